@@ -1,0 +1,56 @@
+# make study   install into .venv if need be, then run the main job
+# make test    the same, then the quick checks: ruff, mypy, pytest
+# make help    every target
+
+PYTHON ?= python3
+JOBS ?= 2
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+# Tests run in parallel processes; threads of BLAS and OpenMP on top would fight for the cores.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+PYTEST := $(ONE_THREAD) $(BIN)/python -m pytest -n $(JOBS)
+
+.DEFAULT_GOAL := help
+.PHONY: help venv study lint test test-all bench reports notebooks clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' Makefile | expand -t 14
+
+venv: $(STAMP) ## create .venv with the tested versions of everything
+
+$(STAMP): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar off --quiet \
+		-c constraints.txt -e '.[all,dev]'
+	touch $@
+
+study: $(STAMP) ## the main job: every strategy on the slosh profile and on a real recording
+	$(BIN)/pikanid study
+
+lint: $(STAMP) ## ruff and mypy
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m mypy
+
+test: lint ## lint, then the quick tests (minutes)
+	$(PYTEST)
+
+test-all: lint ## lint, then all tests, the slow ones too
+	$(PYTEST) -m ""
+
+bench: $(STAMP) ## time the code against its references; writes reports/performance.md
+	mkdir -p build reports
+	$(BIN)/python -m pytest benchmarks -m "" --benchmark-only --benchmark-json build/benchmarks.json
+	$(BIN)/python benchmarks/performance.py build/benchmarks.json reports/performance.md
+
+reports: bench ## rewrite everything under reports/
+	$(BIN)/pikanid study --reports reports
+
+notebooks: $(STAMP) ## execute every notebook from top to bottom
+	$(BIN)/python -m pytest --nbmake --nbmake-timeout=300 notebooks
+
+clean: ## remove the environment, builds and caches
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
