@@ -74,11 +74,7 @@ def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'pikanid' has no attribute {name!r}")
     home = _HOMES[name]
-    found: object
-    if home is None:
-        found = import_module(f"pikanid.{name}")
-    else:
-        found = getattr(import_module(home), name)
+    found = getattr(import_module(home), name) if home else import_module(f"pikanid.{name}")
     globals()[name] = found  # the next access no longer comes through here
     return found
 

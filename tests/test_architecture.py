@@ -1,0 +1,232 @@
+"""The rules that keep the package readable: direction of imports, lazy libraries, short files."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "pikanid"
+
+# Rows from the ground up: a module may import from its own row and from the rows before it.
+# A name also covers what continues it with an underscore: "model" covers model_parts.
+ROWS = (
+    ("errors",),
+    ("units", "expressions"),
+    ("approximators",),
+    ("model", "recording", "channel", "excitation"),
+    ("noise",),
+    ("systems", "datasets", "tracking"),
+    ("simulation",),
+    ("problem",),
+    ("estimate",),
+    ("symbolic",),
+    ("functional", "chains", "initial_state"),
+    ("uncertainty",),
+    ("optimise",),
+    ("equivalence",),
+    ("strategies",),
+    ("study",),
+    ("mismatch",),
+    ("concealed",),
+    ("reporting",),
+    ("cli", "__main__"),
+)
+
+# Seconds to import, or optional: never at the top of a module that `import pikanid` can reach.
+HEAVY = ("torch", "kan", "pandas", "matplotlib", "pint", "numba", "sklearn", "pyarrow", "h5py")
+
+# Where a library may be named at all.
+ONLY_IN = {
+    "kan": ("pikanid.approximators.kan",),
+    "torch": (
+        "pikanid.approximators.kan",
+        "pikanid.approximators.mlp",
+        "pikanid.optimise.gradient",
+        "pikanid.equivalence",
+        "pikanid.simulation.torch",
+    ),
+}
+
+LONGEST = 300
+LONGER = {
+    "pikanid/errors.py",  # every failure text in one place is its one idea
+}
+
+
+@dataclass(frozen=True)
+class Import:
+    """One imported module, seen from one place."""
+
+    importer: str
+    imported: str
+    line: int
+    deferred: bool  # inside a function, or for type checkers only
+
+
+def modules() -> dict[str, Path]:
+    """Dotted name -> file, for every module of the package."""
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def _is_type_checking(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+
+
+def _walk(node: ast.AST, deferred: bool = False) -> Iterator[tuple[ast.AST, bool]]:
+    for child in ast.iter_child_nodes(node):
+        inside = deferred or _is_type_checking(child)
+        inside = inside or isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+        yield child, inside
+        yield from _walk(child, inside)
+
+
+def _named(node: ast.AST, importer: str, is_package: bool, known: frozenset[str]) -> list[str]:
+    """The modules that a statement or an `import_module("...")` call names."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom):
+        base = node.module or ""
+        if node.level:
+            up = importer.split(".")
+            up = up[: len(up) - node.level + is_package]
+            base = ".".join([*up, base] if base else up)
+        names = [f"{base}.{alias.name}" for alias in node.names]
+        return [name if name in known else base for name in names]
+    if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+        first = node.args[0]
+        return [str(first.value)] if isinstance(first, ast.Constant) else []
+    return []
+
+
+@cache
+def imports() -> tuple[Import, ...]:
+    """Every import of the package, the deferred ones too."""
+    found: list[Import] = []
+    known = frozenset(modules())
+    for importer, path in modules().items():
+        is_package = path.name == "__init__.py"
+        for node, deferred in _walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for name in _named(node, importer, is_package, known):
+                found.append(Import(importer, name, getattr(node, "lineno", 0), deferred))
+    return tuple(found)
+
+
+def row(module: str) -> int:
+    """The row of a module of the package; -1 where it has none."""
+    room = module.split(".")[1]
+    for height, names in enumerate(ROWS):
+        if any(room == name or room.startswith(f"{name}_") for name in names):
+            return height
+    return -1
+
+
+def within(module: str, folder: str) -> bool:
+    return module == folder or module.startswith((f"{folder}.", f"{folder}_"))
+
+
+def test_every_module_has_a_row() -> None:
+    homeless = [name for name in modules() if name != "pikanid" and row(name) < 0]
+    assert homeless == [], "give the module a row in ROWS and in CONTRIBUTING.md"
+
+
+def test_imports_go_downwards_only() -> None:
+    upwards = [
+        f"{i.importer}:{i.line} imports {i.imported}"
+        for i in imports()
+        if i.importer != "pikanid"  # the front door names everything
+        and i.imported.startswith("pikanid.")
+        and row(i.imported) > row(i.importer)
+    ]
+    assert upwards == []
+
+
+def test_no_module_needs_the_front_door() -> None:
+    through = [
+        f"{i.importer}:{i.line}"
+        for i in imports()
+        if i.imported == "pikanid" and i.importer != "pikanid" and row(i.importer) < len(ROWS) - 1
+    ]
+    assert through == []
+
+
+def test_no_cycles_at_import_time() -> None:
+    known = modules()
+    graph: dict[str, set[str]] = {name: set() for name in known}
+    for i in imports():
+        if not i.deferred and i.imported in known and i.imported != i.importer:
+            graph[i.importer].add(i.imported)
+    try:
+        tuple(TopologicalSorter(graph).static_order())
+    except CycleError as cycle:
+        pytest.fail(" -> ".join(cycle.args[1]))
+
+
+@pytest.mark.parametrize("library", ONLY_IN)
+def test_library_stays_in_its_rooms(library: str) -> None:
+    outside = [
+        f"{i.importer}:{i.line}"
+        for i in imports()
+        if i.imported.split(".")[0] == library
+        and not any(within(i.importer, room) for room in ONLY_IN[library])
+    ]
+    assert outside == []
+
+
+def test_pykan_is_imported_late() -> None:
+    early = [
+        f"{i.importer}:{i.line}"
+        for i in imports()
+        if i.imported.split(".")[0] == "kan" and not i.deferred
+    ]
+    assert early == []
+
+
+def loaded_by(statements: str) -> set[str]:
+    """Top-level modules that a fresh interpreter has loaded after running `statements`."""
+    code = f"{statements}\nimport sys\nprint(*{{name.split('.')[0] for name in sys.modules}})"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    )
+    return set(done.stdout.split())
+
+
+# Which libraries are loaded says more than a stopwatch, and says it on a busy machine too.
+def test_import_pikanid_is_light() -> None:
+    loaded = loaded_by("import pikanid")
+    assert loaded.isdisjoint({*HEAVY, "numpy", "scipy", "sympy"})
+
+
+@pytest.mark.parametrize(
+    "statements",
+    [
+        "import pikanid as pk\nfor name in pk.__all__: getattr(pk, name)",
+        "import pikanid.cli",
+        "import pikanid.approximators",
+    ],
+    ids=["public names", "cli", "approximators"],
+)
+def test_no_heavy_library_before_it_is_needed(statements: str) -> None:
+    assert loaded_by(statements).isdisjoint(HEAVY)
+
+
+def test_files_are_short() -> None:
+    long = {}
+    for path in modules().values():
+        name = path.relative_to(ROOT).as_posix()
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        if lines > LONGEST and name not in LONGER:
+            long[name] = lines
+    assert long == {}, f"a file is one idea, at most {LONGEST} lines"

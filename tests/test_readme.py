@@ -1,0 +1,44 @@
+"""The README's examples work as printed."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import pikanid as pk
+
+README = (Path(__file__).resolve().parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def block(language: str) -> str:
+    """The first fenced block of a language."""
+    found = re.search(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+    assert found, f"README has no {language} block"
+    return found[1]
+
+
+def test_python_example(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(block("python"), "README.md", "exec"), names)
+    estimate = names["estimate"]
+    assert isinstance(estimate, pk.Estimate)
+    assert abs(estimate.value("l_theta") - 0.045) < 5 * estimate.std("l_theta")
+    assert "l_theta" in capsys.readouterr().out
+
+
+def test_model_file() -> None:
+    model = pk.Model.from_dict(tomllib.loads(block("toml")))
+    assert model.free_names == ("l",)
+
+
+def test_commands_are_make_targets() -> None:
+    targets = set(re.findall(r"^make (\S+)", README, re.MULTILINE))
+    makefile = (Path(__file__).resolve().parents[1] / "Makefile").read_text(encoding="utf-8")
+    assert targets == {"study", "test"}
+    assert targets <= set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
