@@ -45,8 +45,9 @@ bench: $(STAMP) ## time the code against its references; writes reports/performa
 	$(BIN)/python -m pytest benchmarks -m "" --benchmark-only --benchmark-json build/benchmarks.json
 	$(BIN)/python benchmarks/performance.py build/benchmarks.json reports/performance.md
 
-reports: bench ## rewrite everything under reports/
-	$(BIN)/pikanid study --reports reports
+reports: bench ## bench, then every other report: benchmarks/report_*.py
+	set -e; for script in $(sort $(wildcard benchmarks/report_*.py)); do \
+		$(BIN)/python $$script reports; done
 
 notebooks: $(STAMP) ## execute every notebook from top to bottom
 	$(BIN)/python -m pytest --nbmake --nbmake-timeout=300 notebooks
