@@ -1,0 +1,435 @@
+"""Every failure that a user can meet, in one place.
+
+Each function returns one sentence that says what is wrong, where, and what to do about it.  The
+exceptions carry that sentence; the command line prints it and exits with `exit_code`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+
+class PikanidError(Exception):
+    """Base of every error that the user can mend; the command line turns it into exit code 2."""
+
+    exit_code = 2
+
+
+class BadModel(PikanidError):
+    """The model (Python or TOML) is inconsistent or says something that cannot be read."""
+
+
+class BadRecording(PikanidError):
+    """The recording cannot be read or cannot be used with this model."""
+
+
+class BadUnit(PikanidError):
+    """A unit is unknown or does not fit."""
+
+
+class BadSetting(PikanidError):
+    """An option has a value that cannot work."""
+
+
+class DatasetUnavailable(PikanidError):
+    """A real recording is neither on disk nor can it be fetched."""
+
+
+class SimulationFailed(PikanidError):
+    """The model cannot be simulated at the given parameters."""
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names) or "(none)"
+
+
+def _did_you_mean(close: Sequence[str]) -> str:
+    return f" Did you mean '{close[0]}'?" if close else ""
+
+
+# --- formulas ------------------------------------------------------------------------------------
+
+
+def bad_name(name: str, what: str) -> str:
+    return f"'{name}' cannot name a {what}: use letters, digits and '_', starting with a letter."
+
+
+def reserved_name(name: str, what: str) -> str:
+    return f"'{name}' cannot name a {what}: it is a built-in of the formula language. Rename it."
+
+
+def formula_too_long(where: str, limit: int) -> str:
+    return f"The formula of {where} is longer than {limit} characters; split it up."
+
+
+def formula_syntax(text: str, where: str, detail: str) -> str:
+    return f"The formula of {where} cannot be read ({detail}): '{_short(text)}'."
+
+
+def formula_forbidden(part: str, where: str) -> str:
+    return (
+        f"'{_short(part)}' in the formula of {where} is not allowed: use numbers, names, "
+        "+ - * / **, parentheses and the listed functions."
+    )
+
+
+def unknown_symbol(name: str, where: str, known: Sequence[str], close: Sequence[str]) -> str:
+    return (
+        f"'{name}' in the formula of {where} is neither a state, an input nor a parameter "
+        f"(known: {_listed(known)}).{_did_you_mean(close)}"
+    )
+
+
+def unknown_function(name: str, where: str, known: Sequence[str], close: Sequence[str]) -> str:
+    return (
+        f"The function '{name}' in the formula of {where} is unknown "
+        f"(known: {_listed(known)}).{_did_you_mean(close)}"
+    )
+
+
+def wrong_argument_count(name: str, wanted: int, given: int, where: str) -> str:
+    return f"{name}() in the formula of {where} takes {wanted} argument(s), not {given}."
+
+
+def caret_power(text: str, where: str) -> str:
+    return f"'^' in the formula of {where} is not a power: write '**' in '{_short(text)}'."
+
+
+def division_by_zero(text: str, where: str) -> str:
+    return f"The formula of {where} divides by zero: '{_short(text)}'."
+
+
+def _short(text: str, limit: int = 80) -> str:
+    return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
+# --- units ---------------------------------------------------------------------------------------
+
+
+def unknown_unit(text: str, where: str = "") -> str:
+    return (
+        f"The unit '{_short(text)}'{f' of {where}' if where else ''} is unknown: write products "
+        "and powers of SI units such as 'm/s^2', 'rad', 'deg/s', 'mV', or '' for none."
+    )
+
+
+def units_differ(source: str, target: str, where: str = "") -> str:
+    hint = " ('g' is gram; standard gravity is 'g_0')" if "g" in (source, target) else ""
+    return (
+        f"{f'{where}: ' if where else ''}'{source or 'dimensionless'}' cannot be converted to "
+        f"'{target or 'dimensionless'}': they measure different things{hint}."
+    )
+
+
+# --- recordings ----------------------------------------------------------------------------------
+
+
+def channel_name(name: object) -> str:
+    return f"A channel cannot be called {name!r}: give it a name of one or more letters."
+
+
+def channel_twice(name: str, where: str) -> str:
+    return f"'{where}' would have two channels called '{name}': rename one of them."
+
+
+def no_channels(where: str) -> str:
+    return f"'{where}' has no numeric column besides time: there is nothing to identify from."
+
+
+def missing_channel(where: str, name: str, known: Iterable[str], close: Sequence[str] = ()) -> str:
+    return (
+        f"'{where}' has no column '{name}'; it has: {_listed(known)}.{_did_you_mean(close)} "
+        "Map it with columns={'name in the model': 'column in the file'}."
+    )
+
+
+def unknown_channel_setting(what: str, name: str, known: Iterable[str]) -> str:
+    return f"{what} names '{name}', which is not a channel (channels: {_listed(known)})."
+
+
+def not_numbers(name: str, what: str) -> str:
+    return f"The {what} of channel '{name}' are not all numbers."
+
+
+def not_one_dimensional(name: str, what: str, shape: object) -> str:
+    return f"The {what} of channel '{name}' have shape {shape}; they must be one-dimensional."
+
+
+def lengths_differ(name: str, times: int, values: int, what: str = "values") -> str:
+    return f"Channel '{name}' has {times} samples but {values} {what}; they must be as many."
+
+
+def bad_sigma(name: str) -> str:
+    return f"The sigma of channel '{name}' must be positive and finite wherever it has a sample."
+
+
+def unknown_hold(name: str, hold: object) -> str:
+    return f"The hold of channel '{name}' is {hold!r}; it must be 'zero', 'first' or None."
+
+
+def bad_stride(n: object) -> str:
+    return f"Cannot keep every {n!r}-th sample: give a whole number, 1 or more."
+
+
+def filter_needs_uniform(where: str, name: str) -> str:
+    return (
+        f"'{where}': the anti-alias filter needs channel '{name}' evenly sampled and without gaps; "
+        "decimate without filter, or window it to a whole stretch first."
+    )
+
+
+def too_short(where: str, name: str, n: int) -> str:
+    return f"'{where}': channel '{name}' has {n} usable sample(s); at least 2 are needed."
+
+
+def bad_time(where: str, place: str, value: float) -> str:
+    return f"'{where}', {place}: the time is {value:g}; every sample needs a finite time."
+
+
+def time_not_rising(where: str, place: str, now: float, before: float) -> str:
+    how = "repeats" if now == before else "goes back from"
+    return (
+        f"'{where}', {place}: the time {now:.9g} s {how} {before:.9g} s; times must rise from "
+        "sample to sample. Sort the rows and remove repeated ones."
+    )
+
+
+def absurd_value(where: str, place: str, name: str, value: float) -> str:
+    return (
+        f"'{where}', {place}: '{name}' is {value:g}, beyond 1e300; leave a missing sample empty "
+        "instead."
+    )
+
+
+def missing_input(where: str, name: str, sample: int, time: float) -> str:
+    return (
+        f"'{where}', sample {sample} (t = {time:g} s): input '{name}' is missing (NaN); only "
+        "outputs may have gaps. Fill it or window the recording."
+    )
+
+
+def constant_output(where: str, name: str, value: float) -> str:
+    return (
+        f"'{where}': output '{name}' is {value:g} throughout; a signal that never changes (a dead "
+        "sensor, a wrong column?) identifies nothing."
+    )
+
+
+# --- excitations ---------------------------------------------------------------------------------
+
+
+def bad_grid(duration: float, dt: float) -> str:
+    return f"duration = {duration:g} s and dt = {dt:g} s make no grid: both positive, dt smaller."
+
+
+def pulse_off_grid(start: float, stop: float, dt: float) -> str:
+    return (
+        f"A pulse from {start:g} s to {stop:g} s does not start and stop on the grid of "
+        f"dt = {dt:g} s: choose a dt that divides both."
+    )
+
+
+def bad_band(frequencies: Sequence[float], dt: float) -> str:
+    return (
+        f"Frequencies {', '.join(f'{f:g}' for f in frequencies) or '(none)'} Hz: they must rise "
+        f"and lie between 0 and half the sampling rate, {0.5 / dt:g} Hz."
+    )
+
+
+def bad_move_bounds(acceleration: float, velocity: float) -> str:
+    return (
+        f"A move needs positive bounds, not acceleration = {acceleration:g} m/s^2 and "
+        f"velocity = {velocity:g} m/s."
+    )
+
+
+def move_too_long(distance: float, seconds: float) -> str:
+    return (
+        f"A move over {distance:g} m takes {seconds:.3g} s and does not fit: give more duration, "
+        "fewer moves, or higher bounds."
+    )
+
+
+# --- models --------------------------------------------------------------------------------------
+
+
+def duplicate_name(name: str, first: str, second: str) -> str:
+    return f"'{name}' names both a {first} and a {second}; every name may be used once."
+
+
+def missing_equation(state: str) -> str:
+    return f"State '{state}' has no equation: add '{state} = \"...\"' under [equations]."
+
+
+def stray_equation(name: str, states: Sequence[str]) -> str:
+    return f"There is an equation for '{name}', which is not a state (states: {_listed(states)})."
+
+
+def not_in_model(what: str, name: str, known: Sequence[str], close: Sequence[str] = ()) -> str:
+    return f"The model has no {what} '{name}' (it has: {_listed(known)}).{_did_you_mean(close)}"
+
+
+def foreign_symbols(names: Sequence[str], where: str) -> str:
+    return (
+        f"{where} uses {_listed(names)}, unknown to the model: declare it as a parameter "
+        "(pass parameters=[...]) or mend the name."
+    )
+
+
+def no_states() -> str:
+    return "The model has no states: list at least one under [states]."
+
+
+def no_outputs() -> str:
+    return "The model has no outputs: list what was measured under [outputs]."
+
+
+def bad_bounds(name: str, value: float, bounds: Sequence[float]) -> str:
+    return (
+        f"Parameter '{name}': its guess {value:g} must lie inside its bounds "
+        f"[{bounds[0]:g}, {bounds[1]:g}], and the lower bound below the upper one."
+    )
+
+
+def bad_value(what: str, value: object, wanted: str) -> str:
+    return f"{what} is {value!r}; it must be {wanted}."
+
+
+def model_file_unreadable(path: str, detail: str) -> str:
+    return f"The model file '{path}' cannot be read: {detail}."
+
+
+def model_file_key(path: str, where: str, key: str, known: Sequence[str]) -> str:
+    return f"'{path}': {where} has the unknown key '{key}' (known: {_listed(known)})."
+
+
+def model_file_missing(path: str, where: str, wanted: str) -> str:
+    return f"'{path}': {where} lacks {wanted}."
+
+
+def unknown_system(name: str, known: Sequence[str], close: Sequence[str]) -> str:
+    return (
+        f"'{name}' is neither a ready-made model ({_listed(known)}) nor a .toml file that exists."
+        f"{_did_you_mean(close)}"
+    )
+
+
+# --- Kolmogorov-Arnold networks -------------------------------------------------------------------
+
+
+def kan_not_installed(module: str) -> str:
+    return f"KANs need '{module}', which is not installed: pip install 'pikanid[kan]'."
+
+
+def kan_width(width: object) -> str:
+    return (
+        f"width = {width} cannot make a KAN: list the nodes of at least two layers, each 1 or more "
+        "(or [sums, products]), the first without products."
+    )
+
+
+def kan_not_shallow(width: object) -> str:
+    return f"A KAN of width {width} is not shallow: this needs one input and one layer of edges."
+
+
+def kan_symbolic(layer: int) -> str:
+    return (
+        f"Layer {layer} of the KAN has symbolic edges: only spline edges have coefficients to "
+        "estimate; unfix_symbolic(...) them first."
+    )
+
+
+def kan_knots(layer: int) -> str:
+    return f"The knots of layer {layer} of the KAN are not uniform: refit it on a uniform grid."
+
+
+def kan_outside(low: float, high: float, start: float, stop: float) -> str:
+    return (
+        f"Times {low:g} to {high:g} s leave the KAN's grid [{start:g}, {stop:g}] s: build it with "
+        "a grid_range that covers them."
+    )
+
+
+def kan_kink(time: float, start: float, stop: float) -> str:
+    return f"A kink at t = {time:g} s does not lie inside the KAN's grid ({start:g}, {stop:g}) s."
+
+
+def kan_file(path: str, detail: str) -> str:
+    return f"'{path}' is not a saved KAN that can be read: {detail}."
+
+
+def kan_coefficients(given: object, wanted: object) -> str:
+    return f"The KAN takes coefficients of shape {wanted}, not {given}."
+
+
+# --- simulation ----------------------------------------------------------------------------------
+
+
+def not_finite(time: float, values: str) -> str:
+    return (
+        f"The simulation leaves the finite numbers near t = {time:g} s at {values}: "
+        "start from other parameter values, or tighten the bounds."
+    )
+
+
+def too_many_events(time: float) -> str:
+    return (
+        f"The model switches without end near t = {time:g} s (more than 100000 events): "
+        "a non-smooth term chatters; check its sign."
+    )
+
+
+def tolerance_not_reached(tolerance: float, reached: float) -> str:
+    return (
+        f"The simulation reaches an error of {reached:.2g} at best, not the wanted {tolerance:.2g}: "
+        "raise the tolerance or choose method='implicit'."
+    )
+
+
+# --- relaxation (PDA, iPDA) ----------------------------------------------------------------------
+
+
+def spline_knots(degree: int, count: int) -> str:
+    return (
+        f"A spline of degree {degree} needs degree >= 1 and at least {2 * (degree + 1)} knots, "
+        f"not {count}: ask for more intervals or a lower degree."
+    )
+
+
+def spline_knots_unsorted() -> str:
+    return "The knots of a spline must be finite and must not decrease: sort them."
+
+
+def degree_too_low(degree: int, order: int) -> str:
+    return (
+        f"Splines of degree {degree} have no derivative of order {order} to compare with the "
+        f"model: choose degree >= {order + 1}, or form='state'."
+    )
+
+
+def relaxation_cannot_see(names: Sequence[str], why: str) -> str:
+    return (
+        f"A relaxation cannot estimate {_listed(names)} ({why}): fix it, or fit with the "
+        "strategy NLS, which simulates the model."
+    )
+
+
+def smoothing_undetermined(names: Sequence[str]) -> str:
+    return (
+        f"PDA fits splines to the data alone, but the outputs do not determine {_listed(names)}: "
+        "use the strategy iPDA or NLS, which also use the physics there."
+    )
+
+
+# --- binding a model to recordings ---------------------------------------------------------------
+
+
+def no_recordings() -> str:
+    return "No recording was given: pass at least one."
+
+
+def too_few_samples(samples: int, parameters: int) -> str:
+    return (
+        f"There are {samples} usable samples for {parameters} free parameters: record more, or fix "
+        "parameters."
+    )

@@ -1,0 +1,310 @@
+"""Text to SymPy and back, for equations that a user writes in a model file.
+
+The grammar is a whitelist: numbers, names, ``+ - * / **``, parentheses and the functions of
+`FUNCTIONS`.  Python's own grammar is used to *read* the text (`ast.parse`); nothing is ever
+evaluated, so a model file from a stranger can do no more than describe a formula.
+
+Non-smooth functions stay symbolic nodes (`sign`, `abs`, `clip`, ...): the simulator switches at
+their kinks exactly instead of rounding them off.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+from collections.abc import Collection, Mapping
+
+import sympy as sp
+from sympy.printing.str import StrPrinter
+
+from pikanid import errors
+
+MAX_LENGTH = 20_000
+MAX_DEPTH = 120
+TIME = sp.Symbol("t", real=True)
+
+
+def symbol(name: str) -> sp.Symbol:
+    """The real symbol that stands for `name` in every model.
+
+    >>> symbol("theta").is_real
+    True
+    """
+    return sp.Symbol(name, real=True)
+
+
+class clip(sp.Function):
+    """``clip(x, lo, hi)``: x limited to [lo, hi]; exact at both kinks."""
+
+    nargs = 3
+
+    def _eval_derivative(self, s: sp.Symbol) -> sp.Expr:
+        x, lo, hi = self.args
+        inside = sp.Heaviside(x - lo) - sp.Heaviside(x - hi)
+        return (
+            inside * x.diff(s)
+            + (1 - sp.Heaviside(x - lo)) * lo.diff(s)
+            + sp.Heaviside(x - hi) * hi.diff(s)
+        )
+
+    def _latex(self, printer: object) -> str:
+        x, lo, hi = (sp.latex(a) for a in self.args)
+        return rf"\operatorname{{clip}}_{{[{lo},\,{hi}]}}\left({x}\right)"
+
+
+class abs_power(sp.Function):
+    """``abs_power(x, n)`` = \\|x\\|ⁿ, zero at x = 0; differentiable in the exponent as well."""
+
+    nargs = 2
+
+    @classmethod
+    def eval(cls, x: sp.Expr, n: sp.Expr) -> sp.Expr | None:
+        if n.is_Integer and n.is_positive:
+            return sp.Abs(x) ** n
+        return None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        x, n = self.args
+        if argindex == 1:
+            return n * signed_power(x, n - 1)
+        return self * log_abs(x)
+
+    def _latex(self, printer: object) -> str:
+        x, n = (sp.latex(a) for a in self.args)
+        return rf"\left|{x}\right|^{{{n}}}"
+
+
+class signed_power(sp.Function):
+    """``signed_power(x, n)`` = sgn(x)·\\|x\\|ⁿ: the family of Coulomb (n=0) and drag (n=2) laws."""
+
+    nargs = 2
+
+    @classmethod
+    def eval(cls, x: sp.Expr, n: sp.Expr) -> sp.Expr | None:
+        if n.is_zero:
+            return sp.sign(x)
+        if n == 1:
+            return x
+        if n.is_Integer and n.is_positive:
+            return sp.sign(x) * sp.Abs(x) ** n
+        return None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        x, n = self.args
+        if argindex == 1:
+            return n * abs_power(x, n - 1)
+        return self * log_abs(x)
+
+    def _latex(self, printer: object) -> str:
+        x, n = (sp.latex(a) for a in self.args)
+        return rf"\operatorname{{sgn}}\left({x}\right)\left|{x}\right|^{{{n}}}"
+
+
+class log_abs(sp.Function):
+    """ln|x|, taken as 0 at x = 0, where it only ever multiplies |x|ⁿ = 0."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        return 1 / self.args[0]
+
+
+def _step(x: sp.Expr) -> sp.Expr:
+    return sp.Heaviside(x, sp.Rational(1, 2))
+
+
+def _dead_zone(x: sp.Expr, width: sp.Expr) -> sp.Expr:
+    return x - clip(x, -width, width)
+
+
+FUNCTIONS: Mapping[str, tuple[int, object]] = {
+    "sin": (1, sp.sin), "cos": (1, sp.cos), "tan": (1, sp.tan),
+    "asin": (1, sp.asin), "acos": (1, sp.acos), "atan": (1, sp.atan), "atan2": (2, sp.atan2),
+    "sinh": (1, sp.sinh), "cosh": (1, sp.cosh), "tanh": (1, sp.tanh),
+    "exp": (1, sp.exp), "log": (1, sp.log), "sqrt": (1, sp.sqrt),
+    "abs": (1, sp.Abs), "sign": (1, sp.sign), "step": (1, _step),
+    "min": (2, sp.Min), "max": (2, sp.Max), "clip": (3, clip), "dead_zone": (2, _dead_zone),
+    "abs_power": (2, abs_power), "signed_power": (2, signed_power), "log_abs": (1, log_abs),
+}  # fmt: skip
+RESERVED = frozenset(FUNCTIONS) | {"pi", "t"}
+
+
+def check_name(name: str, what: str) -> str:
+    """Return `name` when it may name a state, input, parameter, output or spline.
+
+    >>> check_name("theta_dot", "state")
+    'theta_dot'
+    """
+    if not name.isidentifier() or not name.isascii() or name.startswith("_"):
+        raise errors.BadModel(errors.bad_name(name, what))
+    if name in RESERVED:
+        raise errors.BadModel(errors.reserved_name(name, what))
+    return name
+
+
+def parse(text: str, names: Collection[str], where: str, functions: Collection[str] = ()) -> sp.Expr:
+    """Parse one formula.
+
+    Parameters
+    ----------
+    text : the formula, for example ``"u_x/l*cos(theta) - g/l*sin(theta)"``
+    names : the symbols that may occur (``t`` and ``pi`` always may)
+    where : what the formula belongs to, for the error message
+    functions : names of one-argument functions that the model adds (spline edges)
+
+    Raises
+    ------
+    pikanid.errors.BadModel : unknown name or function, or anything outside the grammar
+
+    >>> parse("a*sin(x)**2", {"a", "x"}, "equation of x")
+    a*sin(x)**2
+    """
+    if len(text) > MAX_LENGTH:
+        raise errors.BadModel(errors.formula_too_long(where, MAX_LENGTH))
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as problem:
+        detail = problem.msg if isinstance(problem, SyntaxError) else "it is nested too deeply"
+        raise errors.BadModel(errors.formula_syntax(text, where, detail)) from None
+    return _Reader(frozenset(names), frozenset(functions), text, where).read(tree, 0)
+
+
+def to_text(expression: sp.Expr) -> str:
+    """The formula as text that `parse` reads back to an equal expression.
+
+    >>> to_text(parse("abs(x)*max(x, 0.1)", {"x"}, "test"))
+    'max(0.1, x)*abs(x)'
+    """
+    return str(_Printer({"order": "none"}).doprint(expression))
+
+
+def to_real(expression: sp.Expr | float | str) -> sp.Expr:
+    """The expression with every free symbol replaced by the model's real symbol of that name."""
+    expr = sp.sympify(expression) if not isinstance(expression, str) else symbol(expression)
+    return expr.xreplace({s: symbol(s.name) for s in expr.free_symbols if s != symbol(s.name)})
+
+
+class _Reader:
+    """Walks Python's syntax tree and builds SymPy, refusing every node outside the whitelist."""
+
+    def __init__(self, names: frozenset[str], functions: frozenset[str], text: str, where: str):
+        self.names, self.functions, self.text, self.where = names, functions, text, where
+
+    def fail(self, node: ast.AST) -> errors.BadModel:
+        part = ast.get_source_segment(self.text.strip(), node) or self.text
+        return errors.BadModel(errors.formula_forbidden(part, self.where))
+
+    def read(self, node: ast.AST, depth: int) -> sp.Expr:
+        if depth > MAX_DEPTH:
+            raise errors.BadModel(errors.formula_syntax(self.text, self.where, "nested too deeply"))
+        match node:
+            case ast.Constant(value=bool() | complex()):
+                raise self.fail(node)
+            case ast.Constant(value=int() | float() as value):
+                return self.number(value, node)
+            case ast.Name(id=name):
+                return self.name(name)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return -self.read(operand, depth + 1)
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.read(operand, depth + 1)
+            case ast.BinOp(left=left, op=op, right=right):
+                return self.binary(node, op, self.read(left, depth + 1), self.read(right, depth + 1))
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
+                return self.call(node, name, [self.read(a, depth + 1) for a in args])
+        raise self.fail(node)
+
+    def number(self, value: int | float, node: ast.AST) -> sp.Expr:
+        if isinstance(value, int) and abs(value) < 2**53:
+            return sp.Integer(value)
+        try:
+            real = float(value)
+        except OverflowError:
+            real = math.inf
+        if not math.isfinite(real):
+            raise self.fail(node)
+        return sp.Float(real)
+
+    def name(self, name: str) -> sp.Expr:
+        if name == "pi":
+            return sp.pi
+        if name in self.names or name == "t":
+            return symbol(name)
+        close = difflib.get_close_matches(name, [*self.names, *FUNCTIONS], 1)
+        raise errors.BadModel(errors.unknown_symbol(name, self.where, sorted(self.names), close))
+
+    def binary(self, node: ast.AST, op: ast.operator, left: sp.Expr, right: sp.Expr) -> sp.Expr:
+        match op:
+            case ast.Add():
+                return left + right
+            case ast.Sub():
+                return left - right
+            case ast.Mult():
+                return left * right
+            case ast.Div():
+                if right.is_zero:
+                    raise errors.BadModel(errors.division_by_zero(self.text, self.where))
+                return left / right
+            case ast.Pow():
+                return self.power(node, left, right)
+            case ast.BitXor():
+                raise errors.BadModel(errors.caret_power(self.text, self.where))
+        raise self.fail(node)
+
+    def power(self, node: ast.AST, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+        if base.is_number and exponent.is_number and not (
+            exponent.is_Integer and abs(int(exponent)) <= 8 and abs(float(base)) < 1e6
+        ):
+            # exact big-integer powers can fill the memory: these become floating point
+            try:
+                return self.number(float(base) ** float(exponent), node)
+            except (OverflowError, ZeroDivisionError, TypeError):
+                raise self.fail(node) from None
+        if base.is_zero and exponent.is_negative:
+            raise errors.BadModel(errors.division_by_zero(self.text, self.where))
+        return base**exponent
+
+    def call(self, node: ast.AST, name: str, args: list[sp.Expr]) -> sp.Expr:
+        if name in self.functions:
+            count, build = 1, sp.Function(name, real=True)
+        elif name in FUNCTIONS:
+            count, build = FUNCTIONS[name]  # type: ignore[assignment]
+        else:
+            known = sorted([*FUNCTIONS, *self.functions])
+            close = difflib.get_close_matches(name, known, 1)
+            raise errors.BadModel(errors.unknown_function(name, self.where, known, close))
+        if len(args) != count:
+            raise errors.BadModel(errors.wrong_argument_count(name, count, len(args), self.where))
+        result = build(*args)  # type: ignore[operator]
+        if result.has(sp.zoo, sp.nan, sp.oo, sp.I):
+            raise self.fail(node)
+        return result
+
+
+class _Printer(StrPrinter):
+    """Prints what `parse` can read: lower-case names, floats that round-trip exactly."""
+
+    def _print_Float(self, expr: sp.Float) -> str:
+        return repr(float(expr))
+
+    def _print_Abs(self, expr: sp.Expr) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_Heaviside(self, expr: sp.Expr) -> str:
+        return f"step({self._print(expr.args[0])})"
+
+    def _nested(self, name: str, args: tuple[sp.Expr, ...]) -> str:
+        text = self._print(args[0])
+        for arg in args[1:]:
+            text = f"{name}({text}, {self._print(arg)})"
+        return str(text)
+
+    def _print_Max(self, expr: sp.Expr) -> str:
+        return self._nested("max", expr.args)
+
+    def _print_Min(self, expr: sp.Expr) -> str:
+        return self._nested("min", expr.args)
+
+    def _print_Exp1(self, expr: sp.Expr) -> str:
+        return "exp(1)"

@@ -1,0 +1,92 @@
+"""What must hold for a `Model` to make sense; every violation is a `BadModel` sentence."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from pikanid import errors
+from pikanid.expressions import TIME, check_name
+
+if TYPE_CHECKING:
+    from pikanid.model import Model
+
+
+def find(items: Iterable[Any], name: str, what: str) -> Any:
+    names = []
+    for item in items:
+        if item.name == name:
+            return item
+        names.append(item.name)
+    close = difflib.get_close_matches(name, names, 1)
+    raise errors.BadModel(errors.not_in_model(what, name, names, close))
+
+
+def validate(model: Model) -> None:
+    if not model.states:
+        raise errors.BadModel(errors.no_states())
+    if not model.outputs:
+        raise errors.BadModel(errors.no_outputs())
+    _check_names(model)
+    everything = model.symbols | {TIME.name}
+    constants = set(model.parameter_names)
+    start = constants | set(model.input_names)
+    for name, expr in model.equations.items():
+        _check_symbols(expr, everything, f"The equation of '{name}'", model)
+    for output in model.outputs:
+        _check_symbols(output.expression, everything, f"Output '{output.name}'", model)
+        _check_symbols(output.delay, constants, f"The delay of output '{output.name}'", model)
+    for state in model.states:
+        _check_symbols(state.initial, start, f"The initial value of '{state.name}'", model)
+    for item in model.inputs:
+        _check_symbols(item.delay, constants, f"The delay of input '{item.name}'", model)
+        if item.hold not in ("zero", "first"):
+            raise errors.BadModel(errors.bad_value(
+                f"The hold of input '{item.name}'", item.hold, "'zero' or 'first'"))
+    for p in model.parameters:
+        if not math.isfinite(p.value):
+            raise errors.BadModel(errors.bad_value(
+                f"The value of parameter '{p.name}'", p.value, "a finite number"))
+        if not p.bounds[0] < p.bounds[1] or (p.free and not p.bounds[0] <= p.value <= p.bounds[1]):
+            raise errors.BadModel(errors.bad_bounds(p.name, p.value, p.bounds))
+        if p.scope not in ("shared", "recording"):
+            raise errors.BadModel(errors.bad_value(
+                f"The scope of parameter '{p.name}'", p.scope, "'shared' or 'recording'"))
+
+
+def _check_names(model: Model) -> None:
+    seen: dict[str, str] = {}
+    groups: list[tuple[str, Iterable[Any]]] = [
+        ("state", model.states), ("input", model.inputs),
+        ("parameter", model.parameters), ("spline", model.splines)]
+    for what, items in groups:
+        for item in items:
+            check_name(item.name, what)
+            if item.name in seen:
+                raise errors.BadModel(errors.duplicate_name(item.name, seen[item.name], what))
+            seen[item.name] = what
+    outputs = [o.name for o in model.outputs]
+    for name in outputs:
+        check_name(name, "output")  # an output may share the name of the state that it measures
+        if outputs.count(name) > 1:
+            raise errors.BadModel(errors.duplicate_name(name, "output", "output"))
+        if seen.get(name) in ("input", "spline"):
+            raise errors.BadModel(errors.duplicate_name(name, seen[name], "output"))
+    for spline in model.splines:
+        if spline.degree < 1 or spline.size < 1 or any(
+                b < a for a, b in zip(spline.knots, spline.knots[1:], strict=False)):
+            raise errors.BadModel(errors.bad_value(
+                f"Spline '{spline.name}'", f"degree {spline.degree}, {len(spline.knots)} knots",
+                "of degree >= 1 with at least degree + 2 non-decreasing knots"))
+
+
+def _check_symbols(expr: sp.Expr, known: Iterable[str], where: str, model: Model) -> None:
+    unknown = sorted({s.name for s in expr.free_symbols} - set(known))
+    functions = {f.func.__name__ for f in expr.atoms(sp.core.function.AppliedUndef)}
+    unknown += sorted(functions - {s.name for s in model.splines})
+    if unknown:
+        raise errors.BadModel(errors.foreign_symbols(unknown, where))

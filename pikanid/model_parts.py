@@ -1,0 +1,85 @@
+"""The parts of a `Model`: states, inputs, parameters, outputs, spline functions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import sympy as sp
+
+Hold = Literal["zero", "first"]
+Scope = Literal["shared", "recording"]
+
+@dataclass(frozen=True)
+class State:
+    """A state; `initial` is its value at the first instant, a formula of parameters and inputs.
+
+    `initial="free"` in `Model.from_dict` or a model file makes it a parameter `<name>_0`.
+    """
+
+    name: str
+    unit: str = ""
+    initial: sp.Expr = sp.Integer(0)
+
+
+@dataclass(frozen=True)
+class Input:
+    """A recorded input.  `hold` says what happens between its samples, `delay` [s] shifts it."""
+
+    name: str
+    unit: str = ""
+    hold: Hold = "zero"
+    default: float | None = None
+    delay: sp.Expr = sp.Integer(0)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: estimated from `value` as its guess when `free`, else held at `value`.
+
+    `scope="recording"` gives every recording its own value in a joint fit.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    bounds: tuple[float, float] = (-math.inf, math.inf)
+    free: bool = True
+    scope: Scope = "shared"
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Output:
+    """A measured quantity y = h(x, u, t; p), seen `delay` seconds late, with noise `sigma`."""
+
+    name: str
+    expression: sp.Expr
+    unit: str = ""
+    sigma: float | None = None
+    delay: sp.Expr = sp.Integer(0)
+
+
+@dataclass(frozen=True)
+class Spline:
+    """A B-spline function of one argument, usable in any formula of the model as ``name(arg)``.
+
+    Its coefficients are the parameters ``name_0 ... name_{K-1}``, K = len(knots) - degree - 1.
+    Outside the base interval [knots[degree], knots[-degree-1]] the outermost polynomial pieces
+    go on, so that a simulation which strays a little stays smooth.
+    """
+
+    name: str
+    degree: int
+    knots: tuple[float, ...]
+
+    @property
+    def size(self) -> int:
+        """The number of coefficients K."""
+        return len(self.knots) - self.degree - 1
+
+    @property
+    def coefficient_names(self) -> tuple[str, ...]:
+        """The parameters that hold the coefficients."""
+        return tuple(f"{self.name}_{k}" for k in range(self.size))

@@ -1,0 +1,290 @@
+"""A model bound to recordings: which channel drives or measures what, in the model's units.
+
+`Problem` lays out the vector θ of everything that is estimated (shared parameters once, the others
+once a recording); `Experiment` is one recording as the model sees it.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import sympy as sp
+
+from pikanid import errors, units
+from pikanid.expressions import symbol
+from pikanid.model import Input, Model, Output
+from pikanid.recording import Channel, Recording
+
+
+@dataclass(frozen=True)
+class HeldInput:
+    """An input as a function of time: samples (N,) and what happens between them."""
+
+    name: str
+    time: np.ndarray
+    values: np.ndarray
+    hold: Literal["zero", "first"]
+
+    def at(self, t: np.ndarray, delay: float = 0.0, side: Literal["left", "right"] = "right"
+           ) -> np.ndarray:
+        """Values at times t (M,), `delay` seconds late; outside the record its end values."""
+        shifted = np.asarray(t, float) - delay
+        if self.hold == "first":
+            return np.interp(shifted, self.time, self.values)
+        # a sample time met up to rounding belongs to the interval that starts there
+        slack = 1e-9 * self._spacing
+        probe = shifted + (slack if side == "right" else -slack)
+        index = np.searchsorted(self.time, probe, side="right") - 1
+        return self.values[np.clip(index, 0, len(self.time) - 1)]
+
+    def slope(self, t: np.ndarray, delay: float = 0.0) -> np.ndarray:
+        """du/dt inside the intervals that hold the times t."""
+        if self.hold == "zero" or len(self.time) < 2:
+            return np.zeros(len(t))
+        index = np.searchsorted(self.time, np.asarray(t) - delay, side="right") - 1
+        inside = (index >= 0) & (index < len(self.time) - 1)
+        index = np.clip(index, 0, len(self.time) - 2)
+        slopes = np.diff(self.values) / np.diff(self.time)
+        return np.where(inside, slopes[index], 0.0)
+
+    @functools.cached_property
+    def switches(self) -> np.ndarray:
+        """Times at which the value (zero-order hold) or the slope (first-order) changes."""
+        if len(self.time) < 2:
+            return np.empty(0)
+        if self.hold == "zero":
+            return self.time[1:][np.diff(self.values) != 0]
+        slopes = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.time), [0.0]])
+        change = np.abs(np.diff(slopes)) > 1e-9 * np.max(np.abs(slopes), initial=0.0)
+        return self.time[change]
+
+    @functools.cached_property
+    def _spacing(self) -> float:
+        return float(np.min(np.diff(self.time))) if len(self.time) > 1 else 1.0
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The measurements of one output: times (N,), values (N,), noise σ (N,) or None."""
+
+    output: int
+    t: np.ndarray
+    y: np.ndarray
+    sigma: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One recording as the model sees it.
+
+    The simulation starts at `t0`, the first instant of any channel that the model uses; an input
+    has its first value before its record begins and its last one after it ends.
+    """
+
+    model: Model
+    name: str
+    t0: float
+    t1: float
+    held: tuple[HeldInput, ...]
+    samples: tuple[Samples, ...]
+    unused: tuple[str, ...] = ()
+
+    @functools.cached_property
+    def fixed_delays(self) -> np.ndarray:
+        """Input delays (m,) at the model's own parameter values."""
+        return delays(self.model.inputs, self.model, np.array(list(self.model.values.values())))
+
+    def inputs(self, t: np.ndarray, side: Literal["left", "right"] = "right") -> np.ndarray:
+        """Inputs (M, m) at times t (M,), right-continuous at switches unless `side="left"`."""
+        columns = [h.at(t, d, side) for h, d in zip(self.held, self.fixed_delays, strict=True)]
+        return np.stack(columns, axis=1) if columns else np.empty((len(t), 0))
+
+    def breakpoints(self) -> np.ndarray:
+        """Interior times at which an input jumps or kinks, sorted, after its delay."""
+        pairs = zip(self.held, self.fixed_delays, strict=True)
+        times = np.concatenate([np.empty(0), *(h.switches + d for h, d in pairs)])
+        return np.unique(times[(times > self.t0) & (times < self.t1)])
+
+    def initial(self, p: np.ndarray) -> np.ndarray:
+        """The initial state x0 (n,) for all parameters p (P,)."""
+        value, _ = initial_state(self.model)
+        return value(p, self.inputs(np.array([self.t0]))[0])
+
+    def initial_jacobian(self, p: np.ndarray) -> np.ndarray:
+        """∂x0/∂p (n, P)."""
+        _, jacobian = initial_state(self.model)
+        return jacobian(p, self.inputs(np.array([self.t0]))[0])
+
+    @property
+    def n_samples(self) -> int:
+        """Number of measurements over all outputs."""
+        return sum(len(s.t) for s in self.samples)
+
+
+@dataclass(frozen=True)
+class FreeParameter:
+    """One entry of θ; `recording` is None for a shared parameter."""
+
+    name: str
+    recording: int | None
+    guess: float
+    bounds: tuple[float, float]
+    unit: str = ""
+
+    @property
+    def label(self) -> str:
+        """The name, with the recording's number where each has its own."""
+        return self.name if self.recording is None else f"{self.name}[{self.recording}]"
+
+
+class Problem:
+    """A model and the recordings that it is fitted to jointly.
+
+    Parameters
+    ----------
+    model : the model
+    recordings : one recording or several
+    need_outputs : whether the recordings must hold the model's outputs (False to simulate only)
+
+    Raises
+    ------
+    pikanid.errors.BadRecording : a channel is missing or cannot be used
+    pikanid.errors.BadUnit : a unit is unknown or does not fit
+    """
+
+    def __init__(self, model: Model, recordings: Recording | Sequence[Recording],
+                 need_outputs: bool = True):
+        self.model = model
+        self.recordings = (
+            (recordings,) if isinstance(recordings, Recording) else tuple(recordings))
+        if not self.recordings:
+            raise errors.BadRecording(errors.no_recordings())
+        self.experiments = tuple(bind(model, r, need_outputs) for r in self.recordings)
+        self.free = self._layout()
+        if need_outputs and self.n_samples < len(self.free):
+            raise errors.BadRecording(errors.too_few_samples(self.n_samples, len(self.free)))
+
+    def _layout(self) -> tuple[FreeParameter, ...]:
+        free = []
+        for p in self.model.parameters:
+            owners: Sequence[int | None] = (
+                [None] if p.scope == "shared" else range(len(self.experiments)))
+            if p.free:
+                free += [FreeParameter(p.name, r, p.value, p.bounds, p.unit) for r in owners]
+        return tuple(free)
+
+    @property
+    def n_samples(self) -> int:
+        """Number of measurements over all recordings and outputs."""
+        return sum(e.n_samples for e in self.experiments)
+
+    @property
+    def guess(self) -> np.ndarray:
+        """θ at the model's guesses (n_free,)."""
+        return np.array([f.guess for f in self.free])
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower bounds of θ."""
+        return np.array([f.bounds[0] for f in self.free])
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds of θ."""
+        return np.array([f.bounds[1] for f in self.free])
+
+    def columns(self, r: int) -> tuple[np.ndarray, np.ndarray]:
+        """Positions in p and in θ of the parameters that recording r is estimated with."""
+        names = self.model.parameter_names
+        here = [(names.index(f.name), k) for k, f in enumerate(self.free)
+                if f.recording in (None, r)]
+        pairs = np.array(here, dtype=np.int64).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
+    def parameters(self, theta: np.ndarray, r: int) -> np.ndarray:
+        """All parameters p (P,) of recording r."""
+        p = np.array(list(self.model.values.values()))
+        inside, outside = self.columns(r)
+        p[inside] = theta[outside]
+        return p
+
+
+def bind(model: Model, recording: Recording, need_outputs: bool = True) -> Experiment:
+    """Find the model's channels in a recording and convert them to the model's units."""
+    held = tuple(_held(recording, item) for item in model.inputs)
+    samples = tuple(_samples(recording, o, k) for k, o in enumerate(model.outputs)
+                    if need_outputs or o.name in recording.channels)
+    times = [s.t for s in samples] + [h.time for h in held if h.name in recording.channels]
+    if not samples:
+        times.append(recording.t)
+    ends = np.array([[t[0], t[-1]] for t in times])
+    used = {*model.input_names, *model.output_names}
+    unused = tuple(n for n in recording.channels if n not in used)
+    return Experiment(model, recording.name, float(ends[:, 0].min()), float(ends[:, 1].max()),
+                      held, samples, unused)
+
+
+def _held(recording: Recording, item: Input) -> HeldInput:
+    if item.name not in recording.channels and item.default is not None:
+        return HeldInput(item.name, np.array([recording.t[0]]), np.array([item.default]), "zero")
+    channel = recording.as_input(item.name)
+    return HeldInput(item.name, channel.time, _converted(channel, item.unit),
+                     channel.hold or item.hold)
+
+
+def _samples(recording: Recording, output: Output, index: int) -> Samples:
+    channel = recording.as_output(output.name)
+    values = _converted(channel, output.unit)
+    seen = np.isfinite(values)
+    sigma = channel.sigma if channel.sigma is not None else None
+    if sigma is not None:
+        factor = units.factor(channel.unit, output.unit) if channel.unit and output.unit else 1.0
+        sigma = np.broadcast_to(np.asarray(sigma, float) * factor, values.shape)[seen]
+    elif output.sigma is not None:
+        sigma = np.full(int(seen.sum()), output.sigma)
+    return Samples(index, channel.time[seen], values[seen], sigma)
+
+
+def _converted(channel: Channel, wanted: str) -> np.ndarray:
+    if not channel.unit or not wanted:
+        return channel.values
+    return units.convert(channel.values, channel.unit, wanted)
+
+
+def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
+    """The delays [s] of inputs or outputs at parameters p (P,)."""
+    table = dict(zip(model.parameter_names, p, strict=True))
+    return np.array([_number(item.delay, table) for item in items])
+
+
+def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
+    """∂delay/∂p (channels, P)."""
+    table = dict(zip(model.parameter_names, p, strict=True))
+    return np.array([[_number(item.delay.diff(symbol(n)), table) for n in model.parameter_names]
+                     for item in items]).reshape(len(items), len(p))
+
+
+def _number(expr: sp.Expr, table: dict[str, float]) -> float:
+    if expr.is_number:
+        return float(expr)
+    return float(expr.xreplace({symbol(n): sp.Float(v) for n, v in table.items()}))
+
+
+@functools.lru_cache(maxsize=64)
+def initial_state(model: Model):  # type: ignore[no-untyped-def]
+    """Functions (p, u0) -> x0 (n,) and (p, u0) -> ∂x0/∂p (n, P), from the symbolic initial state."""
+    n, p_symbols = len(model.states), [symbol(q) for q in model.parameter_names]
+    start = [s.initial for s in model.states]
+    if all(e.is_number for e in start):
+        x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
+        return (lambda p, u: x0.copy()), (lambda p, u: zero.copy())
+    arguments = [p_symbols, [symbol(q) for q in model.input_names]]
+    value = sp.lambdify(arguments, start, "numpy", cse=True)
+    table = [[e.diff(q) for q in p_symbols] for e in start]
+    jacobian = sp.lambdify(arguments, table, "numpy", cse=True)
+    return (lambda p, u: np.array(value(p, u), float)), (
+        lambda p, u: np.array(jacobian(p, u), float).reshape(n, len(p_symbols)))

@@ -1,0 +1,307 @@
+"""From a `Model` to the Python source of its compiled functions.
+
+The source holds, for numba: the right-hand side; the variational equation
+S' = f_x S + f_u ∂u/∂θ + f_p for the columns of S that are asked for; outputs and their
+sensitivities; and, for models with switches, switching functions, their rates along the flow and
+the sensitivities of both.  SymPy differentiates and finds common subexpressions; which parameters
+are estimated is decided at run time (`act`), so that one compiled model serves every choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+from sympy.printing.pycode import PythonCodePrinter
+
+from pikanid.expressions import TIME, log_abs, symbol
+from pikanid.model import Model
+from pikanid.simulation.lowering import (
+    LoweredModel,
+    lower_model,
+    positive_power,
+    spline_value,
+    switch_symbol,
+)
+
+HEADER = '''"""Generated from a model; not meant to be edited."""
+import math
+
+import numpy as np
+from numba import njit
+
+from pikanid.simulation.support import log_abs, positive_power, sgn, solve_small, spline_basis
+
+
+def called(function):
+    return njit(cache=True, error_model="numpy", _nrt=False)(function)
+
+
+def inlined(function):
+    return njit(error_model="numpy", inline="always", _nrt=False)(function)
+
+
+'''
+
+# called once per stage or stop: pasted into the caller, which saves most of the time of small models
+HOT = ("variational", "observe", "observe_sensitivity")
+
+
+class _Printer(PythonCodePrinter):
+    """Prints local names; a model's own symbols get a prefix, so that none hides an array."""
+
+    def _print_Symbol(self, expr: sp.Symbol) -> str:
+        return expr.name if expr == TIME or expr.name.startswith("_") else f"q_{expr.name}"
+
+    def _print_positive_power(self, expr: sp.Expr) -> str:
+        return f"positive_power({self._print(expr.args[0])}, {self._print(expr.args[1])})"
+
+    def _print_log_abs(self, expr: sp.Expr) -> str:
+        return f"log_abs({self._print(expr.args[0])})"
+
+    def _print_Float(self, expr: sp.Float) -> str:
+        return repr(float(expr))
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        return repr(float(expr))
+
+    def _print_Integer(self, expr: sp.Integer) -> str:
+        return f"{int(expr)}.0" if abs(int(expr)) > 2**31 else str(int(expr))
+
+
+_print = _Printer({"fully_qualified_modules": True}).doprint
+
+
+class Writer:
+    """Writes the bodies of a model's functions; knows its symbols and splines."""
+
+    def __init__(self, model: Model, lowered: LoweredModel):
+        self.model, self.lowered = model, lowered
+        self.x = [symbol(n) for n in model.state_names]
+        self.u = [symbol(n) for n in model.input_names]
+        self.p = [symbol(n) for n in model.parameter_names]
+        self.s = [switch_symbol(k) for k in range(len(lowered.switches))]
+        self.v = [sp.Symbol(f"_v_{n}", real=True) for n in model.input_names]
+
+    def unpack(self, exprs: Sequence[sp.Expr]) -> list[str]:
+        """Lines that bring the symbols used in `exprs` into local names."""
+        used = set().union(*(e.free_symbols for e in exprs)) if exprs else set()
+        lines = []
+        for array, symbols in (("x", self.x), ("u", self.u), ("p", self.p), ("v", self.v)):
+            lines += [f"{_print(q)} = {array}[{i}]" for i, q in enumerate(symbols) if q in used]
+        dynamic = self.s[: self.lowered.n_dynamic]
+        return lines + [f"{_print(q)} = s[{i}]" for i, q in enumerate(dynamic) if q in used]
+
+    def block(self, targets: Sequence[tuple[str, sp.Expr]], splines: Splines) -> list[str]:
+        """Assignments `target = expression`, common subexpressions taken out first."""
+        if not targets:
+            return []
+        exprs = [splines.swap(e) for _, e in targets]
+        shared, reduced = sp.cse(exprs, symbols=sp.numbered_symbols("_c"), order="none")
+        lines = [f"{_print(name)} = {_print(value)}" for name, value in shared]
+        return lines + [f"{t} = {_print(e)}"
+                        for (t, _), e in zip(targets, reduced, strict=True)]
+
+    def values(self, name: str, arguments: str, out: str, exprs: Sequence[sp.Expr],
+               inline_switches: bool = False) -> str:
+        """A function that fills `out` with the values of `exprs`."""
+        own = self._own_switches(inline_switches)
+        splines = Splines(self, [*exprs, *own])
+        body = self.unpack([*exprs, *splines.arguments, *own]) + self.prelude(splines, own)
+        body += self.block([(f"{out}[{i}]", e) for i, e in enumerate(exprs)], splines)
+        return _function(name, arguments, body)
+
+    def sensitivities(self, name: str, arguments: str, exprs: Sequence[sp.Expr], out: str,
+                      values: str | None, more: Sequence[tuple[str, sp.Expr]] = (),
+                      inline_switches: bool = False) -> str:
+        """A function that fills ``out[r, a]`` with ∂e_r/∂x S[:, a] + ∂e_r/∂u ud[:, a] + ∂e_r/∂p_act[a].
+
+        `fp` (rows, P + 1) is scratch whose last column stays zero: the "parameter" of an initial
+        state.  `values` names an array for the expressions themselves.
+        """
+        by_x, by_u, targets = [], [], list(more)
+        for r, e in enumerate(exprs):
+            if values:
+                targets.append((f"{values}[{r}]", e))
+            by_x.append(self._partials(e, self.x, f"_x{r}", targets))
+            by_u.append(self._partials(e, self.u, f"_u{r}", targets))
+            for k, q in enumerate(self.p):
+                derivative = e.diff(q)
+                if derivative != 0:
+                    targets.append((f"fp[{r}, {k}]", derivative))
+        own = self._own_switches(inline_switches)
+        used = [*(e for _, e in targets), *own]
+        splines = Splines(self, used)
+        edge_targets, edge_lines = splines.coefficient_columns(exprs)
+        body = self.unpack([*used, *splines.arguments, *(e for _, e in edge_targets)])
+        body += self.prelude(splines, own)
+        body += self.block([*targets, *edge_targets], splines) + edge_lines
+        body += ["for a in range(S.shape[1]):", "    k = act[a]"]
+        for r in range(len(exprs)):
+            terms = [f"{n}*S[{j}, a]" if n != "1" else f"S[{j}, a]" for j, n in by_x[r]]
+            terms += [f"{n}*ud[{j}, a]" for j, n in by_u[r]]
+            body.append(f"    {out}[{r}, a] = " + " + ".join([*terms, f"fp[{r}, k]"]))
+        return _function(name, arguments, body)
+
+    def _partials(self, e: sp.Expr, symbols: Sequence[sp.Symbol], prefix: str,
+                  targets: list[tuple[str, sp.Expr]]) -> list[tuple[int, str]]:
+        found = []
+        for j, q in enumerate(symbols):
+            derivative = e.diff(q)
+            if derivative == 1:
+                found.append((j, "1"))
+            elif derivative != 0:
+                targets.append((f"{prefix}_{j}", derivative))
+                found.append((j, f"{prefix}_{j}"))
+        return found
+
+    def _own_switches(self, inline: bool) -> list[sp.Expr]:
+        return list(self.lowered.switches[self.lowered.n_dynamic:]) if inline else []
+
+    def prelude(self, splines: Splines, own: Sequence[sp.Expr]) -> list[str]:
+        """Splines and the outputs' own switches, each after what its argument needs."""
+        start = self.lowered.n_dynamic
+        pending = {self.s[start + i]: g for i, g in enumerate(own)}
+        lines: list[str] = []
+        for n, (_, z) in enumerate(splines.keys):
+            lines += self._switches_for([z], pending, splines)
+            lines += splines.lines(n)
+        return lines + self._switches_for(list(pending), pending, splines)
+
+    def _switches_for(self, exprs: Sequence[sp.Expr], pending: dict[sp.Symbol, sp.Expr],
+                      splines: Splines) -> list[str]:
+        lines: list[str] = []
+        wanted = set().union(*(e.free_symbols for e in exprs)) if exprs else set()
+        for q in [q for q in self.s if q in wanted and q in pending]:
+            if q in pending:
+                g = pending.pop(q)
+                lines += self._switches_for([g], pending, splines)
+                lines.append(f"{_print(q)} = sgn({_print(splines.swap(g))})")
+        return lines
+
+
+class Splines:
+    """The spline evaluations that a function needs: basis values and sums, once per argument."""
+
+    def __init__(self, writer: Writer, exprs: Sequence[sp.Expr]):
+        self.writer = writer
+        atoms = set().union(*(e.atoms(spline_value) for e in exprs)) if exprs else set()
+        keys = {(int(a.args[0]), a.args[2]) for a in atoms}
+        self.keys = sorted(keys, key=lambda key: (key[1].count_ops(), sp.default_sort_key(key[1])))
+        self.orders = {
+            key: sorted({0} | {int(a.args[1]) for a in atoms
+                               if (int(a.args[0]), a.args[2]) == key})
+            for key in self.keys}
+        self.arguments = [z for _, z in self.keys]
+
+    def swap(self, expr: sp.Expr) -> sp.Expr:
+        """The expression with spline evaluations replaced by the local names that hold them."""
+        table = {
+            spline_value(i, o, z): sp.Symbol(f"_e{n}_{o}", real=True)
+            for n, (i, z) in enumerate(self.keys) for o in self.orders[(i, z)]}
+        return expr.subs(table) if table else expr
+
+    def lines(self, n: int) -> list[str]:
+        """Lines that evaluate the n-th basis and its sums."""
+        i, z = self.keys[n]
+        spline = self.writer.model.splines[i]
+        d, first = spline.degree, self._offset(i)
+        out = [f"_z{n} = {_print(self.swap(z))}"]
+        for o in self.orders[(i, z)]:
+            out += [f"_b{n}_{o} = b[{n * 3 + o}, :{d + 1}]",
+                    f"_k{n} = {first} + spline_basis(KNOTS_{i}, {d}, _z{n}, {o}, _b{n}_{o})",
+                    f"_e{n}_{o} = 0.0",
+                    f"for r in range({d + 1}):",
+                    f"    _e{n}_{o} += _b{n}_{o}[r] * p[_k{n} + r]"]
+        return out
+
+    def coefficient_columns(
+        self, exprs: Sequence[sp.Expr]
+    ) -> tuple[list[tuple[str, sp.Expr]], list[str]]:
+        """∂e/∂c_k for the coefficients: needed derivatives, and the lines that spread them."""
+        targets: list[tuple[str, sp.Expr]] = []
+        lines: list[str] = []
+        for r, e in enumerate(exprs):
+            for i in {i for i, _ in self.keys}:
+                first, size = self._offset(i), self.writer.model.splines[i].size
+                if e.atoms(spline_value):
+                    lines.append(f"fp[{r}, {first}:{first + size}] = 0.0")
+            for n, (i, z) in enumerate(self.keys):
+                for o in self.orders[(i, z)]:
+                    handle = sp.Dummy(real=True)
+                    derivative = e.subs(spline_value(i, o, z), handle).diff(handle)
+                    if derivative == 0:
+                        continue
+                    derivative = derivative.subs(handle, spline_value(i, o, z))
+                    targets.append((f"_w{r}_{n}_{o}", derivative))
+                    d = self.writer.model.splines[i].degree
+                    lines += [f"for r in range({d + 1}):",
+                              f"    fp[{r}, _k{n} + r] += _w{r}_{n}_{o} * _b{n}_{o}[r]"]
+        return targets, lines
+
+    def _offset(self, i: int) -> int:
+        first = self.writer.model.splines[i].coefficient_names[0]
+        return self.writer.model.parameter_names.index(first)
+
+
+def _function(name: str, arguments: str, body: Sequence[str]) -> str:
+    lines = "".join(f"    {line}\n" for line in (body or ["pass"]))
+    mark = "inlined" if name in HOT else "called"
+    return f"@{mark}\ndef {name}({arguments}):\n{lines}\n\n"
+
+
+def generate(model: Model) -> tuple[str, LoweredModel]:
+    """The model's functions as source, and its lowered formulas."""
+    lowered = lower_model(model)
+    w = Writer(model, lowered)
+    knots = "".join(f"KNOTS_{i} = np.array({list(map(float, s.knots))})\n"
+                    for i, s in enumerate(model.splines))
+    f, h = lowered.rhs, lowered.outputs
+    edges = len({(a.args[0], a.args[2]) for e in (*f, *h, *lowered.switches)
+                 for a in e.atoms(spline_value)})
+    width = max((s.degree + 1 for s in model.splines), default=1)
+    h_rate = [_rate(w, e) for e in h]
+    source = HEADER + knots + (
+        f"N, M, P, Q, K = {len(w.x)}, {len(w.u)}, {len(w.p)}, {len(h)}, {lowered.n_dynamic}\n"
+        f"BUFFERS = ({3 * edges}, {width})  # basis values: one row per argument and derivative\n\n\n")
+    source += w.values("rhs", "b, t, x, u, p, s, f", "f", f)
+    source += w.sensitivities(
+        "variational", "b, t, x, S, u, ud, p, s, act, f, fp, dS", f, "dS", "f")
+    source += w.values("observe", "b, t, x, u, p, s, y", "y", h, inline_switches=True)
+    source += w.sensitivities(
+        "observe_sensitivity", "b, t, x, S, u, ud, p, s, act, y, fp, J", h, "J", "y",
+        inline_switches=True)
+    source += w.values("observe_rate", "b, t, x, u, v, p, s, y", "y", h_rate, inline_switches=True)
+    if lowered.n_dynamic:
+        g = lowered.switches[: lowered.n_dynamic]
+        rate = [_rate(w, e) for e in g]
+        dynamic = w.s[: lowered.n_dynamic]
+        push = [(f"Fs[{r}, {k}]", e.diff(q))
+                for r, e in enumerate(f) for k, q in enumerate(dynamic) if e.diff(q) != 0]
+        slope = [(f"Gs[{r}, {k}]", e.diff(q))
+                 for r, e in enumerate(rate) for k, q in enumerate(dynamic) if e.diff(q) != 0]
+        source += w.values("switching", "b, t, x, u, p, s, g", "g", g)
+        source += w.sensitivities(
+            "switching_sensitivity", "b, t, x, S, u, ud, p, s, act, fp, gS", g, "gS", None)
+        source += w.values("switching_rate", "b, t, x, u, v, p, s, G", "G", rate)
+        source += w.sensitivities(
+            "switching_rate_sensitivity", "b, t, x, S, u, v, ud, p, s, act, fp, GS, Gs, Fs", rate,
+            "GS", None, [*push, *slope])
+        source += _slopes(w, "switching_gain", slope, "b, t, x, u, v, p, s, Gs")
+    return source, lowered
+
+
+def _rate(w: Writer, e: sp.Expr) -> sp.Expr:
+    """d e/dt along the flow, with the inputs' slopes v."""
+    total = e.diff(TIME)
+    for q, fq in zip(w.x, w.lowered.rhs, strict=True):
+        total += e.diff(q) * fq
+    for q, vq in zip(w.u, w.v, strict=True):
+        total += e.diff(q) * vq
+    return total
+
+
+def _slopes(w: Writer, name: str, targets: Sequence[tuple[str, sp.Expr]], arguments: str) -> str:
+    splines = Splines(w, [e for _, e in targets])
+    body = w.unpack([*(e for _, e in targets), *splines.arguments]) + w.prelude(splines, [])
+    return _function(name, arguments, body + w.block(targets, splines))

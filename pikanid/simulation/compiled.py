@@ -1,0 +1,112 @@
+"""Compiled models: generated source on disk, compiled once and found again by every process.
+
+Numba cannot cache functions made by `exec`, so the source is written to a cache folder (environment
+variable PIKANID_CACHE, else the user's cache folder) under a name made from the model's formulas
+and from the generator's own source.  Parameter values and which parameters are estimated do not
+enter: one compiled model serves them all.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import os
+import platform
+import sys
+import tempfile
+from pathlib import Path
+from types import ModuleType
+from typing import Literal
+
+from pikanid.expressions import to_text
+from pikanid.model import Model
+
+Method = Literal["explicit", "implicit"]
+_HERE = Path(__file__).parent
+
+
+def compiled(model: Model, method: Method = "explicit") -> ModuleType:
+    """The module of compiled functions for `model`; generated at the first call ever.
+
+    `method` chooses the classical Runge-Kutta step or the L-stable implicit one.
+    """
+    return _load(_key(model, method), method, _Handle(model))
+
+
+class _Handle:
+    """Carries the model past the cache: equal keys mean equal modules."""
+
+    def __init__(self, model: Model):
+        self.model = model
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Handle)
+
+
+@functools.lru_cache(maxsize=256)
+def _load(key: str, method: Method, handle: _Handle) -> ModuleType:
+    path = cache_folder() / f"model_{key}.py"
+    if not path.exists():
+        _write(path, _source(handle.model, method))
+    name = f"pikanid_model_{key}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def cache_folder() -> Path:
+    """The folder of generated sources; a temporary one where the usual one cannot be written."""
+    import platformdirs
+
+    wanted = os.environ.get("PIKANID_CACHE") or platformdirs.user_cache_dir("pikanid")
+    folder = Path(wanted) / "compiled"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return folder
+    except OSError:
+        pass
+    fallback = Path(tempfile.gettempdir()) / f"pikanid-{os.getuid()}"
+    fallback.mkdir(mode=0o700, exist_ok=True)
+    return fallback
+
+
+def _source(model: Model, method: Method) -> str:
+    from pikanid.simulation.codegen import generate
+
+    source, lowered = generate(model)
+    kind = "hybrid" if lowered.n_dynamic else "smooth"
+    step = "rk4" if method == "explicit" else "sdirk"
+    pieces = [f"field_{kind}", step, f"drive_{kind}", "integrate"]
+    return source + "\n\n".join((_HERE / "kernels" / f"{p}.py").read_text() for p in pieces)
+
+
+def _key(model: Model, method: Method) -> str:
+    parts = [method, _generator_version(), *model.state_names, "|", *model.input_names, "|",
+             *model.parameter_names, "|", *map(to_text, model.equations.values()), "|",
+             *(to_text(o.expression) for o in model.outputs), "|", repr(model.splines)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:24]
+
+
+@functools.cache
+def _generator_version() -> str:
+    import numba
+
+    files = [*sorted((_HERE / "kernels").glob("*.py")),
+             *(_HERE / f"{n}.py" for n in ("codegen", "lowering", "support"))]
+    digest = hashlib.sha256("".join(f.read_text() for f in files).encode()).hexdigest()
+    return f"{digest} {numba.__version__} {platform.python_version()} {platform.machine()}"
+
+
+def _write(path: Path, source: str) -> None:
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    with os.fdopen(handle, "w") as file:
+        file.write(source)
+    os.replace(temporary, path)

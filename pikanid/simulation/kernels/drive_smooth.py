@@ -1,0 +1,16 @@
+@inlined
+def begin(t, x, S, u, v, ud, p, mode, act, w):
+    """Nothing to prepare: a smooth model has no modes."""
+    return True
+
+
+@inlined
+def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
+    """One sub-step of length h, in place."""
+    if not step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, w.xn, w.Sn):
+        return 1
+    for i in range(N):
+        x[i] = w.xn[i]
+        for a in range(S.shape[1]):
+            S[i, a] = w.Sn[i, a]
+    return 0

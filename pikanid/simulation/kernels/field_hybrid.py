@@ -1,0 +1,81 @@
+@called
+def sliding_indices(mode, index):
+    """List the switching functions that are held at zero; returns how many."""
+    count = 0
+    for k in range(K):
+        if mode[k] == 0.0:
+            index[count] = k
+            count += 1
+    return count
+
+
+@called
+def resolve(t, x, u, v, p, mode, w):
+    """Fill w.s: the sign of each switching function, or the value that holds a sliding one at 0.
+
+    On a sliding surface s follows from d g/dt = G(x, u, t; s) = 0, which is linear in s.
+    """
+    s = w.s
+    for k in range(K):
+        s[k] = mode[k]
+    sliding = sliding_indices(mode, w.index)
+    if sliding == 0:
+        return
+    switching_rate(w.bs, t, x, u, v, p, s, w.G)
+    w.Gs[:, :] = 0.0
+    switching_gain(w.bs, t, x, u, v, p, s, w.Gs)
+    if sliding == 1:
+        for k in range(K):
+            if mode[k] == 0.0 and w.Gs[k, k] != 0.0:
+                s[k] -= w.G[k] / w.Gs[k, k]
+        return
+    for i in range(sliding):
+        w.change[i, 0] = -w.G[w.index[i]]
+        for j in range(sliding):
+            w.matrix[i, j] = w.Gs[w.index[i], w.index[j]]
+    solve_small(w.matrix[:sliding, :sliding], w.change[:sliding])
+    for i in range(sliding):
+        s[w.index[i]] += w.change[i, 0]
+
+
+@called
+def signs(t, x, u, v, p, mode, w):
+    """The values of the s_k in the present mode."""
+    resolve(t, x, u, v, p, mode, w)
+    return w.s
+
+
+@called
+def field_value(t, x, u, v, p, mode, w, f):
+    """The right-hand side in the present mode (Filippov's on a sliding surface)."""
+    resolve(t, x, u, v, p, mode, w)
+    rhs(w.bs, t, x, u, p, w.s, f)
+
+
+@inlined
+def field(t, x, S, u, v, ud, p, mode, act, w, f, dS):
+    """The right-hand side and its variation; on a sliding surface s varies too: dG = 0."""
+    resolve(t, x, u, v, p, mode, w)
+    A = S.shape[1]
+    if A == 0:
+        rhs(w.bs, t, x, u, p, w.s, f)
+        return
+    variational(w.bs, t, x, S, u, ud, p, w.s, act, f, w.fp, dS)
+    sliding = sliding_indices(mode, w.index)
+    if sliding == 0:
+        return
+    w.Gs[:, :] = 0.0
+    w.Fs[:, :] = 0.0
+    switching_rate_sensitivity(w.bs, t, x, S, u, v, ud, p, w.s, act, w.rp, w.GS, w.Gs, w.Fs)
+    for i in range(sliding):
+        for j in range(sliding):
+            w.matrix[i, j] = w.Gs[w.index[i], w.index[j]]
+        for a in range(A):
+            w.ds[i, a] = -w.GS[w.index[i], a]
+    solve_small(w.matrix[:sliding, :sliding], w.ds[:sliding])
+    for r in range(N):
+        for i in range(sliding):
+            push = w.Fs[r, w.index[i]]
+            if push != 0.0:
+                for a in range(A):
+                    dS[r, a] += push * w.ds[i, a]

@@ -1,0 +1,174 @@
+"""Small compiled functions that generated models call."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+
+class Seen(NamedTuple):
+    """Which observations belong to which stop: those at stop i are first[i] ... first[i+1]-1."""
+
+    first: np.ndarray
+    output: np.ndarray
+    row: np.ndarray
+    inside: np.ndarray
+
+
+class Work(NamedTuple):
+    """Scratch arrays of one integration; the kernels themselves allocate nothing."""
+
+    kx: np.ndarray
+    kS: np.ndarray
+    xt: np.ndarray
+    St: np.ndarray
+    xn: np.ndarray
+    Sn: np.ndarray
+    x: np.ndarray
+    S: np.ndarray
+    u: np.ndarray
+    uc: np.ndarray
+    held: np.ndarray
+    ud: np.ndarray
+    f: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    start: np.ndarray
+    y: np.ndarray
+    J: np.ndarray
+    fp: np.ndarray
+    hp: np.ndarray
+    gp: np.ndarray
+    rp: np.ndarray
+    s: np.ndarray
+    g: np.ndarray
+    phi: np.ndarray
+    G: np.ndarray
+    Gs: np.ndarray
+    Fs: np.ndarray
+    gS: np.ndarray
+    GS: np.ndarray
+    ds: np.ndarray
+    index: np.ndarray
+    eye: np.ndarray
+    fx: np.ndarray
+    matrix: np.ndarray
+    change: np.ndarray
+    still: np.ndarray
+    constant: np.ndarray
+    none: np.ndarray
+    nud: np.ndarray
+    nact: np.ndarray
+    bs: np.ndarray
+
+
+def make_work(n: int, m: int, P: int, q: int, k: int, A: int, stages: int,
+              buffers: tuple[int, int]) -> Work:
+    """Scratch for n states, m inputs, P parameters, q outputs, k switches, A sensitivities."""
+    e, z = np.empty, np.zeros
+    big = max(n, k)
+    return Work(
+        kx=e((stages, n)), kS=e((stages, n, A)), xt=e(n), St=e((n, A)), xn=e(n), Sn=e((n, A)),
+        x=e(n), S=e((n, A)), u=e(m), uc=e(m), held=e(m), ud=z((m, A)),
+        f=e(n), before=e(n), after=e(n), start=e(n), y=e(q), J=e((q, A)),
+        fp=z((n, P + 1)), hp=z((q, P + 1)), gp=z((k, P + 1)), rp=z((k, P + 1)),
+        s=e(k), g=e(k), phi=e(k), G=e(k), Gs=z((k, k)), Fs=z((n, k)), gS=e((k, A)),
+        GS=e((k, A)), ds=e((k, A)), index=e(k, np.int64), eye=np.eye(n), fx=e((n, n)),
+        matrix=e((big, big)), change=e((big, 1)), still=z((m, n)),
+        constant=np.full(n, P, np.int64), none=e((n, 0)), nud=e((m, 0)), nact=e(0, np.int64), bs=e(buffers))
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def solve_small(matrix: np.ndarray, right: np.ndarray) -> None:
+    """Solve in place by Gauss-Jordan elimination; a row without a pivot gives zero."""
+    n, columns = right.shape
+    for i in range(n):
+        best = i
+        for r in range(i + 1, n):
+            if abs(matrix[r, i]) > abs(matrix[best, i]):
+                best = r
+        if matrix[best, i] == 0.0:
+            continue
+        for j in range(n):
+            matrix[i, j], matrix[best, j] = matrix[best, j], matrix[i, j]
+        for j in range(columns):
+            right[i, j], right[best, j] = right[best, j], right[i, j]
+        for r in range(n):
+            if r != i and matrix[r, i] != 0.0:
+                factor = matrix[r, i] / matrix[i, i]
+                for j in range(n):
+                    matrix[r, j] -= factor * matrix[i, j]
+                for j in range(columns):
+                    right[r, j] -= factor * right[i, j]
+    for i in range(n):
+        for j in range(columns):
+            right[i, j] = right[i, j] / matrix[i, i] if matrix[i, i] != 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def positive_power(base: float, n: float) -> float:
+    """baseⁿ for base > 0; at base <= 0 zero (one for n = 0), so that no infinity arises there."""
+    if base <= 0.0:
+        return 1.0 if n == 0.0 else 0.0
+    return base**n
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def log_abs(x: float) -> float:
+    """ln|x|, and 0 at x = 0, where it only multiplies |x|ⁿ = 0."""
+    return 0.0 if x == 0.0 else math.log(abs(x))
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def sgn(x: float) -> float:
+    """The sign of x as a float."""
+    return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def spline_basis(knots: np.ndarray, degree: int, z: float, order: int, out: np.ndarray) -> int:
+    """Values at z of the `order`-th derivatives of the degree+1 B-splines that live there.
+
+    Cox-de Boor recursion (de Boor, A Practical Guide to Splines, 2001, ch. X).  Outside the base
+    interval the outermost polynomial pieces go on.  Returns the index of the first of them.
+    """
+    low, high = degree, len(knots) - degree - 2
+    while low < high:
+        middle = (low + high + 1) // 2
+        if knots[middle] <= z:
+            low = middle
+        else:
+            high = middle - 1
+    span = low
+    out[:] = 0.0
+    if order > degree:
+        return span - degree
+    base = degree - order
+    out[base] = 1.0
+    for d in range(1, base + 1):
+        for r in range(base - d, base + 1):
+            i = span - base + r
+            value = 0.0
+            width = knots[i + d] - knots[i]
+            if width > 0.0 and r > base - d:
+                value += (z - knots[i]) / width * out[r]
+            width = knots[i + d + 1] - knots[i + 1]
+            if width > 0.0 and r < base:
+                value += (knots[i + d + 1] - z) / width * out[r + 1]
+            out[r] = value
+    for d in range(base + 1, degree + 1):
+        # each pass turns derivatives of degree d-1 splines into one derivative more at degree d
+        for r in range(d, -1, -1):
+            i = span - d + r
+            value = 0.0
+            width = knots[i + d] - knots[i]
+            if width > 0.0 and r > 0:
+                value += d / width * out[r - 1]
+            width = knots[i + d + 1] - knots[i + 1]
+            if width > 0.0 and r < d:
+                value -= d / width * out[r]
+            out[r] = value
+    return span - degree
