@@ -1,0 +1,449 @@
+"""A recording: named signals over time, immutable, whatever file they came from.
+
+A recording does not know which of its channels are inputs and which are outputs: the model says
+so, by name.  Channels may have different time bases, such as a 500 Hz motion and a 60 Hz camera.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pikanid import channel as channels_of
+from pikanid import errors, resampling, units
+from pikanid.channel import Array, Channel, Hold
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Channel", "Hold", "Recording"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Signals measured together.
+
+    Attributes:
+        channels: Read-only mapping from name to `Channel`.
+        name: How messages and reports call the recording.
+        notes: What reading or preparing it left out or changed, one sentence each.
+        unreadable: Columns of the file that could not be used, and why; asking for one of them
+            raises that sentence.
+
+    >>> rec = Recording.from_arrays([0.0, 0.1, 0.2], {"theta": [0.0, 1.0, 0.5]}, {"theta": "deg"})
+    >>> rec["theta"].unit, rec.names, rec.stop
+    ('deg', ('theta',), 0.2)
+    """
+
+    channels: Mapping[str, Channel]
+    name: str = "recording"
+    notes: tuple[str, ...] = ()
+    unreadable: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        channels = {name: replace(ch, name=name) for name, ch in dict(self.channels).items()}
+        if not channels:
+            raise errors.BadRecording(errors.no_channels(self.name))
+        object.__setattr__(self, "channels", MappingProxyType(channels))
+        object.__setattr__(self, "unreadable", MappingProxyType(dict(self.unreadable)))
+        object.__setattr__(self, "notes", tuple(self.notes))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: ArrayLike,
+        values: Mapping[str, ArrayLike],
+        units: Mapping[str, str] | None = None,
+        sigma: Mapping[str, ArrayLike] | None = None,
+        hold: Mapping[str, Hold] | None = None,
+        name: str = "recording",
+    ) -> Recording:
+        """A recording of arrays that share one time base.
+
+        Args:
+            t: (N,) times [s].
+            values: Channel name -> (N,) samples.
+            units: Channel name -> unit text.
+            sigma: Channel name -> noise standard deviation, scalar or (N,).
+            hold: Channel name -> ``"zero"`` or ``"first"``.
+            name: Of the recording.
+
+        Raises:
+            BadRecording: If lengths differ or values are not numbers.
+            BadSetting: If `units`, `sigma` or `hold` names a channel that is not there.
+
+        >>> Recording.from_arrays([0, 1], {"u": [0, 1]}, hold={"u": "zero"})["u"].hold
+        'zero'
+        """
+        for what, given in (("units", units), ("sigma", sigma), ("hold", hold)):
+            for unknown in set(given or ()) - set(values):
+                raise errors.BadSetting(errors.unknown_channel_setting(what, unknown, values))
+        made = {
+            key: Channel(
+                key,
+                np.asarray(t),
+                np.asarray(y),
+                (units or {}).get(key, ""),
+                (sigma or {}).get(key),  # type: ignore[arg-type]  # checked by Channel
+                (hold or {}).get(key),
+            )
+            for key, y in values.items()
+        }
+        return cls(made, name)
+
+    @classmethod
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        columns: Mapping[str, str | int] | None = None,
+        rate: float | None = None,
+        sheet: str | int | None = None,
+        units: Mapping[str, str] | None = None,
+        sigma: Mapping[str, ArrayLike] | None = None,
+        delimiter: str | None = None,
+        decimal: str | None = None,
+        name: str | None = None,
+    ) -> Recording:
+        """Read a CSV (also gzipped), Excel, Parquet, MAT or NPZ file.
+
+        Args:
+            path: The file; its kind is known by its ending, checked against its content.
+            columns: Channel name -> column in the file; ``"t"`` (or ``"time"``) names the time
+                column.  A column may be given by its header with or without unit, or by its
+                number counted from 1 where the file has no header.
+            rate: Sampling rate [Hz] of a file without a time column.
+            sheet: Excel sheet by name or number counted from 0; the first by default.
+            units: Channel name -> unit, in place of what the header says (``"t"`` for time).
+            sigma: Channel name -> noise standard deviation in the channel's unit.
+            delimiter: Of a CSV; found out by default.
+            decimal: Decimal sign of a CSV, ``"."`` or ``","``; found out by default.
+            name: Of the recording; the file's stem by default.
+
+        Raises:
+            BadRecording: With one sentence that says what is wrong, and in which row.
+
+        >>> import pathlib, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder) / "run.csv"
+        ...     _ = path.write_text("t;theta [deg]\\n0,0;1,5\\n0,1;2,5\\n")
+        ...     Recording.read(path)["theta"].values.tolist()
+        [1.5, 2.5]
+        """
+        from pikanid import reading
+
+        found = reading.read(path, columns, rate, sheet, units, delimiter, decimal)
+        rec = cls(
+            {ch.name: ch for ch in found.channels},
+            name or found.stem,
+            found.notes,
+            found.unreadable,
+        )
+        return rec.with_sigma(sigma) if sigma else rec
+
+    @classmethod
+    def merge(cls, *recordings: Recording, name: str | None = None) -> Recording:
+        """One recording with the channels of several, each with its own time base.
+
+        Raises:
+            BadRecording: If two of them have a channel of the same name.
+
+        >>> a = Recording.from_arrays([0, 1], {"u": [0, 1]}, name="motion")
+        >>> b = Recording.from_arrays([0.0, 0.5, 1.0], {"y": [0, 1, 2]})
+        >>> Recording.merge(a, b).names
+        ('u', 'y')
+        """
+        together: dict[str, Channel] = {}
+        for rec in recordings:
+            for key, ch in rec.channels.items():
+                if key in together:
+                    raise errors.BadRecording(errors.channel_twice(key, rec.name))
+                together[key] = ch
+        return cls(
+            together,
+            name or (recordings[0].name if recordings else "recording"),
+            tuple(note for rec in recordings for note in rec.notes),
+            {key: why for rec in recordings for key, why in rec.unreadable.items()},
+        )
+
+    # --- looking ---------------------------------------------------------------------------------
+
+    def __getitem__(self, name: str) -> Channel:
+        if name in self.channels:
+            return self.channels[name]
+        if name in self.unreadable:
+            raise errors.BadRecording(self.unreadable[name])
+        close = difflib.get_close_matches(name, self.names, n=1, cutoff=0.5)
+        raise errors.BadRecording(errors.missing_channel(self.name, name, self.names, close))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.channels
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Recording):
+            return NotImplemented
+        return self.name == other.name and dict(self.channels) == dict(other.channels)
+
+    __hash__ = None  # type: ignore[assignment]  # equal by content, which no hash should walk
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the channels, in order."""
+        return tuple(self.channels)
+
+    @property
+    def t(self) -> Array:
+        """(N,) times [s] of the first channel."""
+        return next(iter(self.channels.values())).time
+
+    @property
+    def start(self) -> float:
+        """First time of any channel [s]."""
+        return min((float(ch.time[0]) for ch in self.channels.values() if len(ch)), default=0.0)
+
+    @property
+    def stop(self) -> float:
+        """Last time of any channel [s]."""
+        return max((float(ch.time[-1]) for ch in self.channels.values() if len(ch)), default=0.0)
+
+    def as_input(self, name: str, unit: str | None = None) -> Channel:
+        """The channel `name`, fit to drive a model: rising times, nothing missing.
+
+        Args:
+            name: Of the channel.
+            unit: Unit to convert to; as recorded if None.
+
+        Raises:
+            BadRecording: If it is absent or unusable; BadUnit if its unit does not fit.
+
+        >>> Recording.from_arrays([0, 1], {"u": [0, 1]}, {"u": "mV"}).as_input("u", "V").values[1]
+        np.float64(0.001)
+        """
+        return self._checked(name, unit, missing_allowed=False)
+
+    def as_output(self, name: str, unit: str | None = None) -> Channel:
+        """The channel `name`, fit to be compared with a model: missing samples (NaN) may be.
+
+        Args:
+            name: Of the channel.
+            unit: Unit to convert to; as recorded if None.
+
+        Raises:
+            BadRecording: If it is absent, unusable or never changes; BadUnit if its unit does not
+                fit.
+
+        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).as_output("y").values[1]
+        np.float64(1.0)
+        """
+        checked = self._checked(name, unit, missing_allowed=True)
+        channels_of.check_alive(checked, self.name)
+        return checked
+
+    def _checked(self, name: str, unit: str | None, missing_allowed: bool) -> Channel:
+        found = self[name]
+        channels_of.check_times(found, self.name)
+        channels_of.check_values(found, self.name, missing_allowed)
+        return found.converted(found.unit if unit is None else unit)
+
+    # --- preparing -------------------------------------------------------------------------------
+
+    def _with(self, channels: Mapping[str, Channel], *notes: str) -> Recording:
+        return replace(self, channels=channels, notes=(*self.notes, *notes))
+
+    def window(self, start: float | None = None, stop: float | None = None) -> Recording:
+        """The part with start <= t <= stop; times stay as they are.
+
+        >>> rec = Recording.from_arrays([0, 1, 2, 3], {"y": [0, 1, 2, 3]})
+        >>> rec.window(1, 2)["y"].values.tolist()
+        [1.0, 2.0]
+        """
+        a = self.start if start is None else start
+        b = self.stop if stop is None else stop
+        cut = {key: resampling.window(ch, a, b) for key, ch in self.channels.items()}
+        return self._with(cut)
+
+    def split(self, at: float) -> tuple[Recording, Recording]:
+        """The part with t < at, and the part with t >= at.
+
+        >>> a, b = Recording.from_arrays([0, 1, 2, 3], {"y": [0, 1, 2, 3]}).split(2)
+        >>> a.t.tolist(), b.t.tolist()
+        ([0.0, 1.0], [2.0, 3.0])
+        """
+        before = {
+            key: resampling.window(ch, self.start, at, closed=False)
+            for key, ch in self.channels.items()
+        }
+        return self._with(before), self.window(start=at)
+
+    def decimate(
+        self, n: int, filter: bool = False, channels: Iterable[str] | None = None
+    ) -> Recording:
+        """Every n-th sample of every channel, or of `channels`.
+
+        A channel with a declared hold is an input that is known between its samples: it is
+        thinned only where that leaves the held function as it was, and never filtered; otherwise
+        it keeps its full rate, and a note says so.
+
+        Args:
+            n: Keep samples 0, n, 2n, ...
+            filter: Low-pass first (zero phase), so that nothing aliases.
+            channels: Names of the channels to thin; all by default.
+
+        Raises:
+            BadSetting: If n < 1.
+            BadRecording: If a channel is missing, or `filter` meets gaps or uneven times.
+
+        >>> rec = Recording.from_arrays([0, 1, 2, 3, 4], {"y": [0, 1, 2, 3, 4]})
+        >>> rec.decimate(2)["y"].values.tolist()
+        [0.0, 2.0, 4.0]
+        """
+        if n != int(n) or n < 1:
+            raise errors.BadSetting(errors.bad_stride(n))
+        thin, notes = dict(self.channels), []
+        for key in self.names if channels is None else channels:
+            ch = self[key]
+            if ch.hold is not None:
+                if resampling.survives_stride(ch, int(n)):
+                    thin[key] = resampling.stride(ch, int(n))
+                else:
+                    notes.append(f"Input '{key}' keeps its full rate: thinning would change it.")
+            elif filter:
+                thin[key] = resampling.filtered_stride(ch, int(n), self.name)
+            else:
+                thin[key] = resampling.stride(ch, int(n))
+        return self._with(thin, *notes)
+
+    def rename(self, names: Mapping[str, str]) -> Recording:
+        """Channels under new names: old name -> new name.
+
+        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).rename({"y": "theta"}).names
+        ('theta',)
+        """
+        for old in names:
+            self[old]
+        renamed = [names.get(key, key) for key in self.names]
+        for key in renamed:
+            if renamed.count(key) > 1:
+                raise errors.BadRecording(errors.channel_twice(key, self.name))
+        return self._with(dict(zip(renamed, self.channels.values(), strict=True)))
+
+    def with_channels(self, *channels: Channel) -> Recording:
+        """With channels added, or replaced where the name is the same.
+
+        >>> rec = Recording.from_arrays([0, 1], {"y": [0, 1]})
+        >>> rec.with_channels(Channel("u", [0, 1], [1, 1])).names
+        ('y', 'u')
+        """
+        return self._with({**self.channels, **{ch.name: ch for ch in channels}})
+
+    def with_channel(self, channel: Channel) -> Recording:
+        """With one channel added or replaced."""
+        return self.with_channels(channel)
+
+    def without(self, *names: str) -> Recording:
+        """Without these channels.
+
+        >>> Recording.from_arrays([0, 1], {"y": [0, 1], "u": [0, 0]}).without("u").names
+        ('y',)
+        """
+        for key in names:
+            self[key]
+        return self._with({key: ch for key, ch in self.channels.items() if key not in names})
+
+    def with_sigma(
+        self, sigma: Mapping[str, Any] | None = None, /, **more: ArrayLike | None
+    ) -> Recording:
+        """With noise standard deviations, in the channels' own units; None takes one away.
+
+        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).with_sigma(y=0.1)["y"].sigma
+        0.1
+        """
+        given = {**(sigma or {}), **more}
+        return self.with_channels(*(replace(self[k], sigma=s) for k, s in given.items()))
+
+    def with_unit(self, name: str, unit: str) -> Recording:
+        """With another unit text on a channel whose values are right and whose unit is not.
+
+        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).with_unit("y", "mm")["y"].unit
+        'mm'
+        """
+        return self.with_channels(replace(self[name], unit=units.parse(unit)))
+
+    def with_hold(self, **hold: Hold) -> Recording:
+        """With the hold of inputs declared.
+
+        >>> Recording.from_arrays([0, 1], {"u": [0, 1]}).with_hold(u="first")["u"].hold
+        'first'
+        """
+        return self.with_channels(*(replace(self[k], hold=h) for k, h in hold.items()))
+
+    def shift(self, name: str, seconds: float) -> Recording:
+        """With one channel moved later by `seconds`.
+
+        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).shift("y", 0.5)["y"].time.tolist()
+        [0.5, 1.5]
+        """
+        return self.with_channels(replace(self[name], time=self[name].time + seconds))
+
+    # --- leaving ---------------------------------------------------------------------------------
+
+    def to_frame(self) -> pd.DataFrame:
+        """A DataFrame indexed by time; with several time bases, their union and NaN between.
+
+        >>> Recording.from_arrays([0, 1], {"y": [5, 6]}).to_frame()["y"].tolist()
+        [5.0, 6.0]
+        """
+        import pandas as pd
+
+        every = np.unique(np.concatenate([ch.time for ch in self.channels.values()]))
+        series = {key: pd.Series(ch.values, ch.time) for key, ch in self.channels.items()}
+        return pd.DataFrame(series, index=pd.Index(every, name="t"))
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write a ``.csv``, ``.csv.gz`` or ``.parquet`` file; see `pikanid.writing`."""
+        from pikanid import writing
+
+        writing.write(self.channels, path)
+
+    def __repr__(self) -> str:
+        lines = [f"Recording '{self.name}': {self.start:g} s to {self.stop:g} s"]
+        lines += [
+            "  " + "  ".join(part.ljust(width) for part, width in zip(row, widths, strict=True))
+            for rows in [[_summary(ch) for ch in self.channels.values()]]
+            for widths in [[max(map(len, column)) for column in zip(*rows, strict=True)]]
+            for row in rows
+        ]
+        lines += [f"  note: {note}" for note in self.notes]
+        return "\n".join(line.rstrip() for line in lines)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{escape(part)}</td>" for part in _summary(ch)) + "</tr>"
+            for ch in self.channels.values()
+        )
+        return f"<table><caption>{escape(self.name)}</caption>{rows}</table>"
+
+
+def _summary(ch: Channel) -> tuple[str, ...]:
+    finite = ch.values[np.isfinite(ch.values)]
+    span = f"{finite.min():.4g} to {finite.max():.4g}" if finite.size else "no values"
+    gaps = len(ch) - finite.size
+    rate = f"every {ch.interval:.6g} s" if ch.uniform else "uneven times"
+    sigma = "" if ch.sigma is None else f"sigma {np.median(ch.sigma):.3g}"
+    return (
+        ch.name,
+        f"[{ch.unit}]" if ch.unit else "",
+        f"{len(ch)} samples, {rate}",
+        span,
+        f"{gaps} missing" if gaps else "",
+        f"hold {ch.hold}" if ch.hold else "",
+        sigma,
+    )
