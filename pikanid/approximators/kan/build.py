@@ -1,0 +1,235 @@
+"""Builds real pykan models, and makes their own methods safe to call.
+
+The models are instances of pykan's `MultKAN` in float64: `plot()`, `prune()`, `refine()`,
+`auto_symbolic()` and the rest work on them as on any pykan model, without writing into the working
+directory, touching a random generator or asking for another default dtype.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache, wraps
+from importlib import import_module
+from typing import Any, Literal
+
+import numpy as np
+
+from pikanid.approximators.kan.plan import Array, Base, KanPlan, plan_kan
+from pikanid.approximators.kan.quiet import pykan_module, undisturbed
+
+# pykan methods that seed, make tensors of the default dtype or construct models.
+_GUARDED = (
+    "attribute",
+    "auto_symbolic",
+    "expand_depth",
+    "expand_width",
+    "feature_interaction",
+    "fix_symbolic",
+    "perturb",
+    "prune_edge",
+    "prune_input",
+    "prune_node",
+    "suggest_symbolic",
+)
+
+
+def build_kan(
+    width: Sequence[int | Sequence[int]],
+    grid: int | Sequence[int] = 5,
+    k: int = 3,
+    grid_range: Sequence[float] | Sequence[Sequence[float]] = (-1.0, 1.0),
+    *,
+    base: Base = "zero",
+    mult_arity: int | Sequence[Sequence[int]] = 2,
+    seed: int = 0,
+    noise: float = 0.3,
+    start: Literal["noise", "waves"] = "noise",
+    device: str = "cpu",
+) -> Any:
+    """A pykan `MultKAN` in float64 on uniform knots, made without side effects.
+
+    Args:
+        width: Nodes of every layer; [sums, products] for a layer with multiplication nodes.
+        grid: Intervals G, one number or one a layer of edges.
+        k: Spline degree (order, in pykan's words).
+        grid_range: (start, stop) of the grid, or one pair a layer of edges: hidden values rarely
+            live on the range of the inputs, and outside its grid an edge fades to zero.
+        base: "zero" for w_b = 0 in Eq. (3), "silu" for a trainable w_b.
+        mult_arity: Factors of a product node.
+        seed: Of the starting coefficients; the global generators are neither read nor moved.
+        noise: Size of the starting coefficients, as pykan's `noise_scale`: they lie in
+            ±noise / (2 G).
+        start: "waves" lets the hidden edges begin as slow waves that fill the next layer's grid,
+            so that no hidden node starts idle; the last layer starts at noise.
+        device: Torch device.
+
+    Raises:
+        BadSetting: If an argument cannot make a KAN, or torch or pykan is missing.
+
+    >>> kan = build_kan([1, 1], grid=10, grid_range=(0.0, 5.0))
+    >>> kan.act_fun[0].coef.dtype, kan.act_fun[0].coef.shape
+    (torch.float64, torch.Size([1, 1, 13]))
+    """
+    plan = plan_kan(width, grid, k, grid_range, base, mult_arity)
+    kan = blank_kan(plan, device)
+    generator = np.random.default_rng(seed)
+    for layer in range(plan.depth):
+        shape = (plan.nodes(layer), plan.subnodes(layer + 1), plan.knots[layer].shape[1] - k - 1)
+        coef = noise / plan.intervals(layer) * generator.uniform(-0.5, 0.5, shape)
+        if start == "waves" and layer < plan.depth - 1:
+            coef += _waves(plan, layer, shape, generator)
+        write(kan.act_fun[layer].coef, coef)
+        if base == "silu":
+            bound = 1.0 / np.sqrt(shape[0])
+            write(kan.act_fun[layer].scale_base, generator.uniform(-bound, bound, shape[:2]))
+    kan.cache_data = _default_batch(plan, device)
+    return kan
+
+
+def blank_kan(plan: KanPlan, device: str = "cpu") -> Any:
+    """A KAN of this plan whose coefficients are zero and whose edges are all active."""
+    torch = import_module("torch")
+    kind = kan_class()
+    arity = plan.arity if isinstance(plan.arity, int) else [list(row) for row in plan.arity]
+    with undisturbed():
+        # One interval is enough to construct: pykan's own start is a dense least-squares solve
+        # in the default dtype, and both are replaced right below.
+        kan = kind(
+            width=[list(layer) for layer in plan.width],
+            grid=1,
+            k=plan.k,
+            mult_arity=arity,
+            base_fun=plan.base,
+            sp_trainable=False,
+            sb_trainable=plan.base != "zero",
+            auto_save=False,
+            device=device,
+        ).double()
+    for layer in range(plan.depth):
+        edges, knots = kan.act_fun[layer], plan.knots[layer]
+        edges.num = plan.intervals(layer)
+        edges.grid = torch.nn.Parameter(_tensor(knots, device), requires_grad=False)
+        shape = (*edges.mask.shape, knots.shape[1] - plan.k - 1)
+        edges.coef = torch.nn.Parameter(_tensor(np.zeros(shape), device))
+        write(edges.scale_sp, np.full(shape[:2], 1.0 / np.sqrt(shape[0])))
+        write(edges.scale_base, np.zeros(shape[:2]))
+        # pykan lets the affine map of an unused symbolic edge ask for gradients.
+        kan.symbolic_fun[layer].affine.requires_grad_(False)
+    grids = [plan.intervals(layer) for layer in range(plan.depth)]
+    kan.grid = grids[0] if len(set(grids)) == 1 else grids
+    kan.grid_range = [float(plan.knots[0][0, plan.k]), float(plan.knots[0][0, -plan.k - 1])]
+    return kan
+
+
+def plan_of(kan: Any) -> KanPlan:
+    """The plan of an existing pykan model, its knots as they are now."""
+    arity = kan.mult_arity
+    return KanPlan(
+        width=tuple((int(sums), int(products)) for sums, products in kan.width),
+        k=int(kan.act_fun[0].k),
+        base=kan.base_fun_name,
+        arity=int(arity) if kan.mult_homo else tuple(tuple(map(int, row)) for row in arity),
+        knots=tuple(read(edges.grid) for edges in kan.act_fun),
+    )
+
+
+def read(parameter: Any) -> Array:
+    """A torch parameter as a NumPy array of its own."""
+    return np.array(parameter.detach().cpu().numpy(), dtype=float)
+
+
+def write(parameter: Any, values: Array) -> None:
+    """Put a NumPy array of the same shape into a torch parameter, in place."""
+    parameter.data = _tensor(values, parameter.device)
+
+
+def _tensor(values: Array, device: Any) -> Any:
+    torch = import_module("torch")
+    return torch.from_numpy(np.array(values, dtype=float)).to(device)
+
+
+def _default_batch(plan: KanPlan, device: str) -> Any:
+    """Inputs that span the grid, so that `plot()` and `prune()` work before the first forward."""
+    knots, k, n = plan.knots[0], plan.k, plan.nodes(0)
+    low, high = knots[:, k], knots[:, -k - 1]
+    unit = (
+        np.linspace(0.0, 1.0, 201)[:, None]
+        if n == 1
+        else np.random.default_rng(0).uniform(size=(500, n))
+    )
+    return _tensor(low + (high - low) * unit, device)
+
+
+def _waves(
+    plan: KanPlan, layer: int, shape: tuple[int, ...], generator: np.random.Generator
+) -> Array:
+    """Coefficients of slow cosines that together fill half of the next layer's grid."""
+    inputs, outputs, size = shape
+    target = plan.knots[layer + 1][0, plan.k : -plan.k or None]
+    middle, half = 0.5 * (target[0] + target[-1]), 0.5 * (target[-1] - target[0])
+    place = (np.arange(size) - 0.5 * (plan.k - 1)) / plan.intervals(layer)
+    turns = generator.uniform(0.25, 1.0, (inputs, outputs, 1))
+    phase = generator.uniform(0.0, 2.0 * np.pi, (inputs, outputs, 1))
+    wave = middle / inputs + 0.5 * half / np.sqrt(inputs) * np.cos(
+        2 * np.pi * turns * place + phase
+    )
+    return wave * np.sqrt(inputs)  # scale_sp is 1/sqrt(inputs)
+
+
+@lru_cache(maxsize=1)
+def kan_class() -> type:
+    """pykan's `MultKAN` with its side effects taken out (made on first use, as pykan is slow)."""
+    original: Any = pykan_module().MultKAN
+
+    class QuietKAN(original):
+        """A pykan model whose methods leave no traces; see `pikanid.approximators.kan`."""
+
+        def refine(self, new_grid: int) -> Any:
+            """The same function on a finer grid, exactly where the finer grid contains this one."""
+            from pikanid.approximators.kan.refine import refine
+
+            return refine(self, new_grid).kan
+
+        def prune(self, node_th: float = 1e-2, edge_th: float = 3e-2) -> Any:
+            """Without the nodes and edges that hardly matter on the batch last seen."""
+            from pikanid.approximators.kan.prune import prune
+
+            return prune(self, node_threshold=node_th, edge_threshold=edge_th)
+
+        def plot(self, **options: Any) -> Any:
+            """pykan's diagram as a matplotlib figure."""
+            from pikanid.approximators.kan.plot import plot
+
+            return plot(self, **options)
+
+        def copy(self) -> Any:
+            """A model of its own with the same state."""
+            from pikanid.approximators.kan.state import from_state, to_state
+
+            return from_state(to_state(self))
+
+        def fit(self, dataset: Any, *args: Any, update_grid: bool = False, **options: Any) -> Any:
+            """pykan's training, which here leaves the grid alone unless told otherwise."""
+            with undisturbed(double=True, silent=False):
+                return super().fit(dataset, *args, update_grid=update_grid, **options)
+
+        def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+            from pikanid.approximators.kan.state import from_state, to_state
+
+            return from_state, (to_state(self),)
+
+    for name in _GUARDED:
+        setattr(QuietKAN, name, _guarded(getattr(original, name)))
+    return QuietKAN
+
+
+def _guarded(method: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(method)
+    def call(self: Any, *args: Any, **options: Any) -> Any:
+        with undisturbed(double=True, silent=False):
+            result = method(self, *args, **options)
+        if hasattr(result, "auto_save"):
+            result.auto_save = False
+        return result
+
+    return call

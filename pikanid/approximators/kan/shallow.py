@@ -1,0 +1,281 @@
+"""The shallow KAN [1, n]: Eq. (4), a spline curve for every output, on the KAN's own knots.
+
+Its values and time derivatives are basis matrices, fixed as long as the knots are.  Where an input
+switches, the true curve has a kink in a derivative that no spline on simple knots can follow; the
+basis may therefore be joined by ½(t-t_j)²₊ and (t-t_j)³₊/6 at the switches t_j (`kinks`).  They
+are kept beside the pykan model, in plain sight: curve = kan.forward + kinks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from pikanid import errors
+from pikanid.approximators.kan.bases import (
+    power_blossom,
+    silu,
+    spline_rows,
+    truncated_power,
+)
+from pikanid.approximators.kan.build import plan_of, read, write
+from pikanid.approximators.kan.plan import Array
+
+# A kink of the spline's own degree this near to a knot (in spacings) is what the knot does already.
+_NEAR_KNOT = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Kink:
+    """One enrichment: jump · (t - time)^order_+ / order!, a jump in the order-th derivative."""
+
+    time: float
+    order: int
+    jump: Array
+
+    def __call__(self, t: Array, derivative: int = 0) -> Array:
+        """Its part of the curve at ``t`` (M,), shape (M, outputs)."""
+        return (
+            truncated_power(np.asarray(t, float), self.time, self.order, derivative)[:, None]
+            * self.jump
+        )
+
+
+class ShallowKAN:
+    """A [1, n] pykan model seen as a linear approximator.
+
+    The coefficients of one output are (n_basis,): spline coefficients (mask · scale_sp · coef) in
+    the order of their knots, a kink's coefficient between those that its time separates, and w_b
+    last where the KAN has a base function.  A kink column is the kink function less the spline
+    that equals it on either side, scaled by the knot spacing: it spans the same space, vanishes
+    outside k cells, and keeps every row of the basis short.  With w_b the rows are full.
+
+    Args:
+        kan: A pykan model of width [1, n] (`build_kan`).
+        kinks: Times of the kinks [s], inside the grid, or ready `Kink`s with their jumps.
+        orders: Orders at each time, 1 to k; order k next to a knot is left out (it is a knot).
+
+    Raises:
+        BadSetting: If the model is not shallow, or a kink lies outside its grid.
+
+    >>> from pikanid.approximators.kan import build_kan
+    >>> shallow = ShallowKAN(build_kan([1, 1], grid=10, k=5, grid_range=(0, 5)), kinks=[0.2, 0.6])
+    >>> shallow.n_basis, shallow.basis(np.array([0.0, 0.3]), derivative=2).shape
+    (19, (2, 19))
+    """
+
+    def __init__(
+        self, kan: Any, kinks: Sequence[float | Kink] = (), orders: Sequence[int] = (2, 3)
+    ) -> None:
+        plan = plan_of(kan)
+        if plan.depth != 1 or plan.width[0] != (1, 0) or plan.width[1][1]:
+            raise errors.BadSetting(errors.kan_not_shallow([list(layer) for layer in plan.width]))
+        if float(kan.symbolic_fun[0].mask.abs().sum()) > 0.0:
+            raise errors.BadSetting(errors.kan_symbolic(0))
+        self.kan = kan
+        self.degree = plan.k
+        self.knots = plan.knots[0][0]
+        self.n_outputs = plan.nodes(1)
+        self.has_base = plan.base == "silu"
+        self._spacing = (self.stop - self.start) / plan.intervals(0)
+        self._kinks = self._wanted(kinks, sorted(set(orders)))
+        self._place_kinks()
+        held = {(kink.time, kink.order): kink.jump for kink in kinks if isinstance(kink, Kink)}
+        self._jumps = np.zeros((len(self._kinks), self.n_outputs))
+        for number, place in enumerate(self._kinks):
+            self._jumps[number] = held.get(place, 0.0)
+
+    @property
+    def start(self) -> float:
+        """First time of the grid."""
+        return float(self.knots[self.degree])
+
+    @property
+    def stop(self) -> float:
+        """Last time of the grid."""
+        return float(self.knots[-self.degree - 1])
+
+    @property
+    def n_splines(self) -> int:
+        """Number of B-splines, G + k."""
+        return int(self.knots.size - self.degree - 1)
+
+    @property
+    def n_basis(self) -> int:
+        """Number of basis functions of an output: splines, kinks and w_b."""
+        return self.n_splines + len(self._kinks) + self.has_base
+
+    @property
+    def n_coefficients(self) -> int:
+        """Number of coefficients of an output."""
+        return self.n_basis
+
+    @property
+    def kinks(self) -> tuple[Kink, ...]:
+        """The enrichments with their present jumps."""
+        return tuple(
+            Kink(time, order, jump.copy())
+            for (time, order), jump in zip(self._kinks, self._jumps, strict=True)
+        )
+
+    def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
+        """Basis or its time derivative at ``t`` (M,): csr (M, n_basis), consecutive nonzeros.
+
+        Raises:
+            BadSetting: If a time leaves the grid.
+        """
+        t = self._inside(t)
+        active, values = spline_rows(t, self.knots, self.degree, derivative)
+        rows = np.arange(t.size)[:, None]
+        columns = active[:, None] + np.arange(self.degree + 1)
+        first = self._row_start[active]
+        local = np.zeros((t.size, self._row_width))
+        local[rows, self._spline_at[columns] - first[:, None]] = values
+        for number, (time, order) in enumerate(self._kinks):
+            here = (active >= self._split[number] - self.degree) & (active < self._split[number])
+            spline = np.sum(values[here] * self._beside[number][columns[here]], axis=1)
+            kink = truncated_power(t[here], time, order, derivative) - spline
+            local[here, self._kink_at[number] - first[here]] = kink / self._spacing**order
+        if self.has_base:
+            local[:, -1] = silu(t, derivative)
+        width = self._row_width
+        indices = (first[:, None] + np.arange(width)).ravel()
+        pointers = width * np.arange(t.size + 1)
+        return sparse.csr_array((local.ravel(), indices, pointers), shape=(t.size, self.n_basis))
+
+    def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
+        """The curve for coefficients (n_basis,) or (n_basis, outputs) at ``t`` (M,)."""
+        return self.basis(t, derivative) @ coefficients
+
+    def jacobian(self, t: Array, coefficients: Array, derivative: int = 0) -> sparse.csr_array:
+        """Derivative of ``values`` by one output's coefficients: the basis."""
+        return self.basis(t, derivative)
+
+    @property
+    def coefficients(self) -> Array:
+        """Coefficients (n_basis, outputs) that the pykan model and the kinks hold now."""
+        edges = self.kan.act_fun[0]
+        mask = read(edges.mask)[0]
+        found = np.empty((self.n_basis, self.n_outputs))
+        found[self._spline_at] = (mask * read(edges.scale_sp)[0])[None] * read(edges.coef)[0].T
+        found[self._spline_at] += self._beside.T @ self._jumps
+        found[self._kink_at] = self._jumps * self._scale[:, None]
+        if self.has_base:
+            found[-1] = mask * read(edges.scale_base)[0]
+        return found
+
+    def set_coefficients(self, coefficients: Array) -> None:
+        """Put coefficients (n_basis,) or (n_basis, outputs) into the pykan model and the kinks.
+
+        Raises:
+            BadSetting: If the shape is another.
+        """
+        wanted = (self.n_basis, self.n_outputs)
+        given = np.asarray(coefficients, float)
+        if given.shape == wanted[:1] and self.n_outputs == 1:
+            given = given[:, None]
+        if given.shape != wanted:
+            raise errors.BadSetting(errors.kan_coefficients(given.shape, wanted))
+        edges = self.kan.act_fun[0]
+        mask = read(edges.mask)[0]
+        scale = mask * read(edges.scale_sp)[0]
+        self._jumps = given[self._kink_at] / self._scale[:, None]
+        splines = given[self._spline_at] - self._beside.T @ self._jumps
+        # A masked edge is zero whatever its coefficients are.
+        coef = np.divide(splines, scale, out=np.zeros_like(splines), where=scale != 0.0)
+        write(edges.coef, coef.T[None])
+        if self.has_base:
+            base = np.divide(given[-1], mask, out=np.zeros(self.n_outputs), where=mask != 0.0)
+            write(edges.scale_base, base[None])
+
+    def forward(self, t: Array) -> Array:
+        """The curve (M, outputs) by pykan's own forward pass, plus the kinks."""
+        import torch
+
+        t = self._inside(t)
+        with torch.no_grad():
+            column = torch.from_numpy(t[:, None].copy()).to(self.kan.act_fun[0].grid.device)
+            curve = np.array(self.kan(column).cpu().numpy())
+        for kink in self.kinks:
+            curve += kink(t)
+        return curve
+
+    def refined(self, grid: int) -> ShallowKAN:
+        """The same curve on ``grid`` intervals, with the same kinks."""
+        from pikanid.approximators.kan.refine import refine
+
+        return self.carried_to(refine(self.kan, grid).kan)
+
+    def carried_to(self, kan: Any) -> ShallowKAN:
+        """These kinks, with their jumps, beside another [1, n] model (one just refined, say).
+
+        A kink of order k that now falls on a knot goes into the spline, which contains it.
+        """
+        inner = plan_of(kan).knots[0][0]
+        free: list[Kink] = []
+        absorbed: list[Kink] = []
+        for kink in self.kinks:
+            on_knot = np.abs(inner - kink.time).min() < 1e-9 * self._spacing
+            (absorbed if kink.order == self.degree and on_knot else free).append(kink)
+        other = ShallowKAN(kan, free)
+        found = other.coefficients
+        for kink in absorbed:
+            right = np.searchsorted(other._centres, kink.time)
+            power = power_blossom(other.knots, self.degree, kink.time, kink.order)
+            found[other._spline_at[right:]] += power[right:, None] * kink.jump
+        if absorbed:
+            other.set_coefficients(found)
+        return other
+
+    def _inside(self, t: Array) -> Array:
+        t = np.asarray(t, dtype=float)
+        slack = 1e-9 * (self.stop - self.start)
+        if t.size and (t.min() < self.start - slack or t.max() > self.stop + slack):
+            raise errors.BadSetting(
+                errors.kan_outside(float(t.min()), float(t.max()), self.start, self.stop)
+            )
+        return np.clip(t, self.start, self.stop)
+
+    def _wanted(
+        self, kinks: Sequence[float | Kink], orders: Sequence[int]
+    ) -> list[tuple[float, int]]:
+        places: set[tuple[float, int]] = set()
+        for kink in kinks:
+            if isinstance(kink, Kink):
+                places.add((kink.time, kink.order))
+                continue
+            near = np.abs(self.knots - kink).min() <= _NEAR_KNOT * self._spacing
+            places.update((float(kink), o) for o in orders if o < self.degree or not near)
+        for time, order in places:
+            if not self.start < time < self.stop:
+                raise errors.BadSetting(errors.kan_kink(time, self.start, self.stop))
+            if not 1 <= order <= self.degree:
+                raise errors.BadSetting(
+                    errors.bad_value("the order of a kink", order, f"1 to {self.degree}")
+                )
+        return sorted(places)
+
+    def _place_kinks(self) -> None:
+        n, k = self.n_splines, self.degree
+        self._centres = np.array([self.knots[i + 1 : i + k + 1].mean() for i in range(n)])
+        self._scale = np.array([self._spacing**order for _, order in self._kinks])
+        # The first spline right of the kink: those from there on carry the power function.
+        self._split = np.array(
+            [np.searchsorted(self._centres, time) for time, _ in self._kinks], np.int64
+        )
+        self._beside = np.zeros((len(self._kinks), n))
+        for number, (time, order) in enumerate(self._kinks):
+            right = slice(int(self._split[number]), None)
+            self._beside[number, right] = power_blossom(self.knots, k, time, order)[right]
+        before = np.searchsorted(self._split, np.arange(n), side="right")
+        self._spline_at = np.arange(n) + before
+        self._kink_at = self._split + np.arange(len(self._kinks))
+        starts = self._spline_at[: n - k]
+        self._row_width = int((self._spline_at[k:] - starts).max()) + 1
+        if self.has_base:
+            self._row_width = self.n_basis
+        self._row_start = np.minimum(starts, self.n_basis - self._row_width)
