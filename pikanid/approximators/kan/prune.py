@@ -78,7 +78,7 @@ def prune(
     weak = scores(smaller, x).edges
     state = to_state(smaller)
     layers = tuple(
-        replace(layer, mask=np.where(score.T <= edge_threshold, 0.0, layer.mask))
+        replace(layer, mask=np.where(score.transpose() > edge_threshold, layer.mask, 0.0))
         for layer, score in zip(state.layers, weak, strict=True)
     )
     return from_state(replace(state, layers=layers))

@@ -1,0 +1,60 @@
+"""Trajectory approximators x̂_α(t) of Eq. (2): what may stand in for the state over time.
+
+Two promises are asked of an approximator, and nothing else: its time derivatives as a function of
+its coefficients, and how these change with the coefficients.  A *linear* approximator (B-spline,
+shallow KAN with w_b = 0; Eq. (4)) is its basis alone, and its basis is local: every row of
+``basis(t)`` has the same number of consecutive nonzeros, which makes Gauss-Newton banded.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+
+
+@runtime_checkable
+class Approximator(Protocol):
+    """A scalar function of time with adjustable coefficients (n,)."""
+
+    @property
+    def n_coefficients(self) -> int:
+        """Number of adjustable coefficients."""
+
+    def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
+        """The ``derivative``-th time derivative at ``t`` (M,), shape (M,)."""
+
+    def jacobian(
+        self, t: Array, coefficients: Array, derivative: int = 0
+    ) -> Array | sparse.csr_array:
+        """Derivative of ``values`` with respect to the coefficients, shape (M, n)."""
+
+
+@runtime_checkable
+class LinearApproximator(Protocol):
+    """x̂(t) = Σ c_k B_k(t) (Eq. 4) with a local basis."""
+
+    @property
+    def n_basis(self) -> int:
+        """Number of basis functions."""
+
+    def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
+        """Basis (M, n_basis): equally many consecutive nonzeros a row, one-sided from the right."""
+
+
+def local_rows(matrix: sparse.csr_array) -> tuple[NDArray[np.int64], Array]:
+    """Split a local basis matrix into (first column of each row (M,), values (M, width)).
+
+    >>> first, values = local_rows(sparse.csr_array([[1.0, 2.0, 0.0], [0.0, 3.0, 4.0]]))
+    >>> first, values
+    (array([0, 1]), array([[1., 2.],
+           [3., 4.]]))
+    """
+    rows = matrix.shape[0]
+    width = matrix.nnz // rows if rows else 0
+    first = matrix.indices[::width].astype(np.int64) if width else np.zeros(rows, np.int64)
+    return first, np.asarray(matrix.data, dtype=float).reshape(rows, width)

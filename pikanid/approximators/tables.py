@@ -1,0 +1,104 @@
+"""An approximator at fixed times: evaluated once where it is linear, again and again where not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pikanid.approximators import Approximator, Array, LinearApproximator, local_rows
+
+Matrix = Array | sparse.csr_array
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The `derivative`-th derivative of an approximator at times t (M,).
+
+    Its coefficients are `coefficients[part]` of a recording's coefficient vector (n,).
+    """
+
+    approximator: Approximator | LinearApproximator
+    t: Array = field(repr=False)
+    derivative: int
+    part: slice
+    matrix: sparse.csr_array | None = field(repr=False, default=None)
+    first: NDArray[np.int64] | None = field(repr=False, default=None)
+    local: Array | None = field(repr=False, default=None)
+
+    @staticmethod
+    def of(approximator: Approximator | LinearApproximator, t: Array, derivative: int,
+           part: slice) -> Table:
+        """Tabulate; a linear approximator is evaluated here once and for all."""
+        if not isinstance(approximator, LinearApproximator):
+            return Table(approximator, t, derivative, part)
+        matrix = approximator.basis(t, derivative)
+        first, local = local_rows(matrix)
+        return Table(approximator, t, derivative, part, matrix, first + part.start, local)
+
+    def values(self, coefficients: Array) -> Array:
+        """Values (M,) for a recording's coefficients (n,)."""
+        own = coefficients[self.part]
+        if self.matrix is not None:
+            return self.matrix @ own
+        assert isinstance(self.approximator, Approximator)
+        return self.approximator.values(self.t, own, self.derivative)
+
+    def jacobian(self, coefficients: Array) -> Matrix:
+        """Derivative of `values` by the approximator's own coefficients (M, n_part)."""
+        if self.matrix is not None:
+            return self.matrix
+        assert isinstance(self.approximator, Approximator)
+        return self.approximator.jacobian(self.t, coefficients[self.part], self.derivative)
+
+
+def gauss_nodes(breakpoints: Array, points: int) -> tuple[Array, Array]:
+    """Gauss-Legendre nodes and weights in every interval between breakpoints (E + 1,).
+
+    Nodes lie strictly inside, so none straddles or touches a switch that is a breakpoint.
+
+    Returns
+    -------
+    times (E·points,) increasing, weights (E·points,) [s]
+
+    >>> times, weights = gauss_nodes(np.array([0.0, 2.0, 3.0]), 2)
+    >>> bool(np.isclose((weights * times**3).sum(), 3**4 / 4))
+    True
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    half = 0.5 * np.diff(breakpoints)[:, None]
+    middle = 0.5 * (breakpoints[1:] + breakpoints[:-1])[:, None]
+    return (middle + half * nodes).ravel(), (half * weights).ravel()
+
+
+def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths: tuple[int, ...],
+           start: float) -> tuple[NDArray[np.int64], Array] | None:
+    """How clamped splines are held at a given initial state, exactly, by elimination.
+
+    At the first knot the leading m coefficients of a clamped spline alone decide its value and
+    m - 1 derivatives, so that c[held] = matrix @ (chain states at the start, chain after chain).
+
+    Returns
+    -------
+    (held (k,), matrix (k, k)), or None where an approximator is not clamped there
+    """
+    held, blocks, offset = [], [], 0
+    at = np.array([start])
+    for approximator, length in zip(approximators, lengths, strict=True):
+        if not isinstance(approximator, LinearApproximator):
+            return None
+        rows = np.vstack([approximator.basis(at, q).toarray() for q in range(length)])
+        if np.any(np.abs(np.triu(rows, 1)) > 1e-9 * np.abs(rows).max(axis=1, keepdims=True)):
+            return None
+        held.append(offset + np.arange(length))
+        blocks.append(np.linalg.inv(rows[:, :length]))
+        offset += approximator.n_basis
+    size = sum(lengths)
+    matrix, at_row = np.zeros((size, size)), 0
+    for block in blocks:
+        end = at_row + block.shape[0]
+        matrix[at_row:end, at_row:end] = block
+        at_row = end
+    return np.concatenate(held), matrix

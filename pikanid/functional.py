@@ -1,0 +1,279 @@
+"""Eq. (2): the stacked residual [data; √λ·physics] of an approximator and a model.
+
+PDA, iPDA, PINN and PIKAN minimise ½‖r(α, θ)‖² of this one functional; they differ in the
+approximator, in how λ moves and in the optimiser (Table I).  With σ known the data rows are
+divided by it.  Initial values are part of the model: a clamped spline is held at them exactly, by
+elimination of its leading coefficients; any other approximator is tied to them by heavy rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pikanid import errors
+from pikanid.approximators import Approximator, Array, LinearApproximator
+from pikanid.chains import Chains
+from pikanid.expressions import symbol
+from pikanid.approximators.tables import Table, anchor
+from pikanid.problem import Problem, delays
+from pikanid.simulation.vectorfield import VectorField
+
+Penalty = Literal["physics", "roughness"]
+AnyApproximator = Approximator | LinearApproximator
+
+# Rows for an initial state that cannot be eliminated weigh as much as data of this 1/σ: about 1e-6
+# of the units of the model's states.
+START_WEIGHT = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """Where one family of residuals is taken: M times, E residuals each."""
+
+    t: Array  # (M,)
+    u: Array  # (M, m)
+    weight: Array  # (M, E): square root of the quadrature weight, or 1/σ
+    states: tuple[Table, ...]  # one per state
+    tops: tuple[Table, ...] = ()  # highest derivative of each approximator: E of them
+    target: Array | None = None  # (M, 1): the samples
+    output: int = 0  # which output they are samples of
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One recording's share: its approximators (one per chain) and residual families."""
+
+    approximators: tuple[AnyApproximator, ...]
+    data: tuple[Sites, ...]
+    physics: Sites
+    start: Sites | None  # heavy rows for the initial state, where it cannot be eliminated
+    held: NDArray[np.int64]  # coefficients fixed by the initial state
+    hold: Array  # (k, n): c[held] = hold @ x0
+
+    @property
+    def n_coefficients(self) -> int:
+        """Number of coefficients of the recording's approximators together."""
+        return int(self.physics.tops[-1].part.stop)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Weighted residuals of a family (M, E) and their partial derivatives; None means zero."""
+
+    residual: Array  # (M, E)
+    by_state: Array | None  # (M, E, n)
+    by_top: Array | None  # (M, E): residual e depends on the top of approximator e alone
+    by_theta: Array | None  # (M, E, b): columns `problem.columns(r)`
+
+
+@dataclass(frozen=True, eq=False)
+class Functional:
+    """Eq. (2) for a model bound to recordings.
+
+    α is a list of coefficient vectors, one a recording; θ is the vector of `problem.free`.
+    `scale` (E,) divides the physics residual of each chain; Eq. (2) itself has scale 1.
+    """
+
+    problem: Problem
+    vector_field: VectorField = field(repr=False)
+    chains: Chains
+    parts: tuple[Part, ...] = field(repr=False)
+    scale: Array
+    penalty: Penalty = "physics"
+
+    def with_scale(self, scale: Array) -> Functional:
+        """The same functional with other scales of the physics residual."""
+        return replace(self, scale=np.asarray(scale, dtype=float))
+
+    def smoothing(self) -> Functional:
+        """The functional of PDA's first step: λ weighs the highest derivatives, not the physics."""
+        return replace(self, penalty="roughness")
+
+    @property
+    def n_data(self) -> int:
+        """Number of samples that take part."""
+        return sum(sites.t.size for part in self.parts for sites in part.data)
+
+    def complete(self, r: int, coefficients: Array, theta: Array) -> Array:
+        """The coefficients with the held ones set from the initial state x0(p)."""
+        part = self.parts[r]
+        if part.held.size == 0:
+            return coefficients
+        full = coefficients.copy()
+        x0 = self.problem.experiments[r].initial(self.problem.parameters(theta, r))
+        full[part.held] = part.hold @ x0
+        return full
+
+    def hold_jacobian(self, r: int, theta: Array) -> Array | None:
+        """d c[held] / d θ (k, b) in the columns of `problem.columns(r)`; None where constant."""
+        part = self.parts[r]
+        positions, _ = self.problem.columns(r)
+        p = self.problem.parameters(theta, r)
+        jacobian = self.problem.experiments[r].initial_jacobian(p)[:, positions]
+        return part.hold @ jacobian if part.held.size and np.any(jacobian) else None
+
+    def states(self, sites: Sites, coefficients: Array) -> Array:
+        """Approximated states (M, n) at the sites."""
+        return np.column_stack([table.values(coefficients) for table in sites.states])
+
+    def rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> list[Rows]:
+        """All residual families of recording r with derivatives: data, physics, start."""
+        part = self.parts[r]
+        p = self.problem.parameters(theta, r)
+        positions, _ = self.problem.columns(r)
+        families = [self._data(sites, coefficients, p, positions) for sites in part.data]
+        families.append(self._physics(part.physics, coefficients, p, positions, lam))
+        if part.start is not None:
+            families.append(self._start(part.start, r, coefficients, p, positions))
+        return families
+
+    def _data(self, sites: Sites, c: Array, p: Array, positions: NDArray[np.int64]) -> Rows:
+        x = self.states(sites, c)
+        one = slice(sites.output, sites.output + 1)
+        y = self.vector_field.outputs(sites.t, x, sites.u, p)[:, one]
+        hx, hp = self.vector_field.output_jacobians(sites.t, x, sites.u, p)
+        weight = sites.weight
+        return Rows(weight * (y - sites.target), weight[:, :, None] * hx[:, one], None,
+                    weight[:, :, None] * hp[:, one][:, :, positions])
+
+    def _physics(self, sites: Sites, c: Array, p: Array, positions: NDArray[np.int64],
+                 lam: float) -> Rows:
+        weight = np.sqrt(lam) * sites.weight / self.scale
+        tops = np.column_stack([table.values(c) for table in sites.tops])
+        if self.penalty == "roughness":
+            return Rows(weight * tops, None, weight, None)
+        x = self.states(sites, c)
+        last = list(self.chains.top)
+        f = self.vector_field.rhs(sites.t, x, sites.u, p)[:, last]
+        fx, fp = self.vector_field.rhs_jacobians(sites.t, x, sites.u, p)
+        return Rows(weight * (tops - f), -weight[:, :, None] * fx[:, last], weight,
+                    -weight[:, :, None] * fp[:, last][:, :, positions])
+
+    def _start(self, sites: Sites, r: int, c: Array, p: Array,
+               positions: NDArray[np.int64]) -> Rows:
+        experiment = self.problem.experiments[r]
+        gap = self.states(sites, c) - experiment.initial(p)
+        jacobian = experiment.initial_jacobian(p)[:, positions]
+        weight = sites.weight[:, :, None]
+        return Rows(sites.weight * gap, weight * np.eye(gap.shape[1]), None, -weight * jacobian)
+
+    def families(self, r: int) -> list[Sites]:
+        """The sites of `rows`, in the same order."""
+        part = self.parts[r]
+        return [*part.data, part.physics, *([] if part.start is None else [part.start])]
+
+    def residual(self, coefficients: Sequence[Array], theta: Array, lam: float) -> Array:
+        """Stacked residual, recording after recording, family after family, time by time."""
+        return np.concatenate([
+            rows.residual.ravel() for r, c in enumerate(coefficients)
+            for rows in self.rows(r, c, theta, lam)])
+
+    def jacobian(self, coefficients: Sequence[Array], theta: Array,
+                 lam: float) -> sparse.csr_array:
+        """Derivative of `residual` by [α_1, α_2, ..., θ], for any approximator."""
+        blocks, borders = [], []
+        for r, c in enumerate(coefficients):
+            _, columns = self.problem.columns(r)
+            own, border = [], []
+            for sites, rows in zip(self.families(r), self.rows(r, c, theta, lam), strict=True):
+                own.append(_by_coefficients(sites, rows, c))
+                dense = np.zeros((rows.residual.size, theta.size))
+                if rows.by_theta is not None:
+                    dense[:, columns] = rows.by_theta.reshape(rows.residual.size, -1)
+                border.append(dense)
+            blocks.append(sparse.vstack(own))
+            borders.append(np.vstack(border))
+        return sparse.csr_array(sparse.hstack(
+            [sparse.block_diag(blocks), sparse.csr_array(np.vstack(borders))]))
+
+
+def bind(problem: Problem, vector_field: VectorField, chains: Chains,
+         approximators: Sequence[tuple[AnyApproximator, ...]],
+         nodes: Sequence[tuple[Array, Array]], *, given_start: bool = True,
+         weighted: bool = True) -> Functional:
+    """Eq. (2) for approximators (one tuple a recording, one entry a chain) and physics nodes.
+
+    `nodes` are (times (M,), weights (M,)) a recording: Gauss points with their weights for the
+    integral, the samples with weight 1 for the sum of Eq. (5).  With `given_start` the initial
+    state of the model is kept, exactly where the approximators are clamped.  `weighted` divides
+    data by their σ where it is known.
+
+    Raises:
+        BadSetting: If a delay is to be estimated, which no functional over fixed sites can see.
+    """
+    late = _output_delays(problem)
+    parts = []
+    for experiment, own, (times, weights) in zip(
+            problem.experiments, approximators, nodes, strict=True):
+        sizes = [a.n_basis if isinstance(a, LinearApproximator) else a.n_coefficients for a in own]
+        ends = np.cumsum(sizes)
+        pieces = [slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)]
+
+        def states(t: Array, own: tuple[AnyApproximator, ...] = own,
+                   pieces: list[slice] = pieces) -> tuple[Table, ...]:
+            return tuple(Table.of(own[i], t, q, pieces[i])
+                         for i, q in zip(chains.root, chains.order, strict=True))
+
+        data = []
+        for samples in experiment.samples:
+            seen = np.maximum(samples.t - late[samples.output], experiment.t0)
+            sigma = samples.sigma if weighted and samples.sigma is not None else 1.0
+            weight = np.broadcast_to(1.0 / np.asarray(sigma), seen.shape)[:, None]
+            data.append(Sites(seen, experiment.inputs(seen), weight, states(seen), (),
+                              samples.y[:, None], samples.output))
+        tops = tuple(Table.of(own[i], times, m, pieces[i]) for i, m in enumerate(chains.lengths))
+        weight = np.repeat(np.sqrt(weights)[:, None], len(own), axis=1)
+        physics = Sites(times, experiment.inputs(times), weight, states(times), tops)
+        held, hold, start = np.zeros(0, np.int64), np.zeros((0, len(chains.root))), None
+        if given_start:
+            grip = anchor(own, chains.lengths, experiment.t0)
+            if grip is None:
+                at = np.array([experiment.t0])
+                heavy = np.full((1, len(chains.root)), START_WEIGHT)
+                start = Sites(at, experiment.inputs(at), heavy, states(at))
+            else:
+                held = grip[0]
+                hold = grip[1] @ np.eye(len(chains.root))[np.lexsort((chains.order, chains.root))]
+        parts.append(Part(own, tuple(data), physics, start, held, hold))
+    return Functional(problem, vector_field, chains, tuple(parts), np.ones(len(chains.top)))
+
+
+def _output_delays(problem: Problem) -> Array:
+    model = problem.model
+    free = {symbol(name) for name in model.free_names}
+    for what, items in (("input", model.inputs), ("output", model.outputs)):
+        for item in items:
+            names = sorted(s.name for s in item.delay.free_symbols & free)
+            if names:
+                raise errors.BadSetting(errors.relaxation_cannot_see(
+                    names, f"the delay of {what} '{item.name}'"))
+    return delays(model.outputs, model, np.array(list(model.values.values())))
+
+
+def _by_coefficients(sites: Sites, rows: Rows, c: Array) -> sparse.csr_array:
+    """Chain rule through the tables, rows ordered as `residual.ravel()` (M·E, n)."""
+    count, width = rows.residual.shape
+    total = sparse.csr_array((count * width, c.size))
+    for e in range(width):
+        # Row m·E + e of the stack, as a matrix that spreads a family's M rows into it.
+        spread = sparse.csr_array(
+            (np.ones(count), (np.arange(count) * width + e, np.arange(count))),
+            shape=(count * width, count))
+        pieces = []
+        if rows.by_state is not None:
+            pieces += [(rows.by_state[:, e, s], table) for s, table in enumerate(sites.states)]
+        if rows.by_top is not None:
+            pieces.append((rows.by_top[:, e], sites.tops[e]))
+        for weight, table in pieces:
+            scaled = sparse.csr_array(table.jacobian(c)).multiply(weight[:, None]).tocsr()
+            placed = sparse.csr_array(
+                (scaled.data, scaled.indices + table.part.start, scaled.indptr),
+                shape=(count, c.size))
+            total = total + spread @ placed
+    return total

@@ -1,0 +1,277 @@
+"""Gauss-Newton (Levenberg-damped where needed) on coefficients and parameters together.
+
+Block elimination: with A_r the band of recording r, B_r its border and C the corner of θ,
+    (C - Σ B_rᵀ A_r⁻¹ B_r) Δθ = -(g_θ - Σ B_rᵀ A_r⁻¹ g_r),   Δα_r = -A_r⁻¹ (g_r + B_r Δθ),
+so that a step costs O(N).  Bounds on θ hold in every step: Δθ minimises the reduced quadratic model
+inside the box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+
+from pikanid.approximators import Array
+from pikanid.functional import Functional
+from pikanid.optimise.banded import BandedAssembler, BandedNormal
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An iterate: coefficients of every recording and θ (b,)."""
+
+    coefficients: tuple[Array, ...]
+    theta: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """One recording's normal equations without the held coefficients: they move with θ alone."""
+
+    band: Array  # (kd + 1, n - k)
+    border: Array  # (n - k, b)
+    corner: Array  # (b, b)
+    slope: Array
+    slope_theta: Array
+    held_by_theta: Array | None  # (k, b)
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Eq. (2) and its Gauss-Newton model at a point."""
+
+    point: Point
+    blocks: tuple[Eliminated, ...]
+    data_cost: float
+    physics_cost: float
+    other_cost: float
+
+    @property
+    def cost(self) -> float:
+        """‖r‖², all families together."""
+        return self.data_cost + self.physics_cost + self.other_cost
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A proposed change, what the quadratic model promises of it, and the reduced matrix of θ."""
+
+    coefficients: tuple[Array, ...]
+    theta: Array
+    promised: float
+    schur: Array  # (b, b): C - Σ BᵀA⁻¹B; its inverse is the θ block of (JᵀJ)⁻¹
+    inner: tuple[Array, ...]  # A_r⁻¹ B_r (n_r - k_r, b_r)
+
+
+class BandedSystem:
+    """A functional with local bases, ready for Gauss-Newton."""
+
+    def __init__(self, functional: Functional):
+        self.functional = functional
+        self.columns = [functional.problem.columns(r)[1] for r in range(len(functional.parts))]
+        self.families = [functional.families(r) for r in range(len(functional.parts))]
+        self.assemblers = [BandedAssembler(part, families) for part, families
+                           in zip(functional.parts, self.families, strict=True)]
+
+    def linearise(self, point: Point, lam: float) -> Linearisation:
+        """Residuals and normal equations at a point."""
+        blocks, data, physics, other = [], 0.0, 0.0, 0.0
+        for r, (part, c) in enumerate(zip(self.functional.parts, point.coefficients, strict=True)):
+            rows = self.functional.rows(r, c, point.theta, lam)
+            normal = self.assemblers[r].normal(self.families[r], rows, self.columns[r].size)
+            held = self.functional.hold_jacobian(r, point.theta)
+            blocks.append(_eliminate(normal, part.held.size, held))
+            count = len(part.data)
+            data += sum(normal.costs[:count])
+            physics += normal.costs[count]
+            other += sum(normal.costs[count + 1:])
+        return Linearisation(point, tuple(blocks), data, physics, other)
+
+    def moved(self, point: Point, step: Step) -> Point:
+        """The point after a step, held coefficients set from the initial state."""
+        theta = point.theta + step.theta
+        coefficients = tuple(
+            self.functional.complete(r, c + change, theta) for r, (c, change)
+            in enumerate(zip(point.coefficients, step.coefficients, strict=True)))
+        return Point(coefficients, theta)
+
+    def step(self, at: Linearisation, lower: Array, upper: Array, damping: float = 0.0) -> Step:
+        """Minimise the (damped) Gauss-Newton model with θ inside [lower, upper].
+
+        Raises:
+            LinAlgError: If a band or the reduced matrix is not positive definite.
+        """
+        theta = at.point.theta
+        schur, slope = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
+        factors, inner, outer = [], [], []
+        for columns, block in zip(self.columns, at.blocks, strict=True):
+            band = block.band.copy()
+            band[0] *= 1.0 + damping
+            factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+            solved = cho_solve_banded((factor, True), np.column_stack([block.border, block.slope]),
+                                      check_finite=False)
+            factors.append(factor)
+            inner.append(solved[:, :-1])
+            outer.append(solved[:, -1])
+            corner = block.corner + damping * np.diag(np.diag(block.corner))
+            schur[np.ix_(columns, columns)] += corner - block.border.T @ solved[:, :-1]
+            slope[columns] += block.slope_theta - block.border.T @ solved[:, -1]
+        schur = 0.5 * (schur + schur.T)
+        change = box_minimum(schur, slope, lower - theta, upper - theta)
+        promised = -change @ (slope + 0.5 * schur @ change)
+        moves = []
+        for r, (columns, block) in enumerate(zip(self.columns, at.blocks, strict=True)):
+            own = change[columns]
+            free = -(outer[r] + inner[r] @ own)
+            promised += 0.5 * block.slope @ outer[r]
+            move = np.empty(self.functional.parts[r].n_coefficients)
+            held = move.size - free.size
+            # Held coefficients are set from the initial state afterwards, exactly.
+            move[self.assemblers[r].order] = np.concatenate([np.zeros(held), free])
+            moves.append(move)
+        return Step(tuple(moves), change, 2.0 * float(promised), schur, tuple(inner))
+
+
+def _eliminate(normal: BandedNormal, k: int, held_by_theta: Array | None) -> Eliminated:
+    """Substitute c[held] = const + Q θ (the first k in band order)."""
+    band = normal.band[:, k:]
+    if held_by_theta is None or k == 0:
+        return Eliminated(band, normal.border[k:], normal.corner, normal.slope[k:],
+                          normal.slope_theta, None)
+    n, kd = normal.border.shape[0], normal.band.shape[0] - 1
+    leading = np.zeros((n, k))
+    for j in range(k):
+        end = min(n, j + kd + 1)
+        leading[j:end, j] = normal.band[:end - j, j]
+    leading[:k] = np.tril(leading[:k]) + np.tril(leading[:k], -1).T
+    q = held_by_theta
+    cross = q.T @ normal.border[:k]
+    return Eliminated(
+        band, normal.border[k:] + leading[k:] @ q,
+        normal.corner + cross + cross.T + q.T @ leading[:k] @ q,
+        normal.slope[k:], normal.slope_theta + q.T @ normal.slope[:k], q)
+
+
+def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Array:
+    """Minimum of ½dᵀMd + sᵀd over lower <= d <= upper, by active sets (M positive definite).
+
+    >>> box_minimum(np.diag([1.0, 2.0]), np.array([-3.0, -2.0]), np.zeros(2), np.array([2.0, 9.0]))
+    array([2., 1.])
+
+    Raises:
+        LinAlgError: If the matrix is not positive definite.
+    """
+    size = slope.size
+    change = np.clip(np.zeros(size), lower, upper)
+    bound = lower >= upper
+    change[bound] = lower[bound]
+    diagonal = np.diag(matrix)
+    if not np.all(diagonal[~bound] > 0.0):
+        raise LinAlgError("a parameter has no influence")
+    root = np.sqrt(np.where(bound, 1.0, diagonal))
+    for _ in range(4 * size + 4):
+        free = ~bound
+        if free.any():
+            rhs = -(slope[free] + matrix[np.ix_(free, bound)] @ change[bound])
+            scale = root[free]
+            factor = np.linalg.cholesky(matrix[np.ix_(free, free)] / np.outer(scale, scale))
+            half = np.linalg.solve(factor, rhs / scale)
+            change[free] = np.linalg.solve(factor.T, half) / scale
+        over = np.maximum(lower - change, change - upper)
+        if np.any(over > 0.0):
+            worst = int(np.argmax(np.where(bound, -np.inf, over * root)))
+            change[worst] = lower[worst] if change[worst] < lower[worst] else upper[worst]
+            bound[worst] = True
+            continue
+        pull = matrix @ change + slope
+        wrong = np.where(bound & (lower < upper), np.where(change <= lower, -pull, pull) / root, 0.0)
+        if size == 0 or wrong.max() <= 1e-12 * max(1.0, float(np.abs(slope / root).max())):
+            break
+        bound[int(np.argmax(wrong))] = False
+    return np.clip(change, lower, upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Where Gauss-Newton stopped."""
+
+    at: Linearisation
+    step: Step  # the step that would come next: tiny where converged
+    iterations: int
+    converged: bool
+
+
+def gauss_newton(system: BandedSystem, point: Point, lam: float, lower: Array, upper: Array, *,
+                 iterations: int = 50, tolerance: float = 1e-6) -> Outcome:
+    """Minimise Eq. (2) at one λ from a point.
+
+    Converged when the promised decrease is below `tolerance` of one datum's share of the cost: the
+    estimate is then within √tolerance standard errors of the minimum.  Damping starts at zero and
+    grows only when a step fails.
+    """
+    at = system.linearise(point, lam)
+    share = 1.0 / max(1, system.functional.n_data)
+    damping, done, step = 0.0, 0, _damped_step(system, at, lower, upper, 0.0)
+    while done < iterations:
+        if step.promised <= tolerance * share * at.cost:
+            return Outcome(at, step, done, True)
+        for _ in range(20):
+            trial = system.linearise(system.moved(at.point, step), lam)
+            if np.isfinite(trial.cost) and trial.cost <= at.cost - 1e-4 * step.promised:
+                break
+            damping = max(1e-4, 8.0 * damping)
+            step = _damped_step(system, at, lower, upper, damping)
+        else:  # no decrease at any damping: rounding has been reached
+            return Outcome(at, step, done, step.promised <= 1e-9 * at.cost)
+        at, done = trial, done + 1
+        damping = 0.0 if damping < 1e-6 else 0.1 * damping
+        step = _damped_step(system, at, lower, upper, damping)
+    return Outcome(at, step, done, False)
+
+
+def _damped_step(system: BandedSystem, at: Linearisation, lower: Array, upper: Array,
+                 damping: float) -> Step:
+    while True:
+        try:
+            return system.step(at, lower, upper, damping)
+        except LinAlgError:
+            damping = max(1e-8, 10.0 * damping)
+            if damping > 1e6:
+                raise
+
+
+def theta_covariance(system: BandedSystem, at: Linearisation, step: Step) -> tuple[Array, Array]:
+    """Sandwich and naive covariance (b, b) of θ for unit noise in the weighted data rows.
+
+    The physics residual is not data, so Cov = Zᵀ J_dᵀ J_d Z with Z the θ columns of (JᵀJ)⁻¹, not
+    the θ block of (JᵀJ)⁻¹ itself (White, Econometrica 50, 1982: misspecified likelihood).
+    """
+    naive = np.linalg.inv(step.schur)
+    gram = np.zeros_like(naive)
+    for jacobian in data_response(system, at, step):
+        gram += jacobian.T @ jacobian
+    return naive @ gram @ naive, naive
+
+
+def data_response(system: BandedSystem, at: Linearisation, step: Step) -> Sequence[Array]:
+    """Derivative of each weighted data family by θ with the coefficients following, (N, b)."""
+    functional, responses = system.functional, []
+    for r, part in enumerate(functional.parts):
+        columns, block = system.columns[r], at.blocks[r]
+        follow = np.empty((part.n_coefficients, columns.size))
+        held = np.zeros((part.held.size, columns.size))
+        if block.held_by_theta is not None:
+            held = block.held_by_theta
+        follow[system.assemblers[r].order] = np.concatenate([held, -step.inner[r]])
+        families = functional.rows(r, at.point.coefficients[r], at.point.theta, 0.0)
+        for sites, rows in zip(part.data, families, strict=False):
+            full = np.zeros((sites.t.size, at.point.theta.size))
+            own = rows.by_theta[:, 0].copy()
+            for s, table in enumerate(sites.states):
+                own += rows.by_state[:, 0, s, None] * (table.matrix @ follow[table.part])
+            full[:, columns] = own
+            responses.append(full)
+    return responses
