@@ -139,8 +139,13 @@ def test_one_input_is_its_own_time() -> None:
     t, c = np.linspace(-1, 1, 41), deep.coefficients
     jet = deep.evaluate(t, c, jacobian=True)
     for derivative in range(3):
-        assert np.array_equal(deep.values(t, c, derivative), jet.values[derivative][:, 0])
-        assert np.array_equal(deep.jacobian(t, c, derivative), jet.jacobians[derivative][:, 0])
+        close = {"rtol": 1e-13, "atol": 1e-13}
+        np.testing.assert_allclose(
+            deep.values(t, c, derivative), jet.values[derivative][:, 0], **close
+        )
+        np.testing.assert_allclose(
+            deep.jacobian(t, c, derivative), jet.jacobians[derivative][:, 0], **close
+        )
 
 
 def test_fades_outside_the_grid_as_pykan() -> None:
@@ -151,6 +156,7 @@ def test_fades_outside_the_grid_as_pykan() -> None:
         wanted = kan(torch.tensor(x[:, None])).numpy()
     np.testing.assert_allclose(deep.evaluate(x, deep.coefficients).values[0], wanted, atol=1e-14)
     assert np.all(deep.evaluate(np.array([1e300, -1e300]), deep.coefficients).values[0] == 0.0)
+    assert np.isnan(deep.evaluate(np.array([np.nan, 0.0]), deep.coefficients).values[0][0, 0])
     assert deep.coverage(x, deep.coefficients)[0] == pytest.approx(np.array([[-1.5, 2.5]]))
 
 

@@ -114,7 +114,7 @@ def test_scores_and_nodes_are_pykans(tmp_path: Path, monkeypatch: Any) -> None:
     kan.act_fun[1].coef.data[2:] *= 1e-3
     found = scores(kan)
     kan.attribute()
-    assert np.array_equal(found.nodes[1], kan.node_scores[1].numpy())
+    assert np.array_equal(found.nodes[1], kan.node_scores[1].detach().numpy())
     assert prune(kan).width == kan.prune_node().width == kan.prune().width
     weak = prune(kan, edge_threshold=1e9)
     assert all(float(layer.mask.sum()) == 0.0 for layer in weak.act_fun)

@@ -145,7 +145,7 @@ def write(parameter: Any, values: Array) -> None:
 
 def _tensor(values: Array, device: Any) -> Any:
     torch = import_module("torch")
-    return torch.from_numpy(np.array(values, dtype=float)).to(device)
+    return torch.from_numpy(np.array(values, dtype=float, order="C")).to(device)
 
 
 def _default_batch(plan: KanPlan, device: str) -> Any:

@@ -57,13 +57,12 @@ def local_bases(
     As in pykan, functions fade out over the k cells on either side of the grid and are zero beyond;
     the last grid point belongs to the last cell, so that all its derivatives come from inside.
     """
-    place = (x - start) / step
+    # Far away is as good as just outside, and cannot overflow.
+    place = np.clip((x - start) / step, -degree - 1.0, intervals + degree + 1.0)
     stop = start + step * intervals
-    cell = np.floor(place).astype(np.int64)
+    cell = np.floor(place if np.isfinite(place).all() else np.nan_to_num(place)).astype(np.int64)
     np.copyto(cell, intervals - 1, where=(x <= stop) & (cell >= intervals))
     inside = (cell >= 0) & (cell < intervals)
-    # Far away is as good as just outside, and cannot overflow a power.
-    cell = np.clip(cell, -degree - 1, intervals + degree)
     u = place - cell
     if not inside.all():
         u = np.clip(u, 0.0, 1.0)

@@ -57,7 +57,8 @@ class ShallowKAN:
     Args:
         kan: A pykan model of width [1, n] (`build_kan`).
         kinks: Times of the kinks [s], inside the grid, or ready `Kink`s with their jumps.
-        orders: Orders at each time, 1 to k; order k next to a knot is left out (it is a knot).
+        orders: Orders at each time, 1 to k, by default 2 and 3 (2 alone at k = 2); order k next to
+            a knot is left out (it is a knot).
 
     Raises:
         BadSetting: If the model is not shallow, or a kink lies outside its grid.
@@ -69,7 +70,7 @@ class ShallowKAN:
     """
 
     def __init__(
-        self, kan: Any, kinks: Sequence[float | Kink] = (), orders: Sequence[int] = (2, 3)
+        self, kan: Any, kinks: Sequence[float | Kink] = (), orders: Sequence[int] | None = None
     ) -> None:
         plan = plan_of(kan)
         if plan.depth != 1 or plan.width[0] != (1, 0) or plan.width[1][1]:
@@ -82,9 +83,10 @@ class ShallowKAN:
         self.n_outputs = plan.nodes(1)
         self.has_base = plan.base == "silu"
         self._spacing = (self.stop - self.start) / plan.intervals(0)
-        self._kinks = self._wanted(kinks, sorted(set(orders)))
-        self._place_kinks()
+        orders = range(2, min(3, self.degree) + 1) if orders is None else orders
         held = {(kink.time, kink.order): kink.jump for kink in kinks if isinstance(kink, Kink)}
+        self._kinks = self._wanted(kinks, sorted({*orders, *(order for _, order in held)}))
+        self._place_kinks()
         self._jumps = np.zeros((len(self._kinks), self.n_outputs))
         for number, place in enumerate(self._kinks):
             self._jumps[number] = held.get(place, 0.0)
@@ -243,6 +245,10 @@ class ShallowKAN:
     def _wanted(
         self, kinks: Sequence[float | Kink], orders: Sequence[int]
     ) -> list[tuple[float, int]]:
+        if any(not 1 <= order <= self.degree for order in orders):
+            raise errors.BadSetting(
+                errors.bad_value("the order of a kink", orders, f"1 to {self.degree}")
+            )
         places: set[tuple[float, int]] = set()
         for kink in kinks:
             if isinstance(kink, Kink):
@@ -250,13 +256,9 @@ class ShallowKAN:
                 continue
             near = np.abs(self.knots - kink).min() <= _NEAR_KNOT * self._spacing
             places.update((float(kink), o) for o in orders if o < self.degree or not near)
-        for time, order in places:
+        for time, _ in places:
             if not self.start < time < self.stop:
                 raise errors.BadSetting(errors.kan_kink(time, self.start, self.stop))
-            if not 1 <= order <= self.degree:
-                raise errors.BadSetting(
-                    errors.bad_value("the order of a kink", order, f"1 to {self.degree}")
-                )
         return sorted(places)
 
     def _place_kinks(self) -> None:
