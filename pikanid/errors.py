@@ -215,6 +215,106 @@ def constant_output(where: str, name: str, value: float) -> str:
     )
 
 
+# --- reading and writing files -------------------------------------------------------------------
+
+
+def no_file(path: str) -> str:
+    return f"There is no file '{_short(path, 200)}'."
+
+
+def is_folder(path: str) -> str:
+    return f"'{path}' is a folder; give one of the files in it."
+
+
+def cannot_open(where: str, reason: str) -> str:
+    return f"'{where}' cannot be opened: {reason or 'the system refuses'}."
+
+
+def cannot_write(path: str, reason: str) -> str:
+    return f"'{path}' cannot be written: {reason or 'the system refuses'}."
+
+
+def empty_file(where: str) -> str:
+    return f"'{where}' is empty."
+
+
+def unknown_ending(where: str, known: Iterable[str]) -> str:
+    return f"'{where}': the ending of the name tells no known format (known: {_listed(known)})."
+
+
+def wrong_ending(where: str, actual: str, wanted: str) -> str:
+    return f"'{where}' is {actual}, not {wanted} as its name says: rename it."
+
+
+def damaged(where: str, kind: str) -> str:
+    return f"'{where}' cannot be read as {kind}: it is damaged or cut off."
+
+
+def binary_junk(where: str) -> str:
+    return f"'{where}' is not text: it holds binary data, so it is no CSV."
+
+
+def extra_missing(what: str, module: str, extra: str) -> str:
+    return f"Reading {what} needs {module}, which is missing: pip install 'pikanid[{extra}]'."
+
+
+def no_rows(where: str) -> str:
+    return f"'{where}' holds no rows of data."
+
+
+def no_vectors(where: str) -> str:
+    return f"'{where}' holds no numeric vector of two or more values."
+
+
+def no_sheet(where: str, sheet: str, known: Iterable[str]) -> str:
+    return f"'{where}' has no sheet '{sheet}' (sheets: {_listed(known)})."
+
+
+def ragged_row(where: str, row: int, cells: int, wanted: int) -> str:
+    return (
+        f"'{where}', row {row}: {cells} cell(s) where the header has {wanted}; the file may be cut "
+        "off, or its delimiter be another (delimiter=)."
+    )
+
+
+def not_a_number(where: str, row: int, header: str, cell: str) -> str:
+    return f"'{where}', row {row}, column '{header}': '{_short(cell, 40)}' is not a number."
+
+
+def header_twice(where: str, header: str) -> str:
+    return f"'{where}' has two columns called '{header}': rename one of them."
+
+
+def no_time(where: str, known: Iterable[str]) -> str:
+    return (
+        f"'{where}' has no time column among: {_listed(known)}. Name it with "
+        "columns={'t': 'its header'} or give the sampling rate in Hz with rate=."
+    )
+
+
+def time_length(where: str, name: str, n: int, wanted: int) -> str:
+    return f"'{where}': '{name}' has {n} values but its time column has {wanted}."
+
+
+def bad_rate(rate: float) -> str:
+    return f"A sampling rate of {rate:g} Hz cannot be: it must be positive and finite."
+
+
+def rate_disagrees(where: str, rate: float, name: str, actual: float) -> str:
+    return (
+        f"'{where}' has the time column '{name}' sampled at {actual:.6g} Hz, not at {rate:g} Hz: "
+        "leave out the rate, or map another column to 't'."
+    )
+
+
+def bad_delimiter(text: str) -> str:
+    return f"{text!r} cannot delimit cells: give one character, such as ';'."
+
+
+def bad_decimal(text: str) -> str:
+    return f"{text!r} cannot be the decimal sign here: it must be '.' or ',', not the delimiter."
+
+
 # --- excitations ---------------------------------------------------------------------------------
 
 
@@ -418,6 +518,27 @@ def smoothing_undetermined(names: Sequence[str]) -> str:
     return (
         f"PDA fits splines to the data alone, but the outputs do not determine {_listed(names)}: "
         "use the strategy iPDA or NLS, which also use the physics there."
+    )
+
+
+def relaxation_locked(lam: float, kept: float) -> str:
+    return (
+        f"At λ = {lam:.3g} the splines could no longer follow both data and physics; the result is "
+        f"that at λ = {kept:.3g}. Use more intervals or knots='collocation', or doubt the model."
+    )
+
+
+def grid_not_settled(gap: float, intervals: int) -> str:
+    return (
+        f"With {intervals} intervals, the last halving still moved a parameter by {gap:.2g} "
+        "standard errors: the discretisation bias is not negligible. Set more intervals."
+    )
+
+
+def not_converged(lam: float) -> str:
+    return (
+        f"Gauss-Newton stopped before it converged at λ = {lam:.3g}: start nearer, or tighten the "
+        "bounds."
     )
 
 

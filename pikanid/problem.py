@@ -7,17 +7,17 @@ once a recording); `Experiment` is one recording as the model sees it.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import sympy as sp
 
-from pikanid import errors, units
+from pikanid import errors
 from pikanid.expressions import symbol
 from pikanid.model import Input, Model, Output
-from pikanid.recording import Channel, Recording
+from pikanid.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -111,13 +111,19 @@ class Experiment:
 
     def initial(self, p: np.ndarray) -> np.ndarray:
         """The initial state x0 (n,) for all parameters p (P,)."""
-        value, _ = initial_state(self.model)
-        return value(p, self.inputs(np.array([self.t0]))[0])
+        return self._initial.value(p, self._first_inputs)
 
     def initial_jacobian(self, p: np.ndarray) -> np.ndarray:
         """∂x0/∂p (n, P)."""
-        _, jacobian = initial_state(self.model)
-        return jacobian(p, self.inputs(np.array([self.t0]))[0])
+        return self._initial.jacobian(p, self._first_inputs)
+
+    @functools.cached_property
+    def _initial(self) -> InitialState:
+        return initial_state(self.model)
+
+    @functools.cached_property
+    def _first_inputs(self) -> np.ndarray:
+        return self.inputs(np.array([self.t0]))[0]
 
     @property
     def n_samples(self) -> int:
@@ -230,29 +236,22 @@ def bind(model: Model, recording: Recording, need_outputs: bool = True) -> Exper
 
 def _held(recording: Recording, item: Input) -> HeldInput:
     if item.name not in recording.channels and item.default is not None:
-        return HeldInput(item.name, np.array([recording.t[0]]), np.array([item.default]), "zero")
-    channel = recording.as_input(item.name)
-    return HeldInput(item.name, channel.time, _converted(channel, item.unit),
-                     channel.hold or item.hold)
+        return HeldInput(item.name, np.array([recording.start]), np.array([item.default]), "zero")
+    channel = recording.as_input(item.name, _unit(recording, item))
+    return HeldInput(item.name, channel.time, channel.values, channel.hold or item.hold)
 
 
 def _samples(recording: Recording, output: Output, index: int) -> Samples:
-    channel = recording.as_output(output.name)
-    values = _converted(channel, output.unit)
-    seen = np.isfinite(values)
-    sigma = channel.sigma if channel.sigma is not None else None
-    if sigma is not None:
-        factor = units.factor(channel.unit, output.unit) if channel.unit and output.unit else 1.0
-        sigma = np.broadcast_to(np.asarray(sigma, float) * factor, values.shape)[seen]
-    elif output.sigma is not None:
-        sigma = np.full(int(seen.sum()), output.sigma)
-    return Samples(index, channel.time[seen], values[seen], sigma)
+    channel = recording.as_output(output.name, _unit(recording, output))
+    seen = np.isfinite(channel.values)
+    sigma = output.sigma if channel.sigma is None else channel.sigma
+    spread = None if sigma is None else np.broadcast_to(sigma, channel.values.shape)[seen]
+    return Samples(index, channel.time[seen], channel.values[seen], spread)
 
 
-def _converted(channel: Channel, wanted: str) -> np.ndarray:
-    if not channel.unit or not wanted:
-        return channel.values
-    return units.convert(channel.values, channel.unit, wanted)
+def _unit(recording: Recording, item: Input | Output) -> str | None:
+    """The model's unit, or None where either side leaves the unit open: then it is taken as is."""
+    return item.unit if item.unit and recording[item.name].unit else None
 
 
 def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
@@ -274,17 +273,26 @@ def _number(expr: sp.Expr, table: dict[str, float]) -> float:
     return float(expr.xreplace({symbol(n): sp.Float(v) for n, v in table.items()}))
 
 
+@dataclass(frozen=True)
+class InitialState:
+    """The symbolic initial state as functions of p (P,) and the first inputs u0 (m,)."""
+
+    value: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    jacobian: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
 @functools.lru_cache(maxsize=64)
-def initial_state(model: Model):  # type: ignore[no-untyped-def]
-    """Functions (p, u0) -> x0 (n,) and (p, u0) -> ∂x0/∂p (n, P), from the symbolic initial state."""
+def initial_state(model: Model) -> InitialState:
+    """x0 (n,) and ∂x0/∂p (n, P) as functions."""
     n, p_symbols = len(model.states), [symbol(q) for q in model.parameter_names]
     start = [s.initial for s in model.states]
     if all(e.is_number for e in start):
         x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
-        return (lambda p, u: x0.copy()), (lambda p, u: zero.copy())
+        return InitialState(lambda p, u: x0, lambda p, u: zero)
     arguments = [p_symbols, [symbol(q) for q in model.input_names]]
     value = sp.lambdify(arguments, start, "numpy", cse=True)
     table = [[e.diff(q) for q in p_symbols] for e in start]
     jacobian = sp.lambdify(arguments, table, "numpy", cse=True)
-    return (lambda p, u: np.array(value(p, u), float)), (
+    return InitialState(
+        lambda p, u: np.array(value(p, u), float),
         lambda p, u: np.array(jacobian(p, u), float).reshape(n, len(p_symbols)))

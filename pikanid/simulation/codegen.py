@@ -30,7 +30,8 @@ import math
 import numpy as np
 from numba import njit
 
-from pikanid.simulation.support import log_abs, positive_power, sgn, solve_small, spline_basis
+from pikanid.simulation.support import (
+    Seen, log_abs, make_work, positive_power, sgn, solve_small, spline_basis)
 
 
 def called(function):
@@ -136,7 +137,7 @@ class Writer:
         body = self.unpack([*used, *splines.arguments, *(e for _, e in edge_targets)])
         body += self.prelude(splines, own)
         body += self.block([*targets, *edge_targets], splines) + edge_lines
-        body += ["for a in range(S.shape[1]):", "    k = act[a]"]
+        body += ["for a in range(len(act)):", "    k = act[a]"]
         for r in range(len(exprs)):
             terms = [f"{n}*S[{j}, a]" if n != "1" else f"S[{j}, a]" for j, n in by_x[r]]
             terms += [f"{n}*ud[{j}, a]" for j, n in by_u[r]]
@@ -261,7 +262,7 @@ def generate(model: Model) -> tuple[str, LoweredModel]:
                  for a in e.atoms(spline_value)})
     width = max((s.degree + 1 for s in model.splines), default=1)
     h_rate = [_rate(w, e) for e in h]
-    source = HEADER + knots + (
+    source = HEADER + knots + f"hot = {'called' if lowered.n_dynamic else 'inlined'}\n" + (
         f"N, M, P, Q, K = {len(w.x)}, {len(w.u)}, {len(w.p)}, {len(h)}, {lowered.n_dynamic}\n"
         f"BUFFERS = ({3 * edges}, {width})  # basis values: one row per argument and derivative\n\n\n")
     source += w.values("rhs", "b, t, x, u, p, s, f", "f", f)

@@ -65,20 +65,22 @@ class Work(NamedTuple):
     bs: np.ndarray
 
 
+@njit(cache=True)
 def make_work(n: int, m: int, P: int, q: int, k: int, A: int, stages: int,
-              buffers: tuple[int, int]) -> Work:
+              rows: int, width: int) -> Work:
     """Scratch for n states, m inputs, P parameters, q outputs, k switches, A sensitivities."""
-    e, z = np.empty, np.zeros
     big = max(n, k)
     return Work(
-        kx=e((stages, n)), kS=e((stages, n, A)), xt=e(n), St=e((n, A)), xn=e(n), Sn=e((n, A)),
-        x=e(n), S=e((n, A)), u=e(m), uc=e(m), held=e(m), ud=z((m, A)),
-        f=e(n), before=e(n), after=e(n), start=e(n), y=e(q), J=e((q, A)),
-        fp=z((n, P + 1)), hp=z((q, P + 1)), gp=z((k, P + 1)), rp=z((k, P + 1)),
-        s=e(k), g=e(k), phi=e(k), G=e(k), Gs=z((k, k)), Fs=z((n, k)), gS=e((k, A)),
-        GS=e((k, A)), ds=e((k, A)), index=e(k, np.int64), eye=np.eye(n), fx=e((n, n)),
-        matrix=e((big, big)), change=e((big, 1)), still=z((m, n)),
-        constant=np.full(n, P, np.int64), none=e((n, 0)), nud=e((m, 0)), nact=e(0, np.int64), bs=e(buffers))
+        np.empty((stages, n)), np.empty((stages, n, A)), np.empty(n), np.empty((n, A)),
+        np.empty(n), np.empty((n, A)), np.empty(n), np.empty((n, A)),
+        np.empty(m), np.empty(m), np.empty(m), np.zeros((m, A)),
+        np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(q), np.empty((q, A)),
+        np.zeros((n, P + 1)), np.zeros((q, P + 1)), np.zeros((k, P + 1)), np.zeros((k, P + 1)),
+        np.empty(k), np.empty(k), np.empty(k), np.empty(k), np.zeros((k, k)), np.zeros((n, k)),
+        np.empty((k, A)), np.empty((k, A)), np.empty((k, A)), np.empty(k, np.int64),
+        np.eye(n), np.empty((n, n)), np.empty((big, big)), np.empty((big, 1)), np.zeros((m, n)),
+        np.full(n, P, np.int64), np.empty((n, 0)), np.empty((m, 0)), np.empty(0, np.int64),
+        np.empty((rows, width)))
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

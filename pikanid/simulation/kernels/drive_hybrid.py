@@ -95,7 +95,7 @@ def cross(k, t, x, S, ta, ua, v, ud, p, mode, act, w):
     S+ = S- + (f- - f+) dt_e/dtheta with dt_e/dtheta = -(g_x S + g_u ∂u + g_p)/(dg/dt)-
     (saltation; Di Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, sec. 2.5).
     """
-    A = S.shape[1]
+    A = len(act)
     input_at(t, ta, ua, v, w)
     u, before, after = w.uc, w.before, w.after
     for j in range(M):
@@ -136,12 +136,12 @@ def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
             part, which = locate(t + done, rest, x, ta, ua, v, p, mode, w, end)
         else:
             part, which = rest, -1
-        if S.shape[1] > 0 or which >= 0:
+        if len(act) > 0 or which >= 0:
             if not step(t + done, part, x, S, ta, ua, v, ud, p, mode, act, w, w.xn, w.Sn):
                 return 1
         for i in range(N):
             x[i] = w.xn[i]
-            for a in range(S.shape[1]):
+            for a in range(len(act)):
                 S[i, a] = w.Sn[i, a]
         done = h if which < 0 else done + part
         if which >= 0:

@@ -11,6 +11,6 @@ def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
         return 1
     for i in range(N):
         x[i] = w.xn[i]
-        for a in range(S.shape[1]):
+        for a in range(len(act)):
             S[i, a] = w.Sn[i, a]
     return 0

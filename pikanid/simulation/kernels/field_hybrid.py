@@ -40,9 +40,8 @@ def resolve(t, x, u, v, p, mode, w):
 
 @called
 def signs(t, x, u, v, p, mode, w):
-    """The values of the s_k in the present mode."""
+    """Fill w.s with the s_k of the present mode."""
     resolve(t, x, u, v, p, mode, w)
-    return w.s
 
 
 @called
@@ -56,7 +55,7 @@ def field_value(t, x, u, v, p, mode, w, f):
 def field(t, x, S, u, v, ud, p, mode, act, w, f, dS):
     """The right-hand side and its variation; on a sliding surface s varies too: dG = 0."""
     resolve(t, x, u, v, p, mode, w)
-    A = S.shape[1]
+    A = len(act)
     if A == 0:
         rhs(w.bs, t, x, u, p, w.s, f)
         return

@@ -1,7 +1,6 @@
 @inlined
 def signs(t, x, u, v, p, mode, w):
     """A smooth model has no switching functions."""
-    return mode
 
 
 @inlined
@@ -13,7 +12,7 @@ def field_value(t, x, u, v, p, mode, w, f):
 @inlined
 def field(t, x, S, u, v, ud, p, mode, act, w, f, dS):
     """The right-hand side and, for the columns of S, its variation."""
-    if S.shape[1] == 0:
+    if len(act) == 0:
         rhs(w.bs, t, x, u, p, mode, f)
     else:
         variational(w.bs, t, x, S, u, ud, p, mode, act, f, w.fp, dS)

@@ -1,10 +1,11 @@
 @inlined
 def record(i, t, x, S, u, v, p, mode, act, w, seen, moves, dtau_in, dtau_out, Y, J):
     """Write the observations that belong to the i-th stop."""
-    A = S.shape[1]
+    A = len(act)
     if seen.first[i] == seen.first[i + 1]:
         return
-    s = signs(t, x, u, v, p, mode, w)
+    signs(t, x, u, v, p, mode, w)
+    s = w.s
     for q in range(seen.first[i], seen.first[i + 1]):
         o, row = seen.output[q], seen.row[q]
         if A == 0:
@@ -22,8 +23,8 @@ def record(i, t, x, S, u, v, p, mode, act, w, seen, moves, dtau_in, dtau_out, Y,
 
 
 @called
-def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode, w, seen,
-              X, Y, J):
+def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode, w, seen,
+        X, Y, J):
     """Integrate over the stops T, recording observations; returns (status, stop reached).
 
     T (L,) stops; pieces (L-1,) sub-steps of each interval; U, V (L-1, M) inputs at the start of
@@ -31,7 +32,7 @@ def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act
     dtau_* (channels, A) how each delay depends on the estimated parameters.
     Status 0: done; 1: not finite; 2: endless switching.
     """
-    n, A = S0.shape
+    n, A = N, len(act)
     x, S, ud, before, after, held = w.x, w.S, w.ud, w.before, w.after, w.held
     for r in range(n):
         x[r] = x0[r]
@@ -78,3 +79,12 @@ def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act
             if not abs(x[r]) < 1e120:
                 return 1, i
     return 0, L - 1
+
+
+@njit(cache=True, error_model="numpy")
+def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first, output,
+              row, inside, X, Y, J):
+    """`run` with its scratch; the only function of a model that Python calls."""
+    w = make_work(N, M, P, Q, K, S0.shape[1], STAGES, BUFFERS[0], BUFFERS[1])
+    return run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, np.ones(K), w,
+               Seen(first, output, row, inside), X, Y, J)

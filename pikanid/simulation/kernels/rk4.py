@@ -1,11 +1,11 @@
 STAGES = 4
 
 
-@inlined
+@hot
 def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
     """One classical Runge-Kutta step of the state and its sensitivities."""
     kx, kS, xt, St, u = w.kx, w.kS, w.xt, w.St, w.u
-    n, A = S.shape
+    n, A = N, len(act)
     for stage in range(4):
         c = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         for i in range(n):

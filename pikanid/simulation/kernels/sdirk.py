@@ -17,7 +17,7 @@ def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
     equations with the same matrix I - h/4 f_x, so that they belong to the discrete step exactly.
     """
     kx, kS, xt, St, u = w.kx, w.kS, w.xt, w.St, w.u
-    n, A = S.shape
+    n, A = N, len(act)
     fx, matrix, start, change = w.fx, w.matrix, w.start, w.change
     for stage in range(5):
         ts = t + NODES[stage] * h

@@ -1,0 +1,69 @@
+"""`simulate`: a model and an excitation in, a recording out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.model import Model
+from pikanid.problem import bind
+from pikanid.recording import Channel, Recording
+from pikanid.simulation.simulator import MethodChoice, Simulator
+
+
+def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str, float] = 0.0,
+             seed: int | None = None, t: np.ndarray | None = None,
+             parameters: Mapping[str, float] | None = None, tolerance: float | None = None,
+             method: MethodChoice = "auto") -> Recording:
+    """Simulate a model and return what would be recorded.
+
+    Parameters
+    ----------
+    model : the model, at its guesses and fixed values
+    excitation : a recording that holds the model's inputs
+    sigma : standard deviation of added white Gaussian noise, in the outputs' units; one for all
+        outputs or one by name.  It is stored with the channels.
+    seed : of the noise
+    t : times of the outputs (N,); default: the time base of the excitation
+    parameters : values that differ from the model's
+    tolerance : of the outputs; default 1e-10 of the largest output
+
+    Returns
+    -------
+    Recording with the excitation's channels and one channel an output
+
+    Raises
+    ------
+    pikanid.errors.BadRecording : an input is missing
+    pikanid.errors.SimulationFailed : the trajectory leaves the finite numbers
+
+    >>> from pikanid import excitation, systems
+    >>> rec = simulate(systems.sloshing(), excitation.two_pulse())
+    >>> round(float(abs(rec["theta"].values).max()), 4)
+    0.1979
+    """
+    model = model.with_values(parameters or {})
+    times = np.asarray(excitation.t if t is None else t, dtype=float)
+    inputs = excitation.without(*(n for n in model.output_names if n in excitation.channels))
+    blank = np.zeros(len(times))
+    blank[1:] = 1.0  # any values: only the times of these channels are used
+    wanted = inputs.with_channels(*(
+        Channel(o.name, times, blank, o.unit) for o in model.outputs))
+    simulator = Simulator(model, bind(model, wanted))
+    p = np.array(list(model.values.values()))
+    if tolerance is None:
+        rough = simulator.run(p, steps=simulator.choose_steps(p, method=method))
+        tolerance = 1e-10 * max(float(np.abs(rough.y).max(initial=0.0)), 1e-12)
+    steps = simulator.choose_steps(p, tolerance, method)
+    response = simulator.run(p, steps=steps)
+    if not response.finished:
+        raise errors.SimulationFailed(errors.not_finite(response.stopped_at, "these parameters"))
+    rng = np.random.default_rng(seed)
+    channels = []
+    for o, y in zip(model.outputs, response.y.reshape(len(model.outputs), -1), strict=True):
+        s = sigma if isinstance(sigma, int | float) else sigma.get(o.name, 0.0)
+        noisy = y + rng.normal(0.0, s, len(y)) if s > 0 else y
+        channels.append(Channel(o.name, times, noisy, o.unit, s if s > 0 else None))
+    return inputs.with_channels(*channels)

@@ -1,0 +1,191 @@
+"""`Simulator`: outputs of an experiment and their exact sensitivities, at a stated accuracy."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any, Literal
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.model import Model
+from pikanid.problem import Experiment, delay_jacobian, delays
+from pikanid.simulation.compiled import Method, compiled
+from pikanid.simulation.grid import Grid, build_grid
+
+MethodChoice = Literal["auto", "explicit", "implicit"]
+FINEST = 4096  # sub-steps of the median interval beyond which the explicit route gives up
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How finely to integrate: the method, the longest sub-step [s], the error it was found to have."""
+
+    method: Method
+    longest: float
+    error: float = np.nan
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a simulation gives: outputs y (rows,), their sensitivities (rows, A), states at `t`.
+
+    `finished` is False where the trajectory left the finite numbers or switched without end near
+    `stopped_at` [s]; rows behind that point are not filled.
+    """
+
+    y: np.ndarray
+    sensitivity: np.ndarray
+    t: np.ndarray
+    states: np.ndarray
+    finished: bool = True
+    stopped_at: float = np.nan
+    status: int = 0
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Simulates one model for one experiment; immutable, safe to use from several threads.
+
+    >>> import numpy as np
+    >>> from pikanid import excitation, systems
+    >>> from pikanid.problem import bind
+    >>> model = systems.sloshing()
+    >>> simulator = Simulator(model, bind(model, excitation.two_pulse(), need_outputs=False))
+    >>> simulator.run(np.array([0.045, 0.15, 0.3, 9.81]), states=True).states.shape[1]
+    2
+    """
+
+    model: Model
+    experiment: Experiment
+    _grids: dict[bytes, Grid] = field(default_factory=dict, repr=False, compare=False)
+    _kept: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def module(self, method: Method) -> ModuleType:
+        """The compiled functions."""
+        if method not in self._kept:
+            self._kept[method] = compiled(self.model, method)
+        return self._kept[method]
+
+    @functools.cached_property
+    def _delayed_by(self) -> np.ndarray:
+        """Parameters (P,) that any delay depends on."""
+        p = np.array(list(self.model.values.values()))
+        both = [*self.model.inputs, *self.model.outputs]
+        return np.any(delay_jacobian(both, self.model, p) != 0, axis=0)
+
+    @functools.cached_property
+    def _undelayed(self) -> bool:
+        return all(c.delay == 0 for c in (*self.model.inputs, *self.model.outputs))
+
+    def grid(self, p: np.ndarray) -> Grid:
+        """The stops at parameters p; kept, since only delays change them."""
+        if self._undelayed:
+            delay_in, delay_out = np.zeros(len(self.model.inputs)), np.zeros(len(self.model.outputs))
+        else:
+            delay_in = delays(self.model.inputs, self.model, p)
+            delay_out = delays(self.model.outputs, self.model, p)
+        key = delay_in.tobytes() + delay_out.tobytes()
+        if key not in self._grids:
+            if len(self._grids) > 8:
+                self._grids.clear()
+            self._grids[key] = build_grid(self.experiment, delay_in, delay_out)
+        return self._grids[key]
+
+    def run(self, p: np.ndarray, active: np.ndarray | None = None, steps: Steps | None = None,
+            states: bool = False) -> Response:
+        """Simulate at parameters p (P,).
+
+        Parameters
+        ----------
+        p : all parameters in model order
+        active : indices (A,) of the parameters whose sensitivities are wanted
+        steps : method and step length (`choose_steps`); by default chosen for 1e-8 of the signal
+        states : whether to return the states at every stop
+        """
+        p = np.ascontiguousarray(p, dtype=float)
+        active = np.empty(0, np.int64) if active is None else np.asarray(active, np.int64)
+        steps = steps or self.choose_steps(p)
+        module = self.module(steps.method)
+        grid = self.grid(p)
+        n, A = len(self.model.states), len(active)
+        x0 = self.experiment.initial(p)
+        S0 = np.ascontiguousarray(self.experiment.initial_jacobian(p)[:, active])
+        delayed = not self._undelayed and bool(np.any(self._delayed_by[active]))
+        if delayed:
+            dtau_in = delay_jacobian(self.model.inputs, self.model, p)[:, active]
+            dtau_out = delay_jacobian(self.model.outputs, self.model, p)[:, active]
+        else:
+            dtau_in = np.zeros((len(self.model.inputs), A))
+            dtau_out = np.zeros((len(self.model.outputs), A))
+        X = np.empty((len(grid.T) if states else 0, n))
+        Y, J = np.empty(grid.rows), np.empty((grid.rows, A))
+        status, stop = module.integrate(
+            grid.T, self._pieces(grid, steps.longest), grid.U, grid.V, grid.jumps,
+            np.ascontiguousarray(dtau_in), np.ascontiguousarray(dtau_out), delayed, x0, S0, p,
+            active, *grid.seen, X, Y, J)
+        finite = status == 0 and bool(np.isfinite(Y).all() and np.isfinite(J).all())
+        return Response(Y, J, grid.T, X, finite, float(grid.T[stop]), int(status))
+
+    def _pieces(self, grid: Grid, longest: float) -> np.ndarray:
+        if self._kept.get("grid") is not grid or self._kept.get("longest") != longest:
+            self._kept.update(grid=grid, longest=longest, pieces=grid.pieces(longest))
+        return self._kept["pieces"]
+
+    def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
+                     method: MethodChoice = "auto") -> Steps:
+        """The longest sub-step whose error, by step doubling, is below `tolerance`.
+
+        Runs with steps h and h/2 and takes |y_h - y_{h/2}|·16/15 as the error of h (order 4:
+        Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I, sec. II.4).  Where the
+        explicit method would need very short steps the implicit one is tried.
+
+        Parameters
+        ----------
+        tolerance : of the outputs, in their own units; default 1e-8 of the largest output
+
+        Raises
+        ------
+        pikanid.errors.SimulationFailed : the trajectory is not finite at p with any step
+        """
+        grid = self.grid(p)
+        spacing = float(np.median(np.diff(grid.T)))
+        coarsest = float(np.max(np.diff(grid.T)))
+        candidates: list[Method] = ["explicit", "implicit"] if method == "auto" else [method]
+        found: Steps | None = None
+        failure = Response(*(np.empty(0),) * 4)
+        for candidate in candidates:
+            longest, finest = coarsest, spacing / FINEST
+            rough = self._outputs(p, Steps(candidate, longest))
+            while longest > finest:
+                fine = self._outputs(p, Steps(candidate, longest / 2))
+                if not rough.finished or not fine.finished:
+                    failure, rough, longest = fine, fine, longest / 2
+                    continue
+                scale = tolerance or 1e-8 * max(float(np.abs(fine.y).max(initial=0.0)), 1e-12)
+                error = float(np.abs(fine.y - rough.y).max(initial=0.0)) * 16 / 15
+                if found is None or error < found.error:
+                    found = Steps(candidate, longest, error)
+                if error <= scale:
+                    return Steps(candidate, longest, error)
+                rough, longest = fine, longest / 2
+                if candidate == "explicit" and method == "auto" and longest < spacing / 64:
+                    break
+        if found is None:
+            where = ", ".join(f"{n} = {v:.4g}" for n, v in zip(
+                self.model.parameter_names, p, strict=True))
+            raise errors.SimulationFailed(
+                errors.too_many_events(failure.stopped_at) if failure.status == 2
+                else errors.not_finite(failure.stopped_at, where))
+        return found
+
+    def _outputs(self, p: np.ndarray, steps: Steps) -> Response:
+        """The outputs, or the states where there are none, as one vector."""
+        response = self.run(p, steps=steps, states=not self.experiment.samples)
+        if self.experiment.samples:
+            return response
+        finite = response.finished and bool(np.isfinite(response.states).all())
+        return Response(response.states.ravel(), response.sensitivity, response.t,
+                        response.states, finite, response.stopped_at, response.status)

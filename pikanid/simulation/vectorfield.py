@@ -1,0 +1,206 @@
+"""Right-hand side, outputs and their Jacobians as vectorised NumPy functions.
+
+For strategies that evaluate the model along a whole trajectory at once.  Non-smooth functions take
+the value of their side; at a kink, sgn 0 = 0.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from pikanid.expressions import TIME, symbol
+from pikanid.model import Model
+from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
+
+
+class VectorField:
+    """NumPy functions of a model.
+
+    Arguments of all methods: t (M,), x (M, n), u (M, m), p (P,) = all parameters in model order.
+
+    >>> from pikanid.systems import sloshing
+    >>> field = VectorField(sloshing())
+    >>> p = np.array([0.045, 0.15, 0.3, 9.81])
+    >>> field.rhs(np.zeros(1), np.array([[0.0, 1.0]]), np.zeros((1, 2)), p)
+    array([[ 1. , -0.5]])
+    """
+
+    def __init__(self, model: Model):
+        self.model = model
+        self._functions = _functions(_Structure(model))
+
+    def rhs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """f (M, n)."""
+        return self._functions.values["f"](t, x, u, p)
+
+    def rhs_jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
+                      ) -> tuple[np.ndarray, np.ndarray]:
+        """∂f/∂x (M, n, n) and ∂f/∂p (M, n, P)."""
+        return self._functions.jacobians(t, x, u, p, "f")
+
+    def outputs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """y = h (M, q)."""
+        return self._functions.values["h"](t, x, u, p)
+
+    def output_jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
+                         ) -> tuple[np.ndarray, np.ndarray]:
+        """∂h/∂x (M, q, n) and ∂h/∂p (M, q, P)."""
+        return self._functions.jacobians(t, x, u, p, "h")
+
+
+class _Structure:
+    """Hashes a model by its formulas, so that other parameter values reuse the functions."""
+
+    def __init__(self, model: Model):
+        self.model = model
+        self.key = (model.state_names, model.input_names, model.parameter_names,
+                    tuple(model.equations.values()),
+                    tuple(o.expression for o in model.outputs), model.splines)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Structure) and self.key == other.key
+
+
+class _Functions:
+    def __init__(self, model: Model):
+        self.model = model
+        self.lowered: LoweredModel = lower_model(model)
+        self.x = [symbol(n) for n in model.state_names]
+        self.u = [symbol(n) for n in model.input_names]
+        self.p = [symbol(n) for n in model.parameter_names]
+        self.switches = [switch_symbol(k) for k in range(len(self.lowered.switches))]
+        exprs = {"f": self.lowered.rhs, "h": self.lowered.outputs}
+        self.exprs = exprs
+        self.values = {name: self._vector(e) for name, e in exprs.items()}
+        self._tables: dict[str, Any] = {}
+
+    def arguments(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
+                  ) -> list[np.ndarray]:
+        """t, states, inputs, parameters and the present signs, each broadcast over M."""
+        base: list[np.ndarray] = [np.asarray(t, float), *x.T, *u.T, *p]
+        for g in self._sign_functions:
+            base.append(np.sign(g(*base)))
+        return base
+
+    @functools.cached_property
+    def _sign_functions(self) -> list[Callable[..., np.ndarray]]:
+        head = [TIME, *self.x, *self.u, *self.p]
+        return [self._lambdify([*head, *self.switches[:k]], [g])
+                for k, g in enumerate(self.lowered.switches)]
+
+    def _lambdify(self, arguments: Sequence[sp.Symbol], exprs: Sequence[sp.Expr]) -> Any:
+        tools = {"positive_power": _positive_power, "log_abs": _log_abs,
+                 "spline_value": _Splines(self.model, list(arguments))}
+        atoms = sorted(set().union(*(e.atoms(spline_value) for e in exprs)),
+                       key=sp.default_sort_key)
+        coefficients = {c for a in atoms
+                        for c in self.model.splines[int(a.args[0])].coefficient_names}
+        swapped = [e.replace(spline_value, self._with_coefficients) for e in exprs] if (
+            coefficients) else list(exprs)
+        body = swapped[0] if len(swapped) == 1 else swapped
+        return sp.lambdify(list(arguments), body, [tools, "numpy"], cse=not coefficients)
+
+    def _with_coefficients(self, index: sp.Expr, order: sp.Expr, z: sp.Expr) -> sp.Expr:
+        names = self.model.splines[int(index)].coefficient_names
+        return sp.Function("spline_value")(index, order, z, *(symbol(c) for c in names))
+
+    @property
+    def all_symbols(self) -> list[sp.Symbol]:
+        return [TIME, *self.x, *self.u, *self.p, *self.switches]
+
+    def _vector(self, exprs: Sequence[sp.Expr]) -> Callable[..., np.ndarray]:
+        function = self._lambdify(self.all_symbols, [*exprs, sp.Integer(0)])
+
+        def evaluate(t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+            with np.errstate(all="ignore"):
+                columns = function(*self.arguments(t, x, u, p))[:-1]
+            return np.stack([np.broadcast_to(c, np.shape(t)) for c in columns], axis=1)
+
+        return evaluate
+
+    def jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray, name: str
+                  ) -> tuple[np.ndarray, np.ndarray]:
+        places, function, edges = self._table(name)
+        rows, n, count = len(self.exprs[name]), len(self.x), len(t)
+        jx, jp = np.zeros((count, rows, n)), np.zeros((count, rows, len(self.p)))
+        with np.errstate(all="ignore"):
+            values = function(*self.arguments(t, x, u, p))
+        for (row, column), value in zip(places, values, strict=False):
+            if column < n:
+                jx[:, row, column] = value
+            else:
+                jp[:, row, column - n] = value
+        for (row, index, order), z, weight in zip(
+                edges, values[len(places):len(places) + len(edges)],
+                values[len(places) + len(edges):-1], strict=True):
+            spline = self.model.splines[index]
+            first = self.model.parameter_names.index(spline.coefficient_names[0])
+            basis = _basis(spline.knots, spline.degree, np.broadcast_to(z, (count,)), order)
+            jp[:, row, first:first + spline.size] += np.reshape(
+                np.broadcast_to(weight, (count,)), (-1, 1)) * basis
+        return jx, jp
+
+    def _table(self, name: str) -> Any:
+        if name not in self._tables:
+            places, entries, edges, inner, weights = [], [], [], [], []
+            for row, e in enumerate(self.exprs[name]):
+                for column, q in enumerate([*self.x, *self.p]):
+                    derivative = e.diff(q)
+                    if derivative != 0:
+                        places.append((row, column))
+                        entries.append(derivative)
+                for atom in sorted(e.atoms(spline_value), key=sp.default_sort_key):
+                    handle = sp.Dummy(real=True)
+                    edges.append((row, int(atom.args[0]), int(atom.args[1])))
+                    inner.append(atom.args[2])
+                    weights.append(e.subs(atom, handle).diff(handle).subs(handle, atom))
+            everything = [*entries, *inner, *weights, sp.Integer(0)]
+            if len(everything) == 1:
+                everything.append(sp.Integer(0))
+            self._tables[name] = (
+                places, self._lambdify(self.all_symbols, everything), edges)
+        return self._tables[name]
+
+
+class _Splines:
+    """NumPy evaluation of a model's spline functions from coefficients passed as arguments."""
+
+    def __init__(self, model: Model, arguments: Sequence[sp.Symbol]):
+        self.model = model
+
+    def __call__(self, index: int, order: int, z: np.ndarray, *coefficients: float) -> np.ndarray:
+        spline = self.model.splines[int(index)]
+        return _basis(spline.knots, spline.degree, np.atleast_1d(z), int(order)) @ np.array(
+            coefficients)
+
+
+def _basis(knots: Sequence[float], degree: int, z: np.ndarray, order: int) -> np.ndarray:
+    from scipy.interpolate import BSpline
+
+    size = len(knots) - degree - 1
+    spline = BSpline(np.asarray(knots, float), np.eye(size), degree, extrapolate=True)
+    return spline(z, nu=order)
+
+
+def _positive_power(base: np.ndarray, n: np.ndarray) -> np.ndarray:
+    with np.errstate(all="ignore"):
+        return np.where(np.asarray(base) > 0, np.power(np.maximum(base, 0.0), n),
+                        np.where(np.asarray(n) == 0, 1.0, 0.0))
+
+
+def _log_abs(x: np.ndarray) -> np.ndarray:
+    with np.errstate(all="ignore"):
+        return np.where(np.asarray(x) == 0, 0.0, np.log(np.abs(x)))
+
+
+@functools.lru_cache(maxsize=32)
+def _functions(structure: _Structure) -> _Functions:
+    return _Functions(structure.model)
