@@ -554,3 +554,17 @@ def too_few_samples(samples: int, parameters: int) -> str:
         f"There are {samples} usable samples for {parameters} free parameters: record more, or fix "
         "parameters."
     )
+
+
+# --- estimates -----------------------------------------------------------------------------------
+
+
+def estimate_file(path: str, detail: str) -> str:
+    return f"The estimate file '{path}' cannot be read: {detail}."
+
+
+def bad_start() -> str:
+    return (
+        "The model cannot be simulated from any starting point: give other guesses or narrower "
+        "bounds."
+    )

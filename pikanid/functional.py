@@ -85,6 +85,7 @@ class Functional:
     chains: Chains
     parts: tuple[Part, ...] = field(repr=False)
     scale: Array
+    weighted: bool = True  # data rows are divided by σ where it is known
     penalty: Penalty = "physics"
 
     def with_scale(self, scale: Array) -> Functional:
@@ -127,11 +128,17 @@ class Functional:
         part = self.parts[r]
         p = self.problem.parameters(theta, r)
         positions, _ = self.problem.columns(r)
-        families = [self._data(sites, coefficients, p, positions) for sites in part.data]
+        families = self.data_rows(r, coefficients, theta)
         families.append(self._physics(part.physics, coefficients, p, positions, lam))
         if part.start is not None:
             families.append(self._start(part.start, r, coefficients, p, positions))
         return families
+
+    def data_rows(self, r: int, coefficients: Array, theta: Array) -> list[Rows]:
+        """The data families of recording r alone."""
+        p = self.problem.parameters(theta, r)
+        positions, _ = self.problem.columns(r)
+        return [self._data(sites, coefficients, p, positions) for sites in self.parts[r].data]
 
     def _data(self, sites: Sites, c: Array, p: Array, positions: NDArray[np.int64]) -> Rows:
         x = self.states(sites, c)
@@ -241,7 +248,8 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
                 held = grip[0]
                 hold = grip[1] @ np.eye(len(chains.root))[np.lexsort((chains.order, chains.root))]
         parts.append(Part(own, tuple(data), physics, start, held, hold))
-    return Functional(problem, vector_field, chains, tuple(parts), np.ones(len(chains.top)))
+    return Functional(problem, vector_field, chains, tuple(parts), np.ones(len(chains.top)),
+                      weighted)
 
 
 def _output_delays(problem: Problem) -> Array:

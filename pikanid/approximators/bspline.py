@@ -139,7 +139,17 @@ def uniform_knots(start: float, stop: float, *, intervals: int, degree: int) -> 
     return knots_from_breakpoints(np.linspace(start, stop, intervals + 1), degree)
 
 
-def adaptive_breakpoints(t: Array, y: Array, start: float, stop: float, intervals: int) -> Array:
+def sample_breakpoints(t: Array, start: float, stop: float, intervals: int) -> Array:
+    """Breakpoints (intervals + 1,) with equally many samples t between them: uniform for uniform t.
+
+    >>> sample_breakpoints(np.array([0.0, 1.0, 2.0, 4.0, 8.0]), 0.0, 8.0, 2)
+    array([0., 2., 8.])
+    """
+    place = np.linspace(0.0, t.size - 1.0, intervals + 1)[1:-1]
+    return np.concatenate([[start], np.interp(place, np.arange(t.size), t), [stop]])
+
+
+def curvature_breakpoints(t: Array, y: Array, start: float, stop: float, intervals: int) -> Array:
     """Breakpoints (intervals + 1,) denser where the data (t, y) bend, by equidistribution.
 
     The monitor is 1 + |y''| / mean|y''| of a smoothed second difference, so that half of the knots

@@ -46,6 +46,12 @@ class Table:
         assert isinstance(self.approximator, Approximator)
         return self.approximator.values(self.t, own, self.derivative)
 
+    @property
+    def basis(self) -> sparse.csr_array:
+        """The tabulated basis (M, n_part) of a linear approximator."""
+        assert self.matrix is not None
+        return self.matrix
+
     def jacobian(self, coefficients: Array) -> Matrix:
         """Derivative of `values` by the approximator's own coefficients (M, n_part)."""
         if self.matrix is not None:

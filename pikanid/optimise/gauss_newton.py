@@ -45,9 +45,14 @@ class Linearisation:
 
     point: Point
     blocks: tuple[Eliminated, ...]
-    data_cost: float
+    data_costs: tuple[tuple[float, ...], ...]  # per recording, per data family
     physics_cost: float
     other_cost: float
+
+    @property
+    def data_cost(self) -> float:
+        """Weighted sum of squares of the data rows."""
+        return sum(map(sum, self.data_costs))
 
     @property
     def cost(self) -> float:
@@ -78,17 +83,17 @@ class BandedSystem:
 
     def linearise(self, point: Point, lam: float) -> Linearisation:
         """Residuals and normal equations at a point."""
-        blocks, data, physics, other = [], 0.0, 0.0, 0.0
+        blocks, data, physics, other = [], [], 0.0, 0.0
         for r, (part, c) in enumerate(zip(self.functional.parts, point.coefficients, strict=True)):
             rows = self.functional.rows(r, c, point.theta, lam)
             normal = self.assemblers[r].normal(self.families[r], rows, self.columns[r].size)
             held = self.functional.hold_jacobian(r, point.theta)
             blocks.append(_eliminate(normal, part.held.size, held))
             count = len(part.data)
-            data += sum(normal.costs[:count])
+            data.append(normal.costs[:count])
             physics += normal.costs[count]
             other += sum(normal.costs[count + 1:])
-        return Linearisation(point, tuple(blocks), data, physics, other)
+        return Linearisation(point, tuple(blocks), tuple(data), physics, other)
 
     def moved(self, point: Point, step: Step) -> Point:
         """The point after a step, held coefficients set from the initial state."""
@@ -241,37 +246,3 @@ def _damped_step(system: BandedSystem, at: Linearisation, lower: Array, upper: A
             damping = max(1e-8, 10.0 * damping)
             if damping > 1e6:
                 raise
-
-
-def theta_covariance(system: BandedSystem, at: Linearisation, step: Step) -> tuple[Array, Array]:
-    """Sandwich and naive covariance (b, b) of θ for unit noise in the weighted data rows.
-
-    The physics residual is not data, so Cov = Zᵀ J_dᵀ J_d Z with Z the θ columns of (JᵀJ)⁻¹, not
-    the θ block of (JᵀJ)⁻¹ itself (White, Econometrica 50, 1982: misspecified likelihood).
-    """
-    naive = np.linalg.inv(step.schur)
-    gram = np.zeros_like(naive)
-    for jacobian in data_response(system, at, step):
-        gram += jacobian.T @ jacobian
-    return naive @ gram @ naive, naive
-
-
-def data_response(system: BandedSystem, at: Linearisation, step: Step) -> Sequence[Array]:
-    """Derivative of each weighted data family by θ with the coefficients following, (N, b)."""
-    functional, responses = system.functional, []
-    for r, part in enumerate(functional.parts):
-        columns, block = system.columns[r], at.blocks[r]
-        follow = np.empty((part.n_coefficients, columns.size))
-        held = np.zeros((part.held.size, columns.size))
-        if block.held_by_theta is not None:
-            held = block.held_by_theta
-        follow[system.assemblers[r].order] = np.concatenate([held, -step.inner[r]])
-        families = functional.rows(r, at.point.coefficients[r], at.point.theta, 0.0)
-        for sites, rows in zip(part.data, families, strict=False):
-            full = np.zeros((sites.t.size, at.point.theta.size))
-            own = rows.by_theta[:, 0].copy()
-            for s, table in enumerate(sites.states):
-                own += rows.by_state[:, 0, s, None] * (table.matrix @ follow[table.part])
-            full[:, columns] = own
-            responses.append(full)
-    return responses

@@ -1,0 +1,98 @@
+"""How far a relaxed estimate can be trusted: sandwich covariance and effective parameters.
+
+The physics residual is not data: it has no noise.  With M = JᵀJ of Eq. (2) and J_d its data rows of
+covariance Σ, Cov = Zᵀ J_dᵀ Σ J_d Z, Z the θ columns of M⁻¹ (White, Econometrica 50, 1982).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from pikanid.approximators import Array
+from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
+
+EXACT_UP_TO = 300  # data rows; beyond, the trace is estimated
+PROBES = 32
+
+
+def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
+                     noise: Sequence[Array | float]) -> tuple[Array, Array]:
+    """Sandwich and naive covariance of θ, (b, b) each.
+
+    `noise` is the standard deviation of the rows of each data family, recording after recording.
+    The naive one, the θ block of M⁻¹ times the mean noise variance, counts the physics as data.
+    """
+    bread = np.linalg.inv(step.schur)
+    meat = np.zeros_like(bread)
+    variance, count = 0.0, 0
+    for jacobian, deviation in zip(data_response(system, at, step), noise, strict=True):
+        scaled = jacobian * np.reshape(deviation, (-1, 1))
+        meat += scaled.T @ scaled
+        variance += float(np.sum(np.broadcast_to(deviation, jacobian.shape[:1]) ** 2))
+        count += jacobian.shape[0]
+    return bread @ meat @ bread, bread * (variance / count)
+
+
+def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[Array]:
+    """Derivative (N, b) of every weighted data family by θ, the coefficients following θ."""
+    functional, responses = system.functional, []
+    for r, part in enumerate(functional.parts):
+        columns, block = system.columns[r], at.blocks[r]
+        held = np.zeros((part.held.size, columns.size))
+        if block.held_by_theta is not None:
+            held = block.held_by_theta
+        follow = np.empty((part.n_coefficients, columns.size))
+        follow[system.assemblers[r].order] = np.concatenate([held, -step.inner[r]])
+        rows = functional.data_rows(r, at.point.coefficients[r], at.point.theta)
+        for sites, row in zip(part.data, rows, strict=True):
+            assert row.by_theta is not None and row.by_state is not None
+            own = row.by_theta[:, 0].copy()
+            for s, table in enumerate(sites.states):
+                own += row.by_state[:, 0, s, None] * (table.basis @ follow[table.part])
+            full = np.zeros((sites.t.size, at.point.theta.size))
+            full[:, columns] = own
+            responses.append(full)
+    return responses
+
+
+def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) -> float:
+    """tr(J_d M⁻¹ J_dᵀ): how many parameters' worth of the data the fit has used up.
+
+    Exact for up to 300 samples, else from 32 fixed random probes (Hutchinson, 1990): ±√(edf/16).
+    """
+    functional = system.functional
+    rows = functional.n_data
+    if rows <= EXACT_UP_TO:
+        probes = np.eye(rows)
+    else:
+        probes = np.random.default_rng(0).choice([-1.0, 1.0], size=(rows, PROBES))
+    theta = np.zeros((at.point.theta.size, probes.shape[1]))
+    total, first = 0.0, 0
+    for r, part in enumerate(functional.parts):
+        columns, block = system.columns[r], at.blocks[r]
+        coefficients = at.point.coefficients[r]
+        pulled = np.zeros((part.n_coefficients, probes.shape[1]))
+        pulled_theta = np.zeros((columns.size, probes.shape[1]))
+        for sites, row in zip(part.data, functional.data_rows(
+                r, coefficients, at.point.theta), strict=True):
+            assert row.by_theta is not None and row.by_state is not None
+            probe = probes[first:first + sites.t.size]
+            first += sites.t.size
+            for s, table in enumerate(sites.states):
+                weighted = row.by_state[:, 0, s, None] * probe
+                pulled[table.part] += table.basis.T @ weighted
+            pulled_theta += row.by_theta[:, 0].T @ probe
+        pulled = pulled[system.assemblers[r].order]
+        k = part.held.size
+        if block.held_by_theta is not None:
+            pulled_theta += block.held_by_theta.T @ pulled[:k]
+        factor = cholesky_banded(block.band, lower=True, check_finite=False)
+        solved = cho_solve_banded((factor, True), pulled[k:], check_finite=False)
+        total += float(np.sum(solved * pulled[k:]))
+        theta[columns] += pulled_theta - block.border.T @ solved
+    if theta.size:
+        total += float(np.sum(theta * np.linalg.solve(step.schur, theta)))
+    return total if rows <= EXACT_UP_TO else total / PROBES

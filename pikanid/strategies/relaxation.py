@@ -1,0 +1,262 @@
+"""Relaxed fits: one functional, and Table I as (approximator, λ-schedule, optimiser).
+
+    method   approximator      λ                     optimiser
+    PDA      B-splines         decoupled             two steps: smooth, then regress   (pda.py)
+    iPDA     B-splines         finite, continued up  Gauss-Newton on all unknowns      (here)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.approximators import Array
+from pikanid.approximators.bspline import BSpline
+from pikanid.chains import Chains
+from pikanid.functional import Functional, Sites, bind
+from pikanid.optimise.covariance import effective_parameters, theta_covariance
+from pikanid.optimise.gauss_newton import (
+    BandedSystem,
+    Linearisation,
+    Outcome,
+    Point,
+    gauss_newton,
+)
+from pikanid.optimise.schedules import Schedule, Stage, moved
+from pikanid.optimise.smoothing import Smoothed, smooth
+from pikanid.problem import Problem
+from pikanid.simulation.vectorfield import VectorField
+from pikanid.strategies.grids import Grid
+
+# The grid is fine enough once halving it moves no parameter by more than this many standard errors.
+GRID_SETTLED = 0.05
+MAX_REFINEMENTS = 6
+MAX_ITERATIONS = 200  # at one λ
+# Moves below this share of the parameter itself count as none (clean data: no standard error).
+RELATIVE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class RelaxedFit:
+    """What a relaxation found.
+
+    `covariance` is the sandwich of θ (the physics residual is not data), `naive_covariance` the
+    θ block of σ²(JᵀJ)⁻¹ that treats it as data.  `data_cost` and `physics_cost` are the two sums of
+    squares of Eq. (2), `effective` the number of parameters that the data fit used up.
+    """
+
+    problem: Problem
+    theta: Array
+    covariance: Array
+    naive_covariance: Array
+    coefficients: tuple[Array, ...] = field(repr=False)
+    functional: Functional = field(repr=False)
+    grid: Grid = field(repr=False)
+    lam: float
+    stages: tuple[Stage, ...] = field(repr=False)
+    data_cost: float
+    physics_cost: float
+    effective: float
+    converged: bool
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def std(self) -> Array:
+        """Standard errors of θ (b,), from the sandwich."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def chains(self) -> Chains:
+        """Which spline stands for which states."""
+        return self.functional.chains
+
+    @property
+    def iterations(self) -> int:
+        """Gauss-Newton iterations over all stages."""
+        return sum(stage.iterations for stage in self.stages)
+
+    def trajectory(self, r: int, t: Array) -> Array:
+        """Approximated states (M, n) of recording r at times t (M,) [s]."""
+        part, chains, c = self.functional.parts[r], self.chains, self.coefficients[r]
+        columns = []
+        for i, q in zip(chains.root, chains.order, strict=True):
+            spline, own = part.approximators[i], part.physics.tops[i].part
+            columns.append(spline.basis(t, q) @ c[own])  # type: ignore[union-attr]
+        return np.column_stack(columns)
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What stays the same while a fit goes through grids and λ."""
+
+    problem: Problem
+    field: VectorField
+    chains: Chains
+    given_start: bool
+    weighted: bool
+    nondimensional: bool  # λ in units of N·σ²/(T·s²), s the size of the physics terms
+
+    def functional(self, grid: Grid) -> Functional:
+        """Eq. (2) on a grid."""
+        return bind(self.problem, self.field, self.chains, grid.splines(self.problem, self.chains),
+                    grid.nodes(self.problem, self.chains), given_start=self.given_start,
+                    weighted=self.weighted)
+
+
+def first_point(functional: Functional) -> tuple[Point, Smoothed | None]:
+    """Splines smoothed through the data, θ at its guess; flat splines where data say too little."""
+    theta = functional.problem.guess
+    flat = tuple(functional.complete(r, np.zeros(part.n_coefficients), theta)
+                 for r, part in enumerate(functional.parts))
+    smoothed = smooth(BandedSystem(functional.smoothing()), Point(flat, theta))
+    return (Point(flat, theta), None) if smoothed is None else (smoothed.point, smoothed)
+
+
+def physics_scale(functional: Functional, point: Point, sigma: float) -> Array:
+    """Scale (E,) that makes λ dimensionless: s·√(T/N)/σ.
+
+    At λ = 1 a physics residual as large as the physics itself, s, costs as much as every sample
+    being off by its σ.  s is the root mean square of x⁽ᵐ⁾ or of f, whichever is larger.
+    """
+    tops, rates, total = 0.0, 0.0, 0.0
+    for r, part in enumerate(functional.parts):
+        sites, c = part.physics, point.coefficients[r]
+        weight = sites.weight**2
+        p = functional.problem.parameters(point.theta, r)
+        f = functional.vector_field.rhs(sites.t, functional.states(sites, c), sites.u, p)
+        f = np.nan_to_num(f[:, list(functional.chains.top)], posinf=0.0, neginf=0.0)
+        top = np.column_stack([table.values(c) for table in sites.tops])
+        tops = tops + (weight * top**2).sum(axis=0)
+        rates = rates + (weight * f**2).sum(axis=0)
+        total += weight[:, 0].sum()
+    size = np.sqrt(np.maximum(tops, rates) / total)
+    size = np.where(size > 0.0, size, 1.0)
+    return size * np.sqrt(total / functional.n_data) / sigma
+
+
+def relax(setup: Setup, grid: Grid, schedule: Callable[[float], Schedule], *,
+          refine: bool) -> RelaxedFit:
+    """Fit Eq. (2): smooth, warm up, follow the λ-schedule, refine the grid until it has settled.
+
+    `schedule` is called with the noise level of the data rows: 1 where they are divided by σ.
+
+    Raises:
+        BadSetting: If the splines cannot carry the model, or a delay is to be estimated.
+    """
+    functional = setup.functional(grid)
+    point, smoothed = first_point(functional)
+    noise = noise_level(functional, smoothed)
+    if setup.nondimensional:
+        functional = functional.with_scale(physics_scale(functional, point, noise))
+    system = BandedSystem(functional)
+    stages, outcome, notes = follow(system, point, schedule(noise))
+    lam, gap = stages[-1].lam, 0.0
+    for _ in range(MAX_REFINEMENTS if refine else 0):
+        grid = grid.refined()
+        finer = setup.functional(grid).with_scale(functional.scale)
+        start = transfer(functional, finer, outcome.at.point)
+        functional, system, before = finer, BandedSystem(finer), outcome.at.point.theta
+        outcome = gauss_newton(system, start, lam, setup.problem.lower, setup.problem.upper)
+        stages.append(_stage(system, lam, outcome))
+        gap = moved(before, outcome.at.point.theta, stages[-1].std, RELATIVE)
+        if gap <= GRID_SETTLED:
+            break
+    if gap > GRID_SETTLED:
+        notes.append(errors.grid_not_settled(gap, grid.n_intervals))
+    if not outcome.converged:
+        notes.append(errors.not_converged(lam))
+    return _conclude(setup, grid, system, outcome, stages, notes)
+
+
+def follow(system: BandedSystem, point: Point,
+           plan: Schedule) -> tuple[list[Stage], Outcome, list[str]]:
+    """Warm up at the first λ, then minimise at every λ that the schedule names."""
+    problem = system.functional.problem
+    stages: list[Stage] = []
+    outcomes: list[Outcome] = []
+    lam = plan.next(stages)
+    assert lam is not None
+    if plan.warmup:
+        point = gauss_newton(system, point, lam, point.theta, point.theta,
+                             iterations=plan.warmup).at.point
+    while lam is not None:
+        outcomes.append(gauss_newton(system, point, lam, problem.lower, problem.upper,
+                                     iterations=MAX_ITERATIONS))
+        point = outcomes[-1].at.point
+        stages.append(_stage(system, lam, outcomes[-1]))
+        lam = plan.next(stages)
+    kept = plan.keep(stages)
+    notes = [errors.relaxation_locked(stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
+    return stages[:kept + 1], outcomes[kept], notes
+
+
+def transfer(old: Functional, new: Functional, point: Point) -> Point:
+    """The same trajectories on a finer grid (least squares; exact where the spaces are nested)."""
+    from scipy.interpolate import make_lsq_spline
+
+    coefficients = []
+    for r, (before, after) in enumerate(zip(old.parts, new.parts, strict=True)):
+        pieces = []
+        for i, fine in enumerate(after.approximators):
+            coarse = before.approximators[i]
+            assert isinstance(coarse, BSpline) and isinstance(fine, BSpline)
+            own = point.coefficients[r][before.physics.tops[i].part]
+            edges = fine.breakpoints
+            inside = (np.arange(fine.degree + 1) + 0.5) / (fine.degree + 1)
+            t = (edges[:-1, None] + np.diff(edges)[:, None] * inside).ravel()
+            pieces.append(make_lsq_spline(t, coarse.values(t, own), fine.knots, fine.degree).c)
+        coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
+    return Point(tuple(coefficients), point.theta)
+
+
+def noise_level(functional: Functional, smoothed: Smoothed | None) -> float:
+    """Standard deviation of the data rows, for the scale of λ; a floor serves clean data."""
+    pairs = list(_families(functional))
+    if functional.weighted and all(sigma is not None for _, sigma in pairs):
+        return 1.0
+    rows = [(sites.weight * sites.target).ravel() for sites, _ in pairs if sites.target is not None]
+    spread = float(np.std(np.concatenate(rows))) or 1.0
+    return max(0.1 * spread if smoothed is None else smoothed.sigma, 1e-5 * spread)
+
+
+def row_noise(functional: Functional, at: Linearisation, effective: float) -> list[Array | float]:
+    """Standard deviation of every data family's rows; of an output without σ, from its residual."""
+    left = functional.n_data / max(1.0, functional.n_data - effective)
+    costs: dict[int, float] = {}
+    counts: dict[int, int] = {}
+    flat = [cost for costs_of in at.data_costs for cost in costs_of]
+    families = list(_families(functional))
+    for (sites, _), cost in zip(families, flat, strict=True):
+        costs[sites.output] = costs.get(sites.output, 0.0) + cost
+        counts[sites.output] = counts.get(sites.output, 0) + sites.t.size
+    return [
+        float(np.sqrt(left * costs[sites.output] / counts[sites.output])) if sigma is None
+        else sites.weight[:, 0] * sigma
+        for sites, sigma in families]
+
+
+def _families(functional: Functional) -> Iterator[tuple[Sites, Array | None]]:
+    for experiment, part in zip(functional.problem.experiments, functional.parts, strict=True):
+        for samples, sites in zip(experiment.samples, part.data, strict=True):
+            yield sites, samples.sigma
+
+
+def _stage(system: BandedSystem, lam: float, outcome: Outcome) -> Stage:
+    noise = row_noise(system.functional, outcome.at, outcome.at.point.theta.size)
+    covariance, _ = theta_covariance(system, outcome.at, outcome.step, noise)
+    return Stage(lam, outcome.at.point.theta, np.sqrt(np.diag(covariance)), outcome.at.data_cost,
+                 outcome.at.physics_cost, outcome.iterations, outcome.converged)
+
+
+def _conclude(setup: Setup, grid: Grid, system: BandedSystem, outcome: Outcome,
+              stages: list[Stage], notes: list[str]) -> RelaxedFit:
+    at, step = outcome.at, outcome.step
+    effective = effective_parameters(system, at, step)
+    noise = row_noise(system.functional, at, effective)
+    sandwich, naive = theta_covariance(system, at, step, noise)
+    return RelaxedFit(setup.problem, at.point.theta, sandwich, naive, at.point.coefficients,
+                      system.functional, grid, stages[-1].lam, tuple(stages), at.data_cost,
+                      at.physics_cost, effective, outcome.converged, tuple(notes))
