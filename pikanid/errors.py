@@ -40,7 +40,9 @@ class SimulationFailed(PikanidError):
 
 
 def _listed(names: Iterable[str]) -> str:
-    return ", ".join(names) or "(none)"
+    every = list(names)
+    more = [f"... ({len(every)} in all)"] if len(every) > 40 else []
+    return ", ".join(every[:40] + more) or "(none)"
 
 
 def _did_you_mean(close: Sequence[str]) -> str:

@@ -217,7 +217,8 @@ class Recording:
 
         Args:
             name: Of the channel.
-            unit: Unit to convert to; as recorded if None.
+            unit: Unit to convert to; as recorded if None.  A channel without one is taken to be
+                in it already.
 
         Raises:
             BadRecording: If it is absent or unusable; BadUnit if its unit does not fit.
@@ -232,7 +233,8 @@ class Recording:
 
         Args:
             name: Of the channel.
-            unit: Unit to convert to; as recorded if None.
+            unit: Unit to convert to; as recorded if None.  A channel without one is taken to be
+                in it already.
 
         Raises:
             BadRecording: If it is absent, unusable or never changes; BadUnit if its unit does not
@@ -249,7 +251,9 @@ class Recording:
         found = self[name]
         channels_of.check_times(found, self.name)
         channels_of.check_values(found, self.name, missing_allowed)
-        return found.converted(found.unit if unit is None else unit)
+        # Where a file states no unit, the model's is meant.
+        stated = found if found.unit or not unit else replace(found, unit=unit)
+        return stated.converted(stated.unit if unit is None else unit)
 
     # --- preparing -------------------------------------------------------------------------------
 
@@ -412,15 +416,13 @@ class Recording:
         writing.write(self.channels, path)
 
     def __repr__(self) -> str:
+        rows = [_summary(ch) for ch in self.channels.values()]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = [f"Recording '{self.name}': {self.start:g} s to {self.stop:g} s"]
-        lines += [
-            "  " + "  ".join(part.ljust(width) for part, width in zip(row, widths, strict=True))
-            for rows in [[_summary(ch) for ch in self.channels.values()]]
-            for widths in [[max(map(len, column)) for column in zip(*rows, strict=True)]]
-            for row in rows
-        ]
-        lines += [f"  note: {note}" for note in self.notes]
-        return "\n".join(line.rstrip() for line in lines)
+        for row in rows:
+            cells = (part.ljust(width) for part, width in zip(row, widths, strict=True))
+            lines.append("  " + "  ".join(cells).rstrip())
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
     def _repr_html_(self) -> str:
         from html import escape

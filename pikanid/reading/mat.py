@@ -1,0 +1,115 @@
+"""MATLAB files: level 4 and 5 (scipy) and 7.3 (HDF5, h5py), structures and cells flattened.
+
+``Theta1.signals.values`` is a field of nested structures, ``Y_id.2`` the second cell of a cell
+array; counting starts at 1, as in MATLAB.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.reading.arrays import columns
+from pikanid.reading.door import FOREIGN_FAILURES, NAMES
+from pikanid.reading.table import Table
+
+_DEEPEST = 8
+_MOST_CELLS = 1000
+
+
+def read(content: bytes, where: str) -> Table:
+    """The vectors in a MAT file, each a column named by its path.
+
+    Raises:
+        BadRecording: If the file is damaged or holds no vectors.
+    """
+    found = columns(arrays(content, where))
+    if not found:
+        raise errors.BadRecording(errors.no_vectors(where))
+    return Table(found, shared_time=False)
+
+
+def arrays(content: bytes, where: str) -> dict[str, np.ndarray]:
+    """Every numeric array of the file by its path."""
+    hdf5 = content.startswith((b"\x89HDF", b"MATLAB 7.3"))
+    return dict((_v73 if hdf5 else _v5)(content, where))
+
+
+def _v5(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
+    import scipy.io
+    from scipy.io.matlab import MatReadError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # on duplicate variables and functions
+            variables = scipy.io.loadmat(io.BytesIO(content))  # type: ignore[arg-type]
+        return [
+            leaf
+            for name, value in variables.items()
+            if not name.startswith("__")
+            for leaf in _flat(name, value, 0)
+        ]
+    except (*FOREIGN_FAILURES, MatReadError):  # type: ignore[misc]
+        raise errors.BadRecording(errors.damaged(where, NAMES["mat"])) from None
+
+
+def _flat(path: str, value: Any, depth: int) -> Iterator[tuple[str, np.ndarray]]:
+    array = np.asarray(value)
+    if depth > _DEEPEST:
+        return
+    if array.dtype.names:
+        many = array.size > 1
+        for k, element in enumerate(array.ravel()[:_MOST_CELLS]):
+            for field in array.dtype.names:
+                inner = f"{path}.{k + 1}.{field}" if many else f"{path}.{field}"
+                yield from _flat(inner, element[field], depth + 1)
+    elif array.dtype == object:
+        if array.size == 1 and array.ndim == 0:
+            return  # an object of a class: nothing of it is known
+        for k, element in enumerate(array.ravel(order="F")[:_MOST_CELLS]):
+            yield from _flat(f"{path}.{k + 1}", element, depth + 1)
+    elif array.dtype.kind in "fiub":
+        yield path, array
+
+
+def _v73(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
+    try:
+        import h5py
+    except ImportError:
+        raise errors.BadSetting(errors.extra_missing("MAT 7.3", "h5py", "mat")) from None
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            return [
+                leaf
+                for name in file
+                if not name.startswith("#")
+                for leaf in _flat_hdf5(name, file[name], file, 0)
+            ]
+    except FOREIGN_FAILURES:
+        raise errors.BadRecording(errors.damaged(where, NAMES["mat"])) from None
+
+
+def _flat_hdf5(path: str, node: Any, file: Any, depth: int) -> Iterator[tuple[str, np.ndarray]]:
+    import h5py
+
+    if depth > _DEEPEST:
+        return
+    if isinstance(node, h5py.Group):
+        for field in node:
+            yield from _flat_hdf5(f"{path}.{field}", node[field], file, depth + 1)
+        return
+    if "MATLAB_empty" in node.attrs or node.attrs.get("MATLAB_class", b"") == b"char":
+        return
+    if node.dtype.kind == "O":
+        # A cell array, or one field of an array of structures, is a dataset of references.
+        if h5py.check_ref_dtype(node.dtype) is h5py.Reference:
+            for k, reference in enumerate(np.asarray(node[()]).ravel()[:_MOST_CELLS]):
+                if reference:
+                    yield from _flat_hdf5(f"{path}.{k + 1}", file[reference], file, depth + 1)
+    elif node.dtype.kind in "fiub":
+        yield path, np.asarray(node[()]).T  # HDF5 counts axes the other way round
