@@ -570,3 +570,18 @@ def bad_start() -> str:
         "The model cannot be simulated from any starting point: give other guesses or narrower "
         "bounds."
     )
+
+
+def sigma_unknown(output: str) -> str:
+    return f"The noise of output '{output}' is not known: pass sigma, in the output's unit."
+
+
+def no_influence(name: str) -> str:
+    return f"'{name}' has no influence on what was measured: fix it, or measure something else."
+
+
+def unidentifiable(combination: str, condition: float) -> str:
+    return (
+        f"The data do not determine the combination {combination} (condition {condition:.1g}): "
+        "fix one of these parameters or excite the system differently."
+    )

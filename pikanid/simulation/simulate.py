@@ -47,10 +47,7 @@ def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str,
     model = model.with_values(parameters or {})
     times = np.asarray(excitation.t if t is None else t, dtype=float)
     inputs = excitation.without(*(n for n in model.output_names if n in excitation.channels))
-    blank = np.zeros(len(times))
-    blank[1:] = 1.0  # any values: only the times of these channels are used
-    wanted = inputs.with_channels(*(
-        Channel(o.name, times, blank, o.unit) for o in model.outputs))
+    wanted = with_outputs(model, inputs, times)
     simulator = Simulator(model, bind(model, wanted))
     p = np.array(list(model.values.values()))
     if tolerance is None:
@@ -67,3 +64,15 @@ def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str,
         noisy = y + rng.normal(0.0, s, len(y)) if s > 0 else y
         channels.append(Channel(o.name, times, noisy, o.unit, s if s > 0 else None))
     return inputs.with_channels(*channels)
+
+
+def with_outputs(model: Model, recording: Recording, t: np.ndarray | None = None) -> Recording:
+    """The recording with a placeholder for every output of the model that it lacks.
+
+    Only the times of a placeholder mean something: t (N,), by default the recording's own.
+    """
+    times = recording.t if t is None else t
+    ramp = np.linspace(0.0, 1.0, len(times))
+    return recording.with_channels(*(
+        Channel(o.name, times, ramp, o.unit) for o in model.outputs
+        if o.name not in recording.channels))

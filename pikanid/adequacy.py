@@ -1,0 +1,93 @@
+"""Does the fitted model explain the recording?  A verdict, so that a bad optimum is never a success.
+
+With known σ the sum of squared standardised residuals follows χ² with N - n_free degrees of
+freedom when the model is right (Seber & Wild, Nonlinear Regression, 1989, sec. 2.1).  Without σ the
+residual is compared with the recording's own high-frequency noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any, Literal
+
+import numpy as np
+
+Verdict = Literal["fits", "misfit", "unknown"]
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """The χ² verdict.
+
+    `value` is Σ (residual/σ)² over `dof` degrees of freedom; `p_value` the probability of a larger
+    one if the model is right; `source` says where σ came from ("given" or "differences").
+    """
+
+    value: float
+    dof: int
+    p_value: float
+    verdict: Verdict
+    source: Literal["given", "differences", "none"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        return {"value": self.value, "dof": self.dof, "p_value": self.p_value,
+                "verdict": self.verdict, "sigma_source": self.source}
+
+
+def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
+          data: Sequence[np.ndarray], n_free: int, alpha: float = 1e-3) -> Adequacy:
+    """Judge the residuals of all outputs together.
+
+    Parameters
+    ----------
+    residuals, sigmas, data : one array (N_o,) an output and recording; σ None where unknown
+    n_free : number of estimated parameters
+    alpha : probability of calling a right model a misfit
+
+    >>> r = np.random.default_rng(0).normal(0, 2.0, 500)
+    >>> judge([r], [np.full(500, 2.0)], [r], 2).verdict
+    'fits'
+    >>> judge([r], [np.full(500, 1.0)], [r], 2).verdict
+    'misfit'
+    """
+    from scipy.stats import chi2
+
+    count = sum(map(len, residuals))
+    dof = max(count - n_free, 1)
+    if count == 0:
+        return Adequacy(np.nan, dof, np.nan, "unknown", "none")
+    if all(s is not None for s in sigmas):
+        value = float(sum(np.sum((r / s) ** 2) for r, s in zip(residuals, sigmas, strict=True)))
+        p = float(chi2.sf(value, dof))
+        return Adequacy(value, dof, p, "fits" if p >= alpha else "misfit", "given")
+    value, threshold = 0.0, 0.0
+    for r, s, y in zip(residuals, sigmas, data, strict=True):
+        noise = difference_noise(y) if s is None else s
+        floor = 1e-9 * max(float(np.ptp(y)), 1e-300)
+        value += float(np.sum((r / np.maximum(noise, floor)) ** 2))
+        threshold += len(r)
+    # the noise is itself estimated, and coloured noise fools differences: ask for a factor of four
+    verdict: Verdict = "misfit" if value > 4 * threshold else "fits"
+    return Adequacy(value, dof, float(chi2.sf(value, dof)), verdict, "differences")
+
+
+def difference_noise(y: np.ndarray, order: int = 4) -> float:
+    """σ of white noise on a smooth, evenly sampled signal, from its differences.
+
+    The `order`-th difference removes polynomials below that degree and multiplies the variance of
+    white noise by binomial(2 order, order) (Rice, Annals of Statistics 12, 1984, p. 1215).
+
+    >>> t = np.arange(2000) * 0.01
+    >>> noisy = np.sin(t) + np.random.default_rng(0).normal(0, 0.1, 2000)
+    >>> bool(abs(difference_noise(noisy) - 0.1) < 0.01)
+    True
+    """
+    if len(y) <= order:
+        return float(np.std(y))
+    d = np.diff(y, order)
+    # median, not mean: a few kinks must not count
+    spread = float(np.median(np.abs(d))) / 0.6744897501960817
+    return spread / float(np.sqrt(comb(2 * order, order)))

@@ -1,0 +1,269 @@
+"""`Estimate`: what every strategy returns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.adequacy import Adequacy
+from pikanid.model import Model
+from pikanid.problem import FreeParameter
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Measured against fitted, for one output of one recording; arrays (N,), in the model's unit."""
+
+    recording: str
+    output: str
+    unit: str
+    t: np.ndarray
+    measured: np.ndarray
+    fitted: np.ndarray
+    sigma: np.ndarray | None = None
+
+    @property
+    def residual(self) -> np.ndarray:
+        """measured - fitted (N,)."""
+        return self.measured - self.fitted
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the residual."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The states of one recording on a time grid: t (L,), x (L, n)."""
+
+    t: np.ndarray
+    x: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Estimated parameters with everything that says how far to trust them.
+
+    Attributes
+    ----------
+    model : the model that was fitted, at its guesses; `fitted_model` holds the estimates
+    strategy : "nls", "pda", "ipda", ...
+    free, theta, covariance : layout, values (n_free,) and covariance (n_free, n_free) of θ
+    fits, trajectories : fitted outputs and states, recording by recording
+    cost : half the sum of squared residuals, in output units
+    adequacy : the χ² verdict
+    converged : whether the optimiser stopped at a stationary point
+    settings, history : options as used, and the iterations
+    warnings : sentences that the user should read
+    seconds, seed, version : provenance
+    approximator : the fitted curve of a relaxation strategy, else None
+    """
+
+    model: Model
+    strategy: str
+    free: tuple[FreeParameter, ...]
+    theta: np.ndarray
+    covariance: np.ndarray
+    fits: tuple[Fit, ...]
+    trajectories: tuple[Trajectory, ...]
+    cost: float
+    adequacy: Adequacy
+    converged: bool
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    history: tuple[Mapping[str, float], ...] = ()
+    warnings: tuple[str, ...] = ()
+    seconds: float = float("nan")
+    seed: int | None = None
+    version: str = ""
+    approximator: Any = None
+
+    # --- parameters ------------------------------------------------------------------------------
+
+    def index(self, name: str, recording: int | None = None) -> int:
+        """Position in θ of a parameter.
+
+        Raises
+        ------
+        pikanid.errors.BadModel : it was not estimated
+        """
+        for k, f in enumerate(self.free):
+            if f.name == name and f.recording in (None, recording if recording is not None else 0):
+                return k
+        labels = [f.label for f in self.free]
+        raise errors.BadModel(errors.not_in_model("estimated parameter", name, labels))
+
+    def value(self, name: str, recording: int | None = None) -> float:
+        """The estimate of a parameter, or the value of a fixed one."""
+        fixed = [p for p in self.model.parameters if p.name == name and not p.free]
+        return fixed[0].value if fixed else float(self.theta[self.index(name, recording)])
+
+    def std(self, name: str, recording: int | None = None) -> float:
+        """The standard error of a parameter; 0 for a fixed one."""
+        if any(p.name == name and not p.free for p in self.model.parameters):
+            return 0.0
+        k = self.index(name, recording)
+        return float(np.sqrt(self.covariance[k, k]))
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Correlation matrix of the estimates (n_free, n_free)."""
+        s = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.covariance / np.outer(s, s)
+
+    def interval(self, name: str, level: float = 0.95, recording: int | None = None
+                 ) -> tuple[float, float]:
+        """Confidence interval from the standard error (Student's t with the fit's dof)."""
+        from scipy.stats import t
+
+        half = self.std(name, recording) * float(t.ppf(0.5 + level / 2, self.adequacy.dof))
+        return self.value(name, recording) - half, self.value(name, recording) + half
+
+    @property
+    def fitted_model(self) -> Model:
+        """The model at the estimates (of the first recording, where each has its own)."""
+        return self.model.with_values({
+            f.name: float(v) for f, v in zip(self.free, self.theta, strict=True)
+            if f.recording in (None, 0)})
+
+    # --- goodness --------------------------------------------------------------------------------
+
+    @property
+    def ok(self) -> bool:
+        """Converged, and not a misfit."""
+        return self.converged and self.adequacy.verdict != "misfit"
+
+    @property
+    def n(self) -> int:
+        """Number of samples fitted."""
+        return sum(len(f.t) for f in self.fits)
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square residual over everything fitted."""
+        return float(np.sqrt(sum(np.sum(f.residual**2) for f in self.fits) / max(self.n, 1)))
+
+    # --- showing and keeping ---------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of the JSON that `pikanid identify --json` writes."""
+        return {
+            "schema_version": 1,
+            "model": self.model.name,
+            "strategy": self.strategy,
+            "parameters": {f.label: {"value": float(v), "std": _plain(s), "unit": f.unit}
+                           for f, v, s in zip(self.free, self.theta,
+                                              np.sqrt(np.diag(self.covariance)), strict=True)},
+            "cost": self.cost,
+            "chi2": {k: _plain(v) for k, v in self.adequacy.to_dict().items()},
+            "n": self.n,
+            "rmse": self.rmse,
+            "converged": self.converged,
+            "warnings": list(self.warnings),
+            "seconds": self.seconds,
+            "seed": self.seed,
+            "version": self.version,
+            "settings": dict(self.settings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a parameter: value, standard error, 95 % interval, unit."""
+        import pandas as pd
+
+        rows = []
+        for f in self.free:
+            low, high = self.interval(f.name, recording=f.recording)
+            rows.append({"parameter": f.label, "value": self.value(f.name, f.recording),
+                         "std": self.std(f.name, f.recording), "lower": low, "upper": high,
+                         "unit": f.unit})
+        return pd.DataFrame(rows).set_index("parameter")
+
+    def plot(self) -> matplotlib.figure.Figure:
+        """Measured against fitted, and the residual; one row of axes an output and recording."""
+        from pikanid.plots import plot_fits
+
+        return plot_fits(self.fits, title=f"{self.model.name}: {self.strategy}")
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write everything but the approximator's object to one file (JSON, gzip if *.gz)."""
+        from pikanid.estimate_file import save
+
+        save(self, path)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Estimate:
+        """Read what `save` wrote."""
+        from pikanid.estimate_file import load
+
+        return load(path)
+
+    def __str__(self) -> str:
+        lines = [f"{self.strategy} estimate of {self.model.name} ({self.n} samples, "
+                 f"{self.seconds:.3g} s)"]
+        width = max([len(f.label) for f in self.free], default=0)
+        for f, v, s in zip(self.free, self.theta, np.sqrt(np.diag(self.covariance)), strict=True):
+            lines.append(f"  {f.label:<{width}} = {rounded(v, s)} {f.unit}".rstrip())
+        lines.append(f"  {self.sentence()}")
+        return "\n".join([*lines, *(f"  warning: {w}" for w in self.warnings)])
+
+    def sentence(self) -> str:
+        """The verdict as a sentence."""
+        a = self.adequacy
+        stop = "converged" if self.converged else "stopped before it converged"
+        if a.verdict == "unknown":
+            return f"The fit {stop}; nothing was measured that could judge it."
+        ratio = np.sqrt(a.value / a.dof)
+        what = ("explains the recording" if a.verdict == "fits"
+                else "does NOT explain the recording")
+        noise = "the stated noise" if a.source == "given" else "the recording's own noise"
+        return (f"The fit {stop} and {what}: residual {self.rmse:.3g}, "
+                f"{ratio:.3g} times {noise}.")
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        rows = "".join(
+            f"<tr><td>{escape(f.label)}</td><td>{v:.6g}</td><td>{s:.2g}</td>"
+            f"<td>{escape(f.unit)}</td></tr>"
+            for f, v, s in zip(self.free, self.theta, np.sqrt(np.diag(self.covariance)),
+                               strict=True))
+        notes = "".join(f"<p>warning: {escape(w)}</p>" for w in self.warnings)
+        return (f"<b>{escape(self.strategy)}</b> estimate of {escape(self.model.name)}"
+                "<table><tr><th>parameter</th><th>value</th><th>std. error</th><th>unit</th></tr>"
+                f"{rows}</table><p>{escape(self.sentence())}</p>{notes}")
+
+
+def rounded(value: float, std: float) -> str:
+    """Value and standard error with two significant digits of the error.
+
+    >>> rounded(0.0450123, 0.0000099)
+    '0.0450123 ± 0.0000099'
+    """
+    if not np.isfinite(std) or std <= 0:
+        return f"{value:.6g}"
+    digits = int(np.clip(1 - np.floor(np.log10(std)), 0, 12))
+    if abs(value) >= 1e6 or 0 < abs(value) < 1e-5 or digits > 10:
+        return f"{value:.6e} ± {std:.1e}"
+    return f"{value:.{digits}f} ± {std:.{digits}f}"
+
+
+def _plain(value: Any) -> Any:
+    """NaN and infinity have no JSON form: they become null."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def total_cost(fits: Sequence[Fit]) -> float:
+    """Half the sum of squared residuals."""
+    return 0.5 * float(sum(np.sum(f.residual**2) for f in fits))

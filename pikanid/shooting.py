@@ -1,0 +1,115 @@
+"""Shooting: standardised residuals of all recordings, and their exact Jacobian, as functions of θ."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from pikanid.adequacy import Adequacy, difference_noise, judge
+from pikanid.problem import Problem, Samples
+from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
+
+
+class Shooting:
+    """Residuals (ŷ - y)/σ (rows,) of a problem by simulation.
+
+    Outputs without a known σ are weighted by their own high-frequency noise when there are several
+    (so that units do not decide), and equally when there is one.  A trajectory that cannot be
+    finished gives huge residuals: a bad step, not a crash.
+    """
+
+    def __init__(self, problem: Problem, method: MethodChoice = "auto"):
+        self.problem = problem
+        self.method = method
+        self.simulators = [Simulator(problem.model, e) for e in problem.experiments]
+        self.columns = [problem.columns(r) for r in range(len(self.simulators))]
+        self.steps: list[Steps] = []
+        self.data = [s.y for e in problem.experiments for s in e.samples]
+        self.known = [s.sigma for e in problem.experiments for s in e.samples]
+        several = len(problem.model.outputs) > 1
+        spreads = [_spread(s, several) for e in problem.experiments for s in e.samples]
+        self.weights = 1.0 / np.concatenate([np.empty(0), *spreads])
+        self.y = np.concatenate([np.empty(0), *self.data])
+        self.rows = len(self.y)
+        self._at: np.ndarray | None = None
+        self._kept: tuple[np.ndarray, np.ndarray] | None = None
+
+    def choose_steps(self, theta: np.ndarray, accuracy: Literal["coarse", "fine"]) -> bool:
+        """Choose integration steps at θ; returns whether they changed.
+
+        "fine": the integration error moves no estimate by more than about a hundredth of its
+        standard error (0.01 σ/√N an output), or, where no σ is known, is 1e-10 of the signal;
+        "coarse": ten times that (1e-5 of the signal), never more than 1e-3 of the signal.
+        """
+        old, self.steps = self.steps, []
+        for r, simulator in enumerate(self.simulators):
+            p = self.problem.parameters(theta, r)
+            samples = self.problem.experiments[r].samples
+            limits = [_tolerance(s) for s in samples if len(s.t)]
+            tolerance = min(limits, default=None)
+            if tolerance is not None and accuracy == "coarse":
+                signal = min(float(np.ptp(s.y)) for s in samples if len(s.t))
+                known = all(s.sigma is not None for s in samples)
+                tolerance = min(tolerance * (10 if known else 1e5), 1e-3 * signal)
+            self.steps.append(simulator.choose_steps(p, tolerance, self.method))
+        self._at = None
+        return [(s.method, s.longest) for s in old] != [
+            (s.method, s.longest) for s in self.steps]
+
+    def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
+        """Simulate every recording at θ with sensitivities of its own parameters."""
+        return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
+                for r, s in enumerate(self.simulators)]
+
+    def residual(self, theta: np.ndarray) -> np.ndarray:
+        """(ŷ - y)/σ (rows,)."""
+        return self._evaluate(theta)[0]
+
+    def jacobian(self, theta: np.ndarray) -> np.ndarray:
+        """∂ residual/∂θ (rows, n_free)."""
+        return self._evaluate(theta)[1]
+
+    def _evaluate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if self._kept is None or self._at is None or not np.array_equal(self._at, theta):
+            self._at, self._kept = np.array(theta), self._simulate(theta)
+        return self._kept
+
+    def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        jacobian = np.zeros((self.rows, len(theta)))
+        predicted = np.empty(self.rows)
+        row = 0
+        for response, (_, outside) in zip(self.responses(theta), self.columns, strict=True):
+            if not response.finished:
+                return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
+            end = row + len(response.y)
+            predicted[row:end] = response.y
+            jacobian[row:end, outside] = response.sensitivity
+            row = end
+        jacobian *= self.weights[:, None]
+        return (predicted - self.y) * self.weights, jacobian
+
+    def adequacy(self, theta: np.ndarray) -> Adequacy:
+        """The χ² verdict at θ."""
+        r = self.residual(theta) / self.weights
+        ends = np.cumsum([len(d) for d in self.data])[:-1]
+        return judge(np.split(r, ends), self.known, self.data, len(theta))
+
+    def explains(self, theta: np.ndarray) -> bool:
+        """Whether σ is known and the fit at θ is within it, so that no other start is needed."""
+        verdict = self.adequacy(theta)
+        return verdict.source == "given" and verdict.verdict == "fits"
+
+
+def _spread(samples: Samples, several: bool) -> np.ndarray:
+    if samples.sigma is not None:
+        return samples.sigma
+    noise = difference_noise(samples.y) if several else 1.0
+    floor = 1e-6 * float(np.ptp(samples.y)) if several and len(samples.y) else 1e-300
+    return np.full(len(samples.y), max(noise, floor))
+
+
+def _tolerance(samples: Samples) -> float:
+    if samples.sigma is not None:
+        return 0.01 * float(np.min(samples.sigma)) / np.sqrt(len(samples.t))
+    return 1e-10 * max(float(np.ptp(samples.y)), 1e-300)

@@ -1,0 +1,67 @@
+"""From an optimum of a shooting fit to an `Estimate`: covariance, verdict, warnings."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+import pikanid
+from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
+from pikanid.problem import Problem
+from pikanid.shooting import Shooting
+from pikanid.uncertainty import covariance, identifiability_warnings
+
+
+def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarray, *,
+           converged: bool, history: Sequence[Mapping[str, float]], settings: Mapping[str, Any],
+           seed: int | None, begun: float, warnings: Sequence[str] = (),
+           approximator: Any = None) -> Estimate:
+    """Assemble the `Estimate` at θ."""
+    jacobian = shooting.jacobian(theta)
+    adequacy = shooting.adequacy(theta)
+    scale = 1.0
+    if adequacy.source != "given":
+        r = shooting.residual(theta)
+        scale = float(r @ r) / adequacy.dof
+    at_bound = np.isclose(theta, problem.lower, rtol=1e-6, atol=0) | np.isclose(
+        theta, problem.upper, rtol=1e-6, atol=0)
+    cov = covariance(jacobian, ~at_bound) * scale
+    fits, trajectories = evaluate(problem, shooting, theta)
+    notes = [*warnings]
+    if not converged:
+        notes.append("The optimiser stopped before it converged: raise max_evaluations or give "
+                     "better guesses.")
+    for f, stuck in zip(problem.free, at_bound, strict=True):
+        if stuck:
+            notes.append(f"'{f.label}' ended at its bound; its standard error is not known.")
+    if adequacy.verdict == "misfit":
+        notes.append("The model does not explain the recording: standard errors mean little, and "
+                     "parameters may make up for missing physics.")
+    notes += identifiability_warnings(jacobian, problem.free, ~at_bound)
+    for e in problem.experiments:
+        if e.unused:
+            notes.append(f"Recording '{e.name}': the model does not use {', '.join(e.unused)}.")
+    return Estimate(
+        model=problem.model, strategy=strategy, free=problem.free, theta=np.array(theta),
+        covariance=cov, fits=fits, trajectories=trajectories, cost=total_cost(fits),
+        adequacy=adequacy, converged=converged, settings=settings, history=tuple(history),
+        warnings=tuple(notes), seconds=time.perf_counter() - begun, seed=seed,
+        version=pikanid.__version__, approximator=approximator)
+
+
+def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray
+             ) -> tuple[tuple[Fit, ...], tuple[Trajectory, ...]]:
+    """Simulated outputs beside the measured ones, and the states."""
+    fits, trajectories = [], []
+    for e, response in zip(problem.experiments, shooting.responses(theta, states=True), strict=True):
+        trajectories.append(Trajectory(response.t, response.states))
+        row = 0
+        for s in e.samples:
+            output = problem.model.outputs[s.output]
+            fits.append(Fit(e.name, output.name, output.unit, s.t, s.y,
+                            response.y[row:row + len(s.t)].copy(), s.sigma))
+            row += len(s.t)
+    return tuple(fits), tuple(trajectories)
