@@ -317,6 +317,55 @@ def bad_decimal(text: str) -> str:
     return f"{text!r} cannot be the decimal sign here: it must be '.' or ',', not the delimiter."
 
 
+# --- motions and noise ---------------------------------------------------------------------------
+
+
+def derivative_order(order: object) -> str:
+    return f"Only first and second derivatives can be taken, not order {order!r}."
+
+
+def derivative_short(name: str, n: int, wanted: int) -> str:
+    return f"Channel '{name}' has {n} samples; this derivative needs at least {wanted}."
+
+
+def savgol_uneven(name: str) -> str:
+    return f"Channel '{name}' is not evenly sampled: use method='spline'."
+
+
+def savgol_window(window: float | None) -> str:
+    return f"method='savgol' needs a window in seconds, such as window=0.1, not {window!r}."
+
+
+def bad_smoothing(smoothing: float) -> str:
+    return f"smoothing = {smoothing:g} must be finite and not negative, or None."
+
+
+def bad_quaternion(sample: int) -> str:
+    return f"The attitude quaternion of sample {sample} is zero or not finite."
+
+
+def pose_times(where: str) -> str:
+    return f"'{where}': the channels of the pose do not share one time base."
+
+
+def noise_short(name: str, n: int) -> str:
+    return (
+        f"Channel '{name}' has only {n} samples to estimate its noise from; give sigma yourself, "
+        "with with_sigma or --sigma."
+    )
+
+
+def noise_none(name: str) -> str:
+    return f"Channel '{name}' shows no noise to estimate sigma from; give it yourself."
+
+
+def noise_interval(model: float, given: float) -> str:
+    return (
+        f"The noise model belongs to samples every {model:g} s, not every {given:g} s: estimate "
+        "it from the thinned signal."
+    )
+
+
 # --- excitations ---------------------------------------------------------------------------------
 
 
@@ -525,8 +574,8 @@ def smoothing_undetermined(names: Sequence[str]) -> str:
 
 def relaxation_locked(lam: float, kept: float) -> str:
     return (
-        f"At λ = {lam:.3g} the splines could no longer follow both data and physics; the result is "
-        f"that at λ = {kept:.3g}. Use more intervals or knots='collocation', or doubt the model."
+        f"λ stays at {kept:.3g}: at {lam:.3g} these splines could no longer follow the physics. "
+        "For less bias use more intervals or knots='collocation'."
     )
 
 
@@ -534,6 +583,13 @@ def grid_not_settled(gap: float, intervals: int) -> str:
     return (
         f"With {intervals} intervals, the last halving still moved a parameter by {gap:.2g} "
         "standard errors: the discretisation bias is not negligible. Set more intervals."
+    )
+
+
+def estimate_not_simulated() -> str:
+    return (
+        "The model cannot be simulated at the estimate, so that residuals are those of the fitted "
+        "splines: the parameters are not to be trusted."
     )
 
 

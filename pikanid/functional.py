@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from pikanid import errors
+from pikanid.adequacy import difference_noise
 from pikanid.approximators import Approximator, Array, LinearApproximator
 from pikanid.chains import Chains
 from pikanid.expressions import symbol
 from pikanid.approximators.tables import Table, anchor
-from pikanid.problem import Problem, delays
+from pikanid.problem import Problem, Samples, delays
 from pikanid.simulation.vectorfield import VectorField
 
 Penalty = Literal["physics", "roughness"]
@@ -92,9 +93,17 @@ class Functional:
         """The same functional with other scales of the physics residual."""
         return replace(self, scale=np.asarray(scale, dtype=float))
 
-    def smoothing(self) -> Functional:
-        """The functional of PDA's first step: λ weighs the highest derivatives, not the physics."""
-        return replace(self, penalty="roughness")
+    def smoothing(self, extra: int = 0) -> Functional:
+        """The functional of PDA's first step: λ weighs derivatives, not the physics.
+
+        They are those of the model's order, or `extra` orders higher.
+        """
+        parts = []
+        for part in self.parts:
+            tops = tuple(Table.of(table.approximator, table.t, table.derivative + extra, table.part)
+                         for table in part.physics.tops)
+            parts.append(replace(part, physics=replace(part.physics, tops=tops)))
+        return replace(self, penalty="roughness", parts=tuple(parts) if extra else self.parts)
 
     @property
     def n_data(self) -> int:
@@ -129,7 +138,7 @@ class Functional:
         p = self.problem.parameters(theta, r)
         positions, _ = self.problem.columns(r)
         families = self.data_rows(r, coefficients, theta)
-        families.append(self._physics(part.physics, coefficients, p, positions, lam))
+        families.append(self.physics_rows(r, coefficients, theta, lam))
         if part.start is not None:
             families.append(self._start(part.start, r, coefficients, p, positions))
         return families
@@ -149,8 +158,11 @@ class Functional:
         return Rows(weight * (y - sites.target), weight[:, :, None] * hx[:, one], None,
                     weight[:, :, None] * hp[:, one][:, :, positions])
 
-    def _physics(self, sites: Sites, c: Array, p: Array, positions: NDArray[np.int64],
-                 lam: float) -> Rows:
+    def physics_rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> Rows:
+        """The physics family of recording r alone."""
+        sites, c = self.parts[r].physics, coefficients
+        p = self.problem.parameters(theta, r)
+        positions, _ = self.problem.columns(r)
         weight = np.sqrt(lam) * sites.weight / self.scale
         tops = np.column_stack([table.values(c) for table in sites.tops])
         if self.penalty == "roughness":
@@ -209,7 +221,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
     `nodes` are (times (M,), weights (M,)) a recording: Gauss points with their weights for the
     integral, the samples with weight 1 for the sum of Eq. (5).  With `given_start` the initial
     state of the model is kept, exactly where the approximators are clamped.  `weighted` divides
-    data by their σ where it is known.
+    data by their σ (where it is unknown, by the visible noise if there are several outputs).
 
     Raises:
         BadSetting: If a delay is to be estimated, which no functional over fixed sites can see.
@@ -230,7 +242,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
         data = []
         for samples in experiment.samples:
             seen = np.maximum(samples.t - late[samples.output], experiment.t0)
-            sigma = samples.sigma if weighted and samples.sigma is not None else 1.0
+            sigma = _spread(samples, len(problem.model.outputs) > 1) if weighted else 1.0
             weight = np.broadcast_to(1.0 / np.asarray(sigma), seen.shape)[:, None]
             data.append(Sites(seen, experiment.inputs(seen), weight, states(seen), (),
                               samples.y[:, None], samples.output))
@@ -250,6 +262,13 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
         parts.append(Part(own, tuple(data), physics, start, held, hold))
     return Functional(problem, vector_field, chains, tuple(parts), np.ones(len(chains.top)),
                       weighted)
+
+
+def _spread(samples: Samples, several: bool) -> Array | float:
+    """σ; where unknown, 1 for a single output and the visible noise of each of several."""
+    if samples.sigma is not None or not several:
+        return 1.0 if samples.sigma is None else samples.sigma
+    return max(difference_noise(samples.y), 1e-6 * float(np.ptp(samples.y)), 1e-300)
 
 
 def _output_delays(problem: Problem) -> Array:

@@ -70,9 +70,11 @@ class BSpline:
         return np.unique(self.knots[self.degree : self.n_basis + 1])
 
     @property
-    def clamped(self) -> bool:
-        """Whether the first coefficients alone fix value and derivatives at the start."""
-        return bool(self.knots[0] == self.knots[self.degree])
+    def greville(self) -> Array:
+        """Means of `degree` neighbouring knots (n_basis,): good points to interpolate at."""
+        total = np.concatenate([[0.0], np.cumsum(self.knots)])
+        sums = total[self.degree + 1 : -1] - total[1 : self.n_basis + 1]
+        return np.clip(sums / self.degree, self.start, self.stop)
 
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis matrix or its time derivative at ``t`` (M,): csr (M, n_basis), degree + 1 a row."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from pikanid.approximators import Array
@@ -23,9 +24,10 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
     """Sandwich and naive covariance of θ, (b, b) each.
 
     `noise` is the standard deviation of the rows of each data family, recording after recording.
+    Parameters at a bound count as known: their rows and columns are zero.
     The naive one, the θ block of M⁻¹ times the mean noise variance, counts the physics as data.
     """
-    bread = np.linalg.inv(step.schur)
+    bread = invert(step.schur, inside_bounds(system, at))
     meat = np.zeros_like(bread)
     variance, count = 0.0, 0
     for jacobian, deviation in zip(data_response(system, at, step), noise, strict=True):
@@ -34,6 +36,25 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
         variance += float(np.sum(np.broadcast_to(deviation, jacobian.shape[:1]) ** 2))
         count += jacobian.shape[0]
     return bread @ meat @ bread, bread * (variance / count)
+
+
+def inside_bounds(system: BandedSystem, at: Linearisation) -> NDArray[np.bool_]:
+    """Which parameters (b,) are not at a bound."""
+    problem, theta = system.functional.problem, at.point.theta
+    stuck = np.isclose(theta, problem.lower, rtol=1e-6, atol=0.0)
+    return ~(stuck | np.isclose(theta, problem.upper, rtol=1e-6, atol=0.0))
+
+
+def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
+    """Inverse over the parameters `inside`, zero elsewhere; infinite where nothing is known."""
+    out = np.zeros_like(matrix)
+    which = np.flatnonzero(inside & (np.diag(matrix) > 0.0))
+    scale = np.sqrt(np.diag(matrix)[which])
+    normal = matrix[np.ix_(which, which)] / np.outer(scale, scale)
+    out[np.ix_(which, which)] = np.linalg.pinv(normal, 1e-13, True) / np.outer(scale, scale)
+    unseen = np.flatnonzero(inside & (np.diag(matrix) <= 0.0))
+    out[unseen, unseen] = np.inf
+    return out
 
 
 def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[Array]:
@@ -94,5 +115,5 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
         total += float(np.sum(solved * pulled[k:]))
         theta[columns] += pulled_theta - block.border.T @ solved
     if theta.size:
-        total += float(np.sum(theta * np.linalg.solve(step.schur, theta)))
+        total += float(np.sum(theta * (invert(step.schur, inside_bounds(system, at)) @ theta)))
     return total if rows <= EXACT_UP_TO else total / PROBES

@@ -169,31 +169,33 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     Raises:
         LinAlgError: If the matrix is not positive definite.
     """
-    size = slope.size
-    change = np.clip(np.zeros(size), lower, upper)
-    bound = lower >= upper
-    change[bound] = lower[bound]
+    if slope.size == 0:
+        return np.zeros(0)
     diagonal = np.diag(matrix)
+    change, bound = np.clip(0.0, lower, upper), lower >= upper
+    if bound.all():
+        return change
     if not np.all(diagonal[~bound] > 0.0):
         raise LinAlgError("a parameter has no influence")
     root = np.sqrt(np.where(bound, 1.0, diagonal))
-    for _ in range(4 * size + 4):
-        free = ~bound
-        if free.any():
-            rhs = -(slope[free] + matrix[np.ix_(free, bound)] @ change[bound])
+    for _ in range(4 * slope.size + 4):
+        free = np.flatnonzero(~bound)
+        if free.size:
             scale = root[free]
             factor = np.linalg.cholesky(matrix[np.ix_(free, free)] / np.outer(scale, scale))
-            half = np.linalg.solve(factor, rhs / scale)
-            change[free] = np.linalg.solve(factor.T, half) / scale
+            rhs = -(slope[free] + matrix[np.ix_(free, np.flatnonzero(bound))] @ change[bound])
+            change[free] = np.linalg.solve(factor.T, np.linalg.solve(factor, rhs / scale)) / scale
         over = np.maximum(lower - change, change - upper)
-        if np.any(over > 0.0):
-            worst = int(np.argmax(np.where(bound, -np.inf, over * root)))
+        if np.any(over[free] > 0.0):
+            worst = int(free[np.argmax((over * root)[free])])
             change[worst] = lower[worst] if change[worst] < lower[worst] else upper[worst]
             bound[worst] = True
             continue
-        pull = matrix @ change + slope
-        wrong = np.where(bound & (lower < upper), np.where(change <= lower, -pull, pull) / root, 0.0)
-        if size == 0 or wrong.max() <= 1e-12 * max(1.0, float(np.abs(slope / root).max())):
+        if free.size == slope.size:
+            return change
+        pull = (matrix @ change + slope) / root
+        wrong = np.where(bound & (lower < upper), np.where(change <= lower, -pull, pull), 0.0)
+        if wrong.max() <= 1e-12 * max(1.0, float(np.abs(slope / root).max())):
             break
         bound[int(np.argmax(wrong))] = False
     return np.clip(change, lower, upper)

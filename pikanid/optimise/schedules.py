@@ -66,10 +66,7 @@ class Continuation:
     """λ up by `factor` until no parameter moves by more than `settled` standard errors.
 
     What a finite λ biases falls as 1/λ, so that after a move of Δ no more than Δ/(factor - 1) is
-    left.  `ceiling` is the data cost above which a rise of more than `jump` in one stage counts as
-    a lock: the spline cannot follow the equation, the data fit breaks down and 1/l -> 0.  The stage
-    before is then the result.  (Splines with as many coefficients as collocation conditions cannot
-    lock; for them it is infinite.)
+    left.  That holds for splines with as many coefficients as physics conditions.
     """
 
     start: float = 1.0
@@ -78,31 +75,64 @@ class Continuation:
     relative: float = 1e-6
     limit: float = 1e12
     warmup: int = 3
-    ceiling: float = np.inf
-    jump: float = 1.5
 
     def next(self, past: Sequence[Stage]) -> float | None:
-        """The next λ, or None where the estimate has settled, λ has its limit, or it locked."""
+        """The next λ, or None where the estimate has settled or λ has its limit."""
         if not past:
             return self.start
-        last = past[-1]
-        if self.locked(past) or last.lam >= self.limit:
-            return None
-        if len(past) >= 3 and moved(past[-2].theta, last.theta, last.std, self.relative) <= (
-                self.settled):
-            return None
-        return last.lam * self.factor
-
-    def locked(self, past: Sequence[Stage]) -> bool:
-        """Whether the last stage broke the data fit."""
-        if len(past) < 2:
-            return False
-        before, last = past[-2].data_cost, past[-1].data_cost
-        return last > self.ceiling and last > self.jump * before
+        settled = len(past) >= 3 and _move(past, -1, self.relative) <= self.settled
+        return None if settled or past[-1].lam >= self.limit else past[-1].lam * self.factor
 
     def keep(self, past: Sequence[Stage]) -> int:
-        """The last stage that did not lock."""
-        return len(past) - (2 if self.locked(past) else 1)
+        """The last stage."""
+        return len(past) - 1
+
+
+@dataclass(frozen=True)
+class Cautious:
+    """λ up by `factor`, back one step where the splines themselves become the limit.
+
+    Splines smoother than the equation have fewer coefficients than there are physics conditions;
+    a large λ locks them (1/l -> 0 minimises the physics alone).  The sign: where the physics could
+    be met, its cost λ·P falls as 1/λ; where the discretisation leaves a floor, it rises as λ.
+    `noise_cost` is the data cost that noise alone explains; below half of it the splines still
+    follow the noise, and a rise means nothing.
+    """
+
+    noise_cost: float
+    start: float = 1.0
+    factor: float = 10.0
+    settled: float = 0.05
+    relative: float = 1e-6
+    limit: float = 1e12
+    warmup: int = 3
+
+    def next(self, past: Sequence[Stage]) -> float | None:
+        """The next λ, or None where the estimate has settled or the splines began to lock."""
+        if not past:
+            return self.start
+        calm = len(past) >= 3 and _move(past, -1, self.relative) <= self.settled
+        if calm or self._locked(past) or past[-1].lam >= self.limit:
+            return None
+        return past[-1].lam * self.factor
+
+    def keep(self, past: Sequence[Stage]) -> int:
+        """The last stage before the lock."""
+        return len(past) - (2 if self._locked(past) else 1)
+
+    def _locked(self, past: Sequence[Stage]) -> bool:
+        if len(past) < 2:
+            return False
+        last, before = past[-1], past[-2]
+        floor = last.physics_cost > 0.5 * self.factor * before.physics_cost
+        misfit = last.data_cost > 1.5 * max(self.noise_cost, before.data_cost)
+        return misfit or (floor and last.data_cost > 0.5 * self.noise_cost)
+
+
+def _move(past: Sequence[Stage], index: int, relative: float) -> float:
+    """Move into stage `index`, in the standard errors of the stage before it."""
+    before, after = past[index - 1], past[index]
+    return moved(before.theta, after.theta, before.std, relative)
 
 
 def moved(before: Array, after: Array, std: Array, relative: float) -> float:

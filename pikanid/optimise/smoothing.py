@@ -12,7 +12,10 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from pikanid.approximators import Array
-from pikanid.optimise.gauss_newton import BandedSystem, Point, gauss_newton
+from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, gauss_newton
+
+# (GCV score, residual sum of squares, effective parameters)
+Score = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +28,10 @@ class Smoothed:
     rho: float
 
 
-def smooth(system: BandedSystem, point: Point) -> Smoothed | None:
+def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoothed | None:
     """Smooth the data of all recordings with one ρ; None where they do not determine the splines.
+
+    Without a given ρ, cross-validation chooses it.
 
     `system` is built on `functional.smoothing()`; θ stays.
     """
@@ -37,19 +42,25 @@ def smooth(system: BandedSystem, point: Point) -> Smoothed | None:
     if mass <= 0.0 or rough <= 0.0:
         return None
     probes = _probes([b.slope.size for b in data.blocks])
-    best: tuple[float, float, float, float] | None = None
-    for exponent in np.arange(-14.0, 5.0, 1.0):
-        rho = mass / rough * 10.0**exponent
-        tried = _criterion(data, both, rho, probes, count)
-        if tried is not None and (best is None or tried[0] < best[0]):
-            best = (*tried, rho)
-    if best is None:
+    ridge = mass / rough
+    if rho is None:
+        scores = {q: _criterion(data, both, q, probes, count)
+                  for q in ridge * 10.0 ** np.arange(-14.0, 5.0)}
+        best = _best(scores)
+        if best is None:
+            return None
+        scores |= {q: _criterion(data, both, q, probes, count)
+                   for q in (best / 10**0.5, best * 10**0.5)}
+        rho = _best(scores)
+        assert rho is not None
+        score = scores[rho]
+    else:
+        # Least squares proper (ρ = 0) keeps a trace of roughness, for knots without data.
+        rho = max(rho, 1e-14 * ridge)
+        score = _criterion(data, both, rho, probes, count, most=1.0)
+    if score is None:
         return None
-    for shift in (10**-0.5, 10**0.5):
-        tried = _criterion(data, both, best[3] * shift, probes, count)
-        if tried is not None and tried[0] < best[0]:
-            best = (*tried, best[3] * shift)
-    _, residual, effective, rho = best
+    residual, effective = score[1:]
     try:
         found = gauss_newton(system, point, rho, point.theta, point.theta, iterations=10)
     except LinAlgError:
@@ -64,8 +75,14 @@ def _probes(sizes: list[int]) -> list[Array]:
     return [generator.choice([-1.0, 1.0], size=(size, number)) for size in sizes]
 
 
-def _criterion(data, both, rho, probes, count):  # type: ignore[no-untyped-def]
-    """(GCV score, residual sum of squares, effective parameters) at ρ; None where singular."""
+def _best(scores: dict[float, Score | None]) -> float | None:
+    found = {rho: score[0] for rho, score in scores.items() if score is not None}
+    return min(found, key=lambda rho: found[rho]) if found else None
+
+
+def _criterion(data: Linearisation, both: Linearisation, rho: float, probes: list[Array],
+               count: int, most: float = 0.8) -> Score | None:
+    """The score at ρ; None where the system is singular or more than `most` of the data is used."""
     effective, residual = 0.0, data.data_cost
     for only, all_, probe in zip(data.blocks, both.blocks, probes, strict=True):
         band = only.band + rho * (all_.band - only.band)
@@ -81,9 +98,10 @@ def _criterion(data, both, rho, probes, count):  # type: ignore[no-untyped-def]
         step = solved[:, -1]
         residual += 2.0 * float(only.slope @ step)
         residual += float(step @ multiply(only.band, step[:, None])[:, 0])
-    if effective >= 0.8 * count:
+    if effective >= most * count and most < 1.0:
         return None
-    return count * residual / (count - effective) ** 2, residual, effective
+    left = max(count - effective, 1e-3)
+    return count * residual / left**2, residual, effective
 
 
 def multiply(band: Array, columns: Array) -> Array:

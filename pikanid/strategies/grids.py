@@ -36,6 +36,7 @@ Quadrature = Literal["gauss", "integral", "sum"]
 
 # First spacing: this many radians of the fastest linearised motion an interval.
 RADIANS = 1.5
+PAPER_INTERVALS = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +94,11 @@ class Grid:
         return replace(self, breakpoints=tuple(map(split_breakpoints, self.breakpoints)))
 
     @property
+    def locks(self) -> bool:
+        """Whether there are more physics conditions than coefficients to meet them."""
+        return self.knots != "collocation" or self.quadrature != "gauss"
+
+    @property
     def n_intervals(self) -> int:
         """Intervals of all recordings together."""
         return sum(b.size - 1 for b in self.breakpoints)
@@ -139,6 +145,12 @@ def chosen_grid(problem: Problem, knots: Knots, *, degree: int, intervals: int,
         else:
             breakpoints.append(np.linspace(start, stop, intervals + 1))
     return Grid(knots, tuple(breakpoints), degree, quadrature)
+
+
+def paper_intervals(problem: Problem) -> int:
+    """Table II's about 80 knots, fewer where there are fewer than two samples an interval."""
+    samples = min(s.t.size for e in problem.experiments for s in e.samples)
+    return max(4, min(PAPER_INTERVALS, samples // 2))
 
 
 def _rate(problem: Problem, field: VectorField, r: int) -> float:

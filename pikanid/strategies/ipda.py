@@ -2,39 +2,64 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Literal
-
-import numpy as np
 
 from pikanid import errors
 from pikanid.chains import Form, find_chains
-from pikanid.optimise.schedules import Continuation, Fixed, Schedule
+from pikanid.estimate import Estimate
+from pikanid.model import Model
+from pikanid.optimise.schedules import Cautious, Continuation, Fixed, Schedule
 from pikanid.problem import Problem
+from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
-from pikanid.strategies.grids import Grid, Knots, Quadrature, chosen_grid, default_grid
-from pikanid.strategies.relaxation import RelaxedFit, Setup, relax
+from pikanid.strategies.grids import (
+    PAPER_INTERVALS,
+    Grid,
+    Knots,
+    Quadrature,
+    chosen_grid,
+    default_grid,
+    paper_intervals,
+)
+from pikanid.strategies.relaxation import RelaxedFit, Setup, relax, start_is_estimated
+from pikanid.strategies.relaxed_estimate import relaxed_estimate
 
 # Table II: cubic splines, about 80 knots, λ = 1e-4 (doubled for the sparse scenario), 15 warm-up
 # iterations.  "Sparse" is read as fewer samples than twice the knots.
-PAPER_INTERVALS = 80
 PAPER_DEGREE = 3
 PAPER_LAMBDA = 1e-4
 PAPER_WARMUP = 15
-# A data cost above this multiple of what the noise explains is suspected to be a lock.
-LOCK_FACTOR = 1.5
 
 
 @dataclass(frozen=True)
-class IPDASettings:
-    """Options of iPDA; None leaves the choice to the protocol.
+class IPDA:
+    """Iterated principal differential analysis: Gauss-Newton on splines and parameters together.
 
-    protocol: "default" chooses knots and λ so that neither biases visibly; "paper" is Table II.
-    form: "second_order" (a state that is a derivative of another shares its spline) or "state".
-    knots: "collocation", "aligned" (repeated at the switches), "uniform", "adaptive" (as many
-        samples between any two), "curvature" (denser where the data bend).
-    physics: "gauss" (integral, Gauss points), "integral" (trapezoidal over the samples) or "sum".
-    lam: a fixed λ, in the units of Eq. (2) under "paper", dimensionless otherwise.
+    Parameters
+    ----------
+    protocol : "default" chooses knots and λ so that neither biases visibly; "paper" is Table II.
+        None elsewhere leaves the choice to it
+    form : "second_order" (a state that is another's derivative shares its spline) or "state"
+    degree : of the splines, for the longest chain
+    intervals : between knots, per recording
+    knots : "collocation" (as many coefficients as physics conditions), "aligned" (repeated at the
+        input switches), "uniform", "adaptive" (equally many samples between any two) or
+        "curvature" (denser where the data bend)
+    physics : "gauss" (integral by Gauss points), "integral" (trapezoidal rule over the samples) or
+        "sum" (over the samples, Eq. 5)
+    lam : a fixed λ, as in Eq. (2) under "paper", else dimensionless: at 1 a physics residual as
+        large as the physics itself costs as much as every sample being off by its σ
+    warmup : iterations at the first λ in which only the splines move
+
+    >>> import numpy as np, pikanid as pk
+    >>> model = pk.systems.sloshing()
+    >>> rec = pk.simulate(model, pk.excitation.two_pulse(), sigma=0.1*np.pi/180, seed=0)
+    >>> est = IPDA().fit(model.with_values(l_theta=0.06, d_theta=0.05), rec)
+    >>> round(est.value("l_theta"), 4)
+    0.045
     """
 
     protocol: Literal["default", "paper"] = "default"
@@ -46,19 +71,32 @@ class IPDASettings:
     lam: float | None = None
     warmup: int | None = None
 
+    def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
+        """Estimate the model's free parameters from one recording, or from several jointly.
 
-def fit_relaxed(problem: Problem, settings: IPDASettings) -> RelaxedFit:
-    """iPDA of a model bound to recordings.
+        Raises
+        ------
+        pikanid.errors.BadRecording : a channel is missing or unusable
+        pikanid.errors.BadSetting : options that cannot work together, or a delay to be estimated
+        """
+        begun = time.perf_counter()
+        fit = fit_relaxed(Problem(model, recordings), self)
+        return relaxed_estimate("ipda", fit, asdict(self), begun)
 
-    Raises:
-        BadSetting: For options that cannot work together, or a delay that is to be estimated.
+
+def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
+    """iPDA of a model bound to recordings, with all that it found on the way.
+
+    Raises
+    ------
+    pikanid.errors.BadSetting : options that cannot work together, or a delay to be estimated
     """
     _check(settings)
     paper = settings.protocol == "paper"
     field = VectorField(problem.model)
     chains = find_chains(problem.model, settings.form)
     # The paper leaves the start free; an estimated initial state needs its parameters tied.
-    given = not paper or _start_is_estimated(problem)
+    given = not paper or start_is_estimated(problem)
     setup = Setup(problem, field, chains, given_start=given, weighted=not paper,
                   nondimensional=not paper)
     chosen = settings.knots or ("adaptive" if paper else "collocation")
@@ -70,25 +108,19 @@ def fit_relaxed(problem: Problem, settings: IPDASettings) -> RelaxedFit:
     else:
         degree = settings.degree or (PAPER_DEGREE if paper else max(chains.lengths) + 3)
         grid = chosen_grid(
-            problem, chosen, degree=degree, intervals=settings.intervals or _paper_knots(problem),
+            problem, chosen, degree=degree, intervals=settings.intervals or paper_intervals(problem),
             quadrature=settings.physics or ("sum" if paper else "gauss"))
 
     def schedule(noise: float) -> Schedule:
         if settings.lam is not None or paper:
             warmup = PAPER_WARMUP if settings.warmup is None else settings.warmup
             return Fixed(_paper_lambda(problem) if settings.lam is None else settings.lam, warmup)
-        ceiling = np.inf
-        if grid.knots != "collocation":
-            ceiling = LOCK_FACTOR * noise**2 * problem.n_samples
         warmup = 3 if settings.warmup is None else settings.warmup
-        return Continuation(warmup=warmup, ceiling=ceiling)
+        if grid.locks:
+            return Cautious(noise**2 * problem.n_samples, warmup=warmup)
+        return Continuation(warmup=warmup)
 
     return relax(setup, grid, schedule, refine=settle)
-
-
-def _paper_knots(problem: Problem) -> int:
-    samples = min(s.t.size for e in problem.experiments for s in e.samples)
-    return max(4, min(PAPER_INTERVALS, samples // 2))
 
 
 def _paper_lambda(problem: Problem) -> float:
@@ -96,13 +128,7 @@ def _paper_lambda(problem: Problem) -> float:
     return PAPER_LAMBDA * (2.0 if samples < 2 * PAPER_INTERVALS else 1.0)
 
 
-def _start_is_estimated(problem: Problem) -> bool:
-    free = set(problem.model.free_names)
-    return any(free & {s.name for s in state.initial.free_symbols}
-               for state in problem.model.states)
-
-
-def _check(settings: IPDASettings) -> None:
+def _check(settings: IPDA) -> None:
     for name, least in (("degree", 1), ("intervals", 1), ("warmup", 0)):
         value = getattr(settings, name)
         if value is not None and value < least:

@@ -106,6 +106,13 @@ class Setup:
                     weighted=self.weighted)
 
 
+def start_is_estimated(problem: Problem) -> bool:
+    """Whether a free parameter is, or enters, an initial state."""
+    free = set(problem.model.free_names)
+    return any(free & {s.name for s in state.initial.free_symbols}
+               for state in problem.model.states)
+
+
 def first_point(functional: Functional) -> tuple[Point, Smoothed | None]:
     """Splines smoothed through the data, θ at its guess; flat splines where data say too little."""
     theta = functional.problem.guess
@@ -194,8 +201,11 @@ def follow(system: BandedSystem, point: Point,
 
 
 def transfer(old: Functional, new: Functional, point: Point) -> Point:
-    """The same trajectories on a finer grid (least squares; exact where the spaces are nested)."""
-    from scipy.interpolate import make_lsq_spline
+    """The same trajectories on a finer grid: interpolation at the Greville points of its knots.
+
+    Exact, because the spaces are nested.
+    """
+    from scipy.interpolate import make_interp_spline
 
     coefficients = []
     for r, (before, after) in enumerate(zip(old.parts, new.parts, strict=True)):
@@ -204,10 +214,9 @@ def transfer(old: Functional, new: Functional, point: Point) -> Point:
             coarse = before.approximators[i]
             assert isinstance(coarse, BSpline) and isinstance(fine, BSpline)
             own = point.coefficients[r][before.physics.tops[i].part]
-            edges = fine.breakpoints
-            inside = (np.arange(fine.degree + 1) + 0.5) / (fine.degree + 1)
-            t = (edges[:-1, None] + np.diff(edges)[:, None] * inside).ravel()
-            pieces.append(make_lsq_spline(t, coarse.values(t, own), fine.knots, fine.degree).c)
+            t = fine.greville
+            values = coarse.values(t, own)
+            pieces.append(make_interp_spline(t, values, fine.degree, t=fine.knots).c)
         coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
     return Point(tuple(coefficients), point.theta)
 

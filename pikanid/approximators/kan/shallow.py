@@ -124,6 +124,11 @@ class ShallowKAN:
             for (time, order), jump in zip(self._kinks, self._jumps, strict=True)
         )
 
+    @property
+    def kink_columns(self) -> tuple[int, ...]:
+        """Where the coefficients of `kinks`, in that order, stand among the n_basis."""
+        return tuple(int(column) for column in self._kink_at)
+
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis or its time derivative at ``t`` (M,): csr (M, n_basis), consecutive nonzeros.
 

@@ -1,0 +1,217 @@
+"""PDA: splines fitted to the data alone, then parameters to the splines' derivatives.
+
+    ĉ = argmin ‖(y - h(Bc))/σ‖² + ρ·roughness,   p̂ = argmin ∫ |x̂⁽ᵐ⁾ - f(x̂, u; p)|² dt
+
+No simulation, no coupling: fast, and biased by whatever the splines cannot follow or smooth away.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+
+from pikanid import errors
+from pikanid.approximators import Array
+from pikanid.chains import Form, find_chains
+from pikanid.estimate import Estimate
+from pikanid.functional import Functional
+from pikanid.model import Model
+from pikanid.optimise.covariance import invert
+from pikanid.optimise.gauss_newton import BandedSystem, Point, box_minimum
+from pikanid.optimise.smoothing import Smoothed, smooth
+from pikanid.problem import Problem
+from pikanid.recording import Recording
+from pikanid.simulation.vectorfield import VectorField
+from pikanid.strategies.grids import Knots, Quadrature, chosen_grid, paper_intervals
+from pikanid.strategies.relaxation import RelaxedFit, Setup, row_noise, start_is_estimated
+from pikanid.strategies.relaxed_estimate import relaxed_estimate
+
+PAPER_DEGREE = 3
+# The smoothed derivative of order m + SMOOTHER is penalised by default; the regression needs m.
+SMOOTHER = 1
+MOST_INTERVALS_A_SAMPLE = 0.5
+REGRESSION_STEPS = 50
+
+
+@dataclass(frozen=True)
+class PDA:
+    """Principal differential analysis: smooth, then regress.
+
+    Parameters
+    ----------
+    protocol : "default" smooths by generalised cross-validation, knots aligned with the switches;
+        "paper" is Table II: least-squares cubic splines with about 80 knots, sums at the samples
+    form, degree, intervals, knots, physics : see `IPDA`
+    smoothing : ρ, the weight of roughness; None chooses it by cross-validation ("paper": none)
+
+    >>> import numpy as np, pikanid as pk
+    >>> model = pk.systems.sloshing()
+    >>> rec = pk.simulate(model, pk.excitation.two_pulse(), sigma=0.1*np.pi/180, seed=0)
+    >>> est = PDA().fit(model.with_values(l_theta=0.06, d_theta=0.05), rec)
+    >>> round(est.value("l_theta"), 3)
+    0.045
+    """
+
+    protocol: Literal["default", "paper"] = "default"
+    form: Form = "second_order"
+    degree: int | None = None
+    intervals: int | None = None
+    knots: Knots | None = None
+    physics: Quadrature | None = None
+    smoothing: float | None = None
+
+    def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
+        """Estimate the model's free parameters from one recording, or from several jointly.
+
+        Raises
+        ------
+        pikanid.errors.BadRecording : a channel is missing or unusable
+        pikanid.errors.BadSetting : the outputs do not determine every spline, or a parameter acts
+            where derivatives do not show it
+        """
+        begun = time.perf_counter()
+        fit = fit_decoupled(Problem(model, recordings), self)
+        return relaxed_estimate("pda", fit, asdict(self), begun)
+
+
+def fit_decoupled(problem: Problem, settings: PDA) -> RelaxedFit:
+    """PDA of a model bound to recordings.
+
+    Raises
+    ------
+    pikanid.errors.BadSetting : see `PDA.fit`
+    """
+    paper = settings.protocol == "paper"
+    chains = find_chains(problem.model, settings.form)
+    degree = settings.degree or (PAPER_DEGREE if paper else max(chains.lengths) + 3)
+    grid = chosen_grid(
+        problem, settings.knots or ("adaptive" if paper else "aligned"), degree=degree,
+        intervals=settings.intervals or (paper_intervals(problem) if paper else _fine(problem)),
+        quadrature=settings.physics or ("sum" if paper else "gauss"))
+    given = not paper and not start_is_estimated(problem)
+    setup = Setup(problem, VectorField(problem.model), chains, given_start=given,
+                  weighted=not paper, nondimensional=False)
+    functional = setup.functional(grid)
+    extra = min(SMOOTHER, degree - max(chains.lengths))
+    system = BandedSystem(functional.smoothing(extra))
+    rho = settings.smoothing if settings.smoothing is not None or not paper else 0.0
+    smoothed = smooth_data(system, rho)
+    point, converged = regress(functional, smoothed.point)
+    noise = row_noise(functional, system.linearise(point, 0.0), smoothed.effective)
+    covariance = _covariance(functional, system, point, smoothed.rho, noise)
+    at = BandedSystem(functional).linearise(point, 1.0)
+    return RelaxedFit(problem, point.theta, covariance, covariance, point.coefficients, functional,
+                      grid, 0.0, (), at.data_cost, at.physics_cost, smoothed.effective, converged)
+
+
+def smooth_data(system: BandedSystem, rho: float | None) -> Smoothed:
+    """The data-only fit with a given roughness weight, or with the cross-validated one.
+
+    Raises
+    ------
+    pikanid.errors.BadSetting : the outputs do not determine every spline
+    """
+    functional = system.functional
+    theta = functional.problem.guess
+    flat = Point(tuple(functional.complete(r, np.zeros(part.n_coefficients), theta)
+                       for r, part in enumerate(functional.parts)), theta)
+    found = smooth(system, flat, rho)
+    unseen = [functional.problem.model.state_names[functional.chains.root.index(i)]
+              for i in range(len(functional.chains.top)) if not _is_seen(functional, i)]
+    if found is None or unseen:
+        names = unseen or functional.problem.model.state_names
+        raise errors.BadSetting(errors.smoothing_undetermined(list(names)))
+    return found
+
+
+def regress(functional: Functional, point: Point) -> tuple[Point, bool]:
+    """θ that minimises the physics residual of fixed splines, within bounds (Gauss-Newton).
+
+    Raises
+    ------
+    pikanid.errors.BadSetting : a parameter has no influence on the derivatives
+    """
+    problem = functional.problem
+    theta, damping = np.clip(point.theta, problem.lower, problem.upper), 0.0
+    cost, gram, slope = _physics_normal(functional, replace(point, theta=theta))
+    idle = [f.label for f, g in zip(problem.free, np.diag(gram), strict=True) if g <= 0.0]
+    if idle:
+        raise errors.BadSetting(errors.relaxation_cannot_see(
+            idle, "it does not act on the derivatives of the states"))
+    for _ in range(REGRESSION_STEPS):
+        damped = gram + (damping + 1e-14) * np.diag(np.diag(gram))
+        step = box_minimum(damped, slope, problem.lower - theta, problem.upper - theta)
+        trial = _physics_normal(functional, replace(point, theta=theta + step))
+        if not trial[0] <= cost:
+            damping = max(1e-3, 10.0 * damping)
+            if damping > 1e9:
+                break
+            continue
+        theta, damping = theta + step, 0.1 * damping if damping > 1e-6 else 0.0
+        gain, (cost, gram, slope) = cost - trial[0], trial
+        if gain <= 1e-12 * cost:
+            return replace(point, theta=theta), True
+    return replace(point, theta=theta), damping > 1e9
+
+
+def _physics_normal(functional: Functional, point: Point) -> tuple[float, Array, Array]:
+    size = point.theta.size
+    cost, gram, slope = 0.0, np.zeros((size, size)), np.zeros(size)
+    for r, c in enumerate(point.coefficients):
+        _, columns = functional.problem.columns(r)
+        rows = functional.physics_rows(r, c, point.theta, 1.0)
+        assert rows.by_theta is not None
+        jacobian = rows.by_theta.reshape(-1, columns.size)
+        residual = rows.residual.ravel()
+        cost += float(residual @ residual)
+        gram[np.ix_(columns, columns)] += jacobian.T @ jacobian
+        slope[columns] += jacobian.T @ residual
+    return cost, gram, slope
+
+
+def _covariance(functional: Functional, system: BandedSystem, point: Point, rho: float,
+                noise: list[Array | float]) -> Array:
+    """Noise carried through both steps: dθ = -(J_θᵀJ_θ)⁻¹ J_θᵀJ_c A⁻¹ B_dᵀ dε (residuals small)."""
+    problem = functional.problem
+    _, gram, _ = _physics_normal(functional, point)
+    stuck = np.isclose(point.theta, problem.lower, rtol=1e-6, atol=0.0) | np.isclose(
+        point.theta, problem.upper, rtol=1e-6, atol=0.0)
+    bread = invert(gram, ~stuck)
+    coupled = BandedSystem(functional).linearise(point, 1.0)
+    alone = BandedSystem(functional).linearise(point, 0.0)
+    penalised = system.linearise(point, rho)
+    meat, first = np.zeros_like(bread), 0
+    for r, part in enumerate(functional.parts):
+        columns, order = system.columns[r], system.assemblers[r].order
+        factor = cholesky_banded(penalised.blocks[r].band, lower=True, check_finite=False)
+        border = coupled.blocks[r].border - alone.blocks[r].border
+        carried = np.zeros((part.n_coefficients, columns.size))
+        carried[order[part.held.size:]] = cho_solve_banded((factor, True), border)
+        rows = functional.data_rows(r, point.coefficients[r], point.theta)
+        for sites, row in zip(part.data, rows, strict=True):
+            assert row.by_state is not None
+            response = np.zeros((sites.t.size, point.theta.size))
+            for s, table in enumerate(sites.states):
+                own = row.by_state[:, 0, s, None] * (table.basis @ carried[table.part])
+                response[:, columns] += own
+            response *= np.reshape(noise[first], (-1, 1))
+            meat += response.T @ response
+            first += 1
+    return bread @ meat @ bread
+
+
+def _is_seen(functional: Functional, chain: int) -> bool:
+    """Whether any output depends on a state of the chain."""
+    model = functional.problem.model
+    names = {model.state_names[s] for s, i in enumerate(functional.chains.root) if i == chain}
+    return any(names & {q.name for q in o.expression.free_symbols} for o in model.outputs)
+
+
+def _fine(problem: Problem) -> int:
+    samples = max(s.t.size for e in problem.experiments for s in e.samples)
+    return max(8, int(MOST_INTERVALS_A_SAMPLE * samples))

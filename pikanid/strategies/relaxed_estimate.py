@@ -1,0 +1,111 @@
+"""From a relaxed fit to an `Estimate`.
+
+The verdict is about the parameters, not about the splines, which can follow almost any data: the
+model is simulated at the estimate, and that simulation is held against the recording.  The
+splines themselves are kept as `estimate.approximator`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+import pikanid
+from pikanid import errors
+from pikanid.adequacy import judge
+from pikanid.approximators import Array
+from pikanid.approximators.bspline import BSpline
+from pikanid.chains import Chains
+from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
+from pikanid.shooting import Shooting
+from pikanid.strategies.finish import finish
+from pikanid.strategies.relaxation import RelaxedFit
+
+
+@dataclass(frozen=True, eq=False)
+class SplineTrajectories:
+    """The fitted splines: `splines[r][i]` with `coefficients[r][i]` for chain i of recording r."""
+
+    state_names: tuple[str, ...]
+    chains: Chains
+    splines: tuple[tuple[BSpline, ...], ...]
+    coefficients: tuple[tuple[Array, ...], ...]
+
+    def states(self, t: Array, recording: int = 0) -> Array:
+        """Approximated states (M, n) of a recording at times t (M,) [s]."""
+        pairs = list(zip(self.splines[recording], self.coefficients[recording], strict=True))
+        return np.column_stack([pairs[i][0].values(t, pairs[i][1], q) for i, q
+                                in zip(self.chains.root, self.chains.order, strict=True)])
+
+
+def relaxed_estimate(strategy: str, fit: RelaxedFit, settings: Mapping[str, Any],
+                     begun: float) -> Estimate:
+    """Assemble the `Estimate` of a relaxation strategy."""
+    used = {**settings, "knots": fit.grid.knots, "degree": fit.grid.degree,
+            "intervals": fit.grid.n_intervals, "physics": fit.grid.quadrature, "lam": fit.lam,
+            "data_cost": fit.data_cost, "physics_cost": fit.physics_cost,
+            "effective_parameters": fit.effective,
+            "naive_std": [float(s) for s in np.sqrt(np.diag(fit.naive_covariance))]}
+    history = [
+        {"lam": float(s.lam), "data_cost": s.data_cost, "physics_cost": s.physics_cost,
+         "iterations": float(s.iterations),
+         **{f.label: float(v) for f, v in zip(fit.problem.free, s.theta, strict=True)}}
+        for s in fit.stages]
+    curves = trajectories(fit)
+    shooting = Shooting(fit.problem)
+    try:
+        shooting.choose_steps(fit.theta, "fine")
+        finished = all(r.finished for r in shooting.responses(fit.theta))
+    except errors.SimulationFailed:
+        finished = False
+    if finished:
+        estimate = finish(strategy, fit.problem, shooting, fit.theta, converged=True,
+                          history=history, settings=used, seed=None, begun=begun,
+                          warnings=fit.warnings, approximator=curves)
+    else:
+        estimate = _unsimulated(strategy, fit, curves, history, used)
+    covariance = fit.covariance.copy()
+    stuck = np.isnan(np.diag(estimate.covariance)) if finished else np.diag(covariance) == 0.0
+    covariance[stuck] = covariance[:, stuck] = np.nan
+    return replace(estimate, covariance=covariance, converged=fit.converged,
+                   seconds=time.perf_counter() - begun)
+
+
+def trajectories(fit: RelaxedFit) -> SplineTrajectories:
+    """The splines of a fit, without the machinery that fitted them."""
+    splines, coefficients = [], []
+    for part, c in zip(fit.functional.parts, fit.coefficients, strict=True):
+        splines.append(tuple(a for a in part.approximators if isinstance(a, BSpline)))
+        coefficients.append(tuple(c[table.part] for table in part.physics.tops))
+    return SplineTrajectories(fit.problem.model.state_names, fit.chains, tuple(splines),
+                              tuple(coefficients))
+
+
+def _unsimulated(strategy: str, fit: RelaxedFit, curves: SplineTrajectories,
+                 history: list[dict[str, float]], settings: Mapping[str, Any]) -> Estimate:
+    """The model diverges at the estimate: all there is to show are the splines."""
+    problem, functional = fit.problem, fit.functional
+    fits, paths = [], []
+    for r, (experiment, part) in enumerate(
+            zip(problem.experiments, functional.parts, strict=True)):
+        p = problem.parameters(fit.theta, r)
+        for samples, sites in zip(experiment.samples, part.data, strict=True):
+            x = functional.states(sites, fit.coefficients[r])
+            y = functional.vector_field.outputs(sites.t, x, sites.u, p)[:, samples.output]
+            output = problem.model.outputs[samples.output]
+            fits.append(Fit(experiment.name, output.name, output.unit, samples.t, samples.y, y,
+                            samples.sigma))
+        grid = np.unique(np.concatenate([s.t for s in experiment.samples]))
+        paths.append(Trajectory(grid, curves.states(grid, r)))
+    adequacy = judge([f.residual for f in fits], [f.sigma for f in fits],
+                     [f.measured for f in fits], fit.theta.size)
+    return Estimate(
+        model=problem.model, strategy=strategy, free=problem.free, theta=fit.theta,
+        covariance=fit.covariance, fits=tuple(fits), trajectories=tuple(paths),
+        cost=total_cost(fits), adequacy=replace(adequacy, verdict="misfit"), converged=True,
+        settings=settings, history=tuple(history), version=pikanid.__version__,
+        warnings=(*fit.warnings, errors.estimate_not_simulated()), approximator=curves)
