@@ -268,6 +268,13 @@ class Model:
 
         return map_output(self, name, **maps)
 
+    def with_half_derivative(self, of: Formula, name: str, band: tuple[float, float],
+                             order: int = 10) -> tuple[Model, sp.Expr]:
+        """Add states that realise D^½ of a formula: see `pikanid.half_derivative`."""
+        from pikanid.half_derivative import with_half_derivative
+
+        return with_half_derivative(self, of, name, band, order)
+
     # --- the file form ---------------------------------------------------------------------------
 
     @staticmethod

@@ -22,7 +22,7 @@ ROWS = (
     ("errors",),
     ("units", "expressions"),
     ("approximators",),
-    ("model", "recording", "channel", "excitation"),
+    ("model", "half_derivative", "recording", "channel", "excitation"),
     ("noise",),
     ("systems", "datasets", "tracking"),
     ("problem",),

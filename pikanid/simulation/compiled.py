@@ -21,6 +21,7 @@ from typing import Literal
 
 from pikanid.expressions import to_text
 from pikanid.model import Model
+from pikanid.simulation.structure import Structure
 
 Method = Literal["explicit", "implicit"]
 _HERE = Path(__file__).parent
@@ -31,27 +32,15 @@ def compiled(model: Model, method: Method = "explicit") -> ModuleType:
 
     `method` chooses the classical Runge-Kutta step or the L-stable implicit one.
     """
-    return _load(_key(model, method), method, _Handle(model))
-
-
-class _Handle:
-    """Carries the model past the cache: equal keys mean equal modules."""
-
-    def __init__(self, model: Model):
-        self.model = model
-
-    def __hash__(self) -> int:
-        return 0
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Handle)
+    return _load(Structure(model), method)
 
 
 @functools.lru_cache(maxsize=256)
-def _load(key: str, method: Method, handle: _Handle) -> ModuleType:
+def _load(structure: Structure, method: Method) -> ModuleType:
+    key = _key(structure.model, method)
     path = cache_folder() / f"model_{key}.py"
     if not path.exists():
-        _write(path, _source(handle.model, method))
+        _write(path, _source(structure.model, method))
     name = f"pikanid_model_{key}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None

@@ -16,6 +16,7 @@ import sympy as sp
 from pikanid.expressions import TIME, symbol
 from pikanid.model import Model
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
+from pikanid.simulation.structure import Structure
 
 
 class VectorField:
@@ -32,7 +33,7 @@ class VectorField:
 
     def __init__(self, model: Model):
         self.model = model
-        self._functions = _functions(_Structure(model))
+        self._functions = _functions(Structure(model))
 
     def rhs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """f (M, n)."""
@@ -51,22 +52,6 @@ class VectorField:
                          ) -> tuple[np.ndarray, np.ndarray]:
         """∂h/∂x (M, q, n) and ∂h/∂p (M, q, P)."""
         return self._functions.jacobians(t, x, u, p, "h")
-
-
-class _Structure:
-    """Hashes a model by its formulas, so that other parameter values reuse the functions."""
-
-    def __init__(self, model: Model):
-        self.model = model
-        self.key = (model.state_names, model.input_names, model.parameter_names,
-                    tuple(model.equations.values()),
-                    tuple(o.expression for o in model.outputs), model.splines)
-
-    def __hash__(self) -> int:
-        return hash(self.key)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Structure) and self.key == other.key
 
 
 class _Functions:
@@ -202,5 +187,5 @@ def _log_abs(x: np.ndarray) -> np.ndarray:
 
 
 @functools.lru_cache(maxsize=32)
-def _functions(structure: _Structure) -> _Functions:
+def _functions(structure: Structure) -> _Functions:
     return _Functions(structure.model)

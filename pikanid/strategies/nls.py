@@ -22,6 +22,7 @@ from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.shooting import Shooting
 from pikanid.strategies.finish import finish
+from pikanid.strategies.multiple_shooting import multiple_shooting
 from pikanid.strategies.starts import starting_points
 
 
@@ -38,6 +39,7 @@ class NLS:
     max_evaluations : simulations allowed a start
     seed : of the starting points
     method : integration method, see `pikanid.simulate`
+    segments : with more than one, every start is first led to a basin by multiple shooting
 
     >>> import pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -53,6 +55,7 @@ class NLS:
     max_evaluations: int = 100
     seed: int = 0
     method: Literal["auto", "explicit", "implicit"] = "auto"
+    segments: int = 1
 
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
@@ -81,7 +84,7 @@ class NLS:
         if best is None:
             raise errors.SimulationFailed(errors.bad_start())
         settings = {"starts": self.starts, "protocol": self.protocol, "tolerance": self.tolerance,
-                    "method": shooting.steps[0].method, "tried": len(history)}
+                    "method": shooting.steps[0].method, "segments": self.segments, "tried": len(history)}
         return finish(
             "nls", problem, shooting, best.theta, converged=best.converged, history=history,
             settings=settings, seed=self.seed, begun=begun)
@@ -90,7 +93,10 @@ class NLS:
         """One local fit: coarse steps first, then steps fine enough for the final digits."""
         evaluations = 0
         theta, found = start, None
-        for accuracy in ("coarse", "fine"):
+        if self.segments > 1:
+            led = multiple_shooting(shooting, start, self.segments)
+            theta = start if led is None else led
+        for accuracy, tolerance in (("coarse", max(1e-6, self.tolerance)), ("fine", self.tolerance)):
             try:
                 changed = shooting.choose_steps(theta, accuracy)
             except errors.SimulationFailed:
@@ -98,7 +104,7 @@ class NLS:
             if found is not None and not changed:
                 break
             found = minimise(shooting.residual, shooting.jacobian, theta, shooting.problem.lower,
-                             shooting.problem.upper, self.tolerance, self.max_evaluations)
+                             shooting.problem.upper, tolerance, self.max_evaluations)
             evaluations += found.evaluations
             theta = found.theta
         assert found is not None

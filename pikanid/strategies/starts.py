@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -12,8 +13,8 @@ EXTRA = 8
 
 
 def starting_points(problem: Problem, starts: int | Literal["auto"],
-                    protocol: Literal["default", "paper"], seed: int) -> np.ndarray:
-    """Starting points (n_starts, n_free); the first is the guess.
+                    protocol: Literal["default", "paper"], seed: int) -> Iterator[np.ndarray]:
+    """Yield starting points (n_free,); the first is the guess.
 
     "paper": five points within ±20 % of the guess (Table II, best of five).  Otherwise a
     Latin hypercube (McKay, Beckman & Conover, Technometrics 21, 1979) over each parameter's range:
@@ -21,18 +22,20 @@ def starting_points(problem: Problem, starts: int | Literal["auto"],
     a decade around the guess.
     """
     guess = problem.guess
+    yield guess
     rng = np.random.default_rng(seed)
     if protocol == "paper":
         draws = rng.uniform(0.8, 1.2, (4, len(guess))) * guess
-        return np.clip(np.vstack([guess, draws]), problem.lower, problem.upper)
+        yield from np.clip(draws, problem.lower, problem.upper)
+        return
     count = (EXTRA + 1 if starts == "auto" else starts) - 1
     if count < 1 or len(guess) == 0:
-        return guess[None, :]
+        return
     from scipy.stats import qmc
 
     unit = qmc.LatinHypercube(len(guess), rng=rng).random(count)
     columns = [_spread(f, unit[:, k]) for k, f in enumerate(problem.free)]
-    return np.vstack([guess, np.stack(columns, axis=1)])
+    yield from np.stack(columns, axis=1)
 
 
 def _spread(f: FreeParameter, unit: np.ndarray) -> np.ndarray:
