@@ -366,6 +366,24 @@ def noise_interval(model: float, given: float) -> str:
     )
 
 
+# --- datasets ------------------------------------------------------------------------------------
+
+
+def dataset_missing(local: str, url: str, variable: str) -> str:
+    return (
+        f"The recording '{local}' is not on this machine and cannot be downloaded: connect to the "
+        f"network, or fetch {url} yourself and set {variable} to the folder that holds '{local}'."
+    )
+
+
+def dataset_altered(path: str, url: str) -> str:
+    return f"'{path}' is not the original file (its checksum differs): fetch it again from {url}."
+
+
+def no_such_data(what: str, given: str, known: Iterable[str]) -> str:
+    return f"There is no {what} '{given}' (known: {_listed(known)})."
+
+
 # --- excitations ---------------------------------------------------------------------------------
 
 
