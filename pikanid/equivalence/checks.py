@@ -1,0 +1,165 @@
+"""The comparison of both derivations, and the list of settings it is made for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pikanid.equivalence.ipda import IpdaObjective
+from pikanid.equivalence.optimisers import Path, adam, lbfgs, levenberg_marquardt
+from pikanid.equivalence.report import Check, EquivalenceReport
+from pikanid.equivalence.setting import Array, Form, Setting
+
+MATRICES = 1e-12
+GRADIENTS = 1e-10
+MINIMISERS = 1e-8
+_STEPS = 20
+
+_SHALLOW = "shallow KAN = Eq. (5)"
+
+
+def run_checks(*, quick: bool = False, seed: int = 0) -> EquivalenceReport:
+    """Every check of the equivalence.
+
+    Args:
+        quick: A third of the settings, and 20 Levenberg-Marquardt steps instead of all (most
+            minimisers are then left out).
+        seed: Of coefficients, parameters, noise and random grids.
+    """
+    from pikanid.equivalence.controls import controls, quadratic_at_the_end, uniqueness
+    from pikanid.equivalence.deep import tangent_step
+    from pikanid.equivalence.delivery import delivered_curve
+
+    rows: list[Check] = []
+    for number, setting in enumerate(settings(seed)):
+        if not quick or number % 3 == 0:
+            rows += compare(setting)
+    for setting in optimised(seed):
+        rows += compare_paths(setting, quick=quick)
+    rows += uniqueness(seed)
+    rows += delivered_curve(seed)
+    rows += tangent_step(seed)
+    rows += controls(seed)
+    rows += quadratic_at_the_end(seed)
+    return EquivalenceReport(tuple(rows))
+
+
+def settings(seed: int = 0) -> Iterator[Setting]:
+    """Degrees 2-5 (second-order form 3-5), both systems and forms, varied grids, T and λ."""
+    grids = ((5, 2.0, 1e-4), (40, 5.0, 1.0), (17, 8.0, 10.0))
+    points = ((41, 81, True), (51, 121, False), (201, 161, True))
+    number = 0
+    forms: tuple[Form, ...] = ("state", "second-order")
+    for system in ("sloshing", "duffing"):
+        for form in forms:
+            for degree in range(2 if form == "state" else 3, 6):
+                for (grid, horizon, weight), (n, m, even) in zip(grids, points, strict=True):
+                    kinks = (0.2, 0.6, 1.2, 1.6) if degree > 3 and grid == 40 else ()
+                    yield Setting(
+                        system,
+                        form,
+                        degree,
+                        grid,
+                        horizon,
+                        weight,
+                        n,
+                        m,
+                        even,
+                        kinks,
+                        seed + number,
+                    )
+                    number += 1
+
+
+def optimised(seed: int = 0) -> Iterator[Setting]:
+    """Settings whose optimisation is followed: minimisers that are finite, and one that is not."""
+    yield Setting("duffing", "state", 3, 12, 5.0, 1e-1, seed=seed)
+    yield Setting("duffing", "second-order", 4, 12, 5.0, 1e-1, even=False, seed=seed)
+    yield Setting("sloshing", "state", 4, 30, 5.0, 1e-3, seed=seed)
+    yield Setting("sloshing", "second-order", 5, 30, 5.0, 1e-5, seed=seed)
+    yield Setting(
+        "sloshing", "second-order", 5, 30, 5.0, 1e-4, kinks=(0.2, 0.6, 1.2, 1.6), seed=seed
+    )
+    # λ and grid of the paper's last stage: here the minimiser has l beyond all bounds.
+    yield Setting("sloshing", "second-order", 3, 40, 5.0, 1.0, 151, 151, seed=seed)
+
+
+def compare(setting: Setting) -> tuple[Check, ...]:
+    """Value, gradients and Gauss-Newton matrix at one random point."""
+    from pikanid.equivalence.network import NetworkLoss
+
+    network = NetworkLoss(setting)
+    objective = IpdaObjective(setting, network.knots)
+    unknowns = setting.unknowns()
+    value_a, gradient_a = network.value_and_gradient(unknowns)
+    value_b, gradient_b = objective.value_and_gradient(unknowns)
+    _, jacobian_a = network.residuals_and_jacobian(unknowns)
+    _, jacobian_b = objective.residuals_and_jacobian(unknowns)
+    split = setting.shape[0] * setting.shape[1]
+    return tuple(
+        Check(_SHALLOW, setting.describe(), quantity, difference(a, b), tolerance)
+        for quantity, a, b, tolerance in (
+            ("loss", np.array(value_a), np.array(value_b), MATRICES),
+            ("gradient in c", gradient_a[:split], gradient_b[:split], GRADIENTS),
+            ("gradient in p", gradient_a[split:], gradient_b[split:], GRADIENTS),
+            ("Jacobian", jacobian_a, jacobian_b, MATRICES),
+            (
+                "Gauss-Newton matrix",
+                jacobian_a.T @ jacobian_a,
+                jacobian_b.T @ jacobian_b,
+                MATRICES,
+            ),
+        )
+    )
+
+
+def compare_paths(setting: Setting, *, quick: bool = False) -> tuple[Check, ...]:
+    """The same optimisers from the same start: 20 iterates of each, and the minimiser if finite."""
+    from pikanid.equivalence.network import NetworkLoss
+
+    network = NetworkLoss(setting)
+    objective = IpdaObjective(setting, network.knots)
+    start = setting.unknowns(0.01)
+    basis, outputs = objective.matrices.values, setting.outputs
+    losses = (network.value_and_gradient, objective.value_and_gradient)
+    residuals = (network.residuals_and_jacobian, objective.residuals_and_jacobian)
+    most = _STEPS if quick else 200
+    paths = {
+        "L-BFGS": tuple(lbfgs(loss, start, _STEPS) for loss in losses),
+        "Adam": tuple(adam(loss, start, _STEPS) for loss in losses),
+        "Levenberg-Marquardt": tuple(levenberg_marquardt(r, start, most) for r in residuals),
+    }
+    rows = []
+    for name, (a, b) in paths.items():
+        found = apart(a.first(_STEPS), b.first(_STEPS), basis, outputs)
+        quantity = f"{_STEPS} iterates of {name}"
+        rows.append(Check(_SHALLOW, setting.describe(), quantity, found, MINIMISERS))
+        if a.converged and b.converged:
+            found = apart(a.last(), b.last(), basis, outputs)
+            rows.append(Check(_SHALLOW, setting.describe(), "minimiser", found, MINIMISERS))
+    return tuple(rows)
+
+
+def difference(a: Array, b: Array) -> float:
+    """Largest difference relative to the largest entry."""
+    scale = max(float(np.abs(a).max()), float(np.abs(b).max()))
+    return float(np.abs(a - b).max()) / scale if scale else 0.0
+
+
+def apart(a: Path, b: Path, basis: Array, outputs: int) -> float:
+    """Largest relative difference of curve or parameters over two paths; infinite if one is longer.
+
+    Curves, not coefficients, are compared: beside kinks, whose functions grow over the whole
+    record, coefficients are known only to the condition of the basis.  A path that ends by
+    convergence may end a step earlier than the other.
+    """
+    shared = min(len(a.iterates), len(b.iterates))
+    if len(a.iterates) != len(b.iterates) and not (a.converged and b.converged):
+        return float("inf")
+    worst = 0.0
+    split = basis.shape[1] * outputs
+    for x, y in zip(a.iterates[:shared], b.iterates[:shared], strict=True):
+        curves = (basis @ z[:split].reshape(-1, outputs) for z in (x, y))
+        worst = max(worst, difference(*curves), difference(x[split:], y[split:]))
+    return worst
