@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+EXIT_MISFIT = 3  # of the command line, where a fit is done but explains nothing
+
 
 class PikanidError(Exception):
     """Base of every error that the user can mend; the command line turns it into exit code 2."""
@@ -659,3 +661,80 @@ def unidentifiable(combination: str, condition: float) -> str:
         f"The data do not determine the combination {combination} (condition {condition:.1g}): "
         "fix one of these parameters or excite the system differently."
     )
+
+
+# --- command line --------------------------------------------------------------------------------
+
+
+def usage(message: str, command: str) -> str:
+    return f"{message.rstrip('.')}; see '{command} --help'."
+
+
+def not_an_assignment(option: str, text: str, example: str) -> str:
+    return f"{option} takes NAME=VALUE, such as '{example}', not '{_short(text)}'."
+
+
+def named_twice(option: str, name: str) -> str:
+    return f"{option} names '{name}' more than once: keep one."
+
+
+def free_and_fixed(name: str) -> str:
+    return f"'{name}' cannot be both free and fixed: keep --free or --fix."
+
+
+def not_a_quantity(text: str, where: str) -> str:
+    return f"{where} is '{_short(text)}'; write a number, with a unit if it needs one, as '0.1deg'."
+
+
+def sigma_not_positive(text: str) -> str:
+    return f"--sigma is '{_short(text)}'; the noise must be positive and finite."
+
+
+def reversed_window(start: float, stop: float) -> str:
+    return f"The stretch from {start:g} s to {stop:g} s is empty: --from must lie before --to."
+
+
+def nothing_free(model: str) -> str:
+    return f"Every parameter of '{model}' is fixed, so there is nothing to identify: use --free NAME."
+
+
+def output_ending(option: str, path: str, endings: Sequence[str]) -> str:
+    return f"{option}: '{_short(path, 200)}' must end in {' or '.join(endings)}."
+
+
+def output_folder(option: str, path: str, folder: str) -> str:
+    return (
+        f"{option}: '{_short(path, 200)}' cannot be written, because there is no folder "
+        f"'{_short(folder, 200)}'."
+    )
+
+
+def output_refused(option: str, path: str, why: str) -> str:
+    return f"{option}: '{_short(path, 200)}' cannot be written: {why}."
+
+
+def output_is_input(option: str, path: str) -> str:
+    return f"{option} would overwrite the input '{_short(path, 200)}': choose another name."
+
+
+def output_twice(first: str, second: str, path: str) -> str:
+    return f"{first} and {second} both name '{_short(path, 200)}': choose another name for one."
+
+
+def save_needs_one_strategy() -> str:
+    return "--save keeps one estimate: choose one strategy, or use --json for several."
+
+
+def unknown_excitation(name: str, known: Sequence[str], close: Sequence[str]) -> str:
+    return (
+        f"'{_short(name, 200)}' is neither an excitation ({_listed(known)}) nor a file that exists."
+        f"{_did_you_mean(close)}"
+    )
+
+
+def nothing_to_simulate(name: str) -> str:
+    return f"'{name}' drives the model with nothing: none of its columns is an input of the model."
+
+
+def out_of_memory() -> str:
+    return "There is not enough memory for this: shorten the recording, or thin it with --decimate."

@@ -1,0 +1,113 @@
+"""The command line: which commands there are, and what becomes of failures.
+
+Exit codes: 0 done; 2 bad input, with one sentence on standard error; 3 fitted, but the model does
+not explain the recording; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated, TextIO
+
+import typer
+
+from pikanid import errors
+from pikanid.commands.identify import EXAMPLES as IDENTIFY
+from pikanid.commands.identify import identify
+from pikanid.commands.models import EXAMPLES as MODELS
+from pikanid.commands.models import models
+from pikanid.commands.simulate import EXAMPLES as SIMULATE
+from pikanid.commands.simulate import simulate
+
+EXIT_INTERRUPTED = 130
+EXAMPLES = """Examples:
+
+  pikanid simulate --model sloshing --sigma 0.1deg --out run.csv
+
+  pikanid identify run.csv --model sloshing --sigma 0.1deg --plot fit.png
+
+  pikanid models sloshing
+
+Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
+
+# What typer raises for wrong usage; where its base class lives depends on the version.
+UsageError: type[Exception] = typer.BadParameter.__mro__[2]
+
+app = typer.Typer(
+    name="pikanid", add_completion=False, rich_markup_mode="rich",
+    pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
+app.command(epilog=IDENTIFY)(identify)
+app.command(epilog=SIMULATE)(simulate)
+app.command(epilog=MODELS)(models)
+
+
+@app.callback(invoke_without_command=True, epilog=EXAMPLES)
+def pikanid(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="print the version")] = False,
+) -> None:
+    """Parameters of a simulation model from a recording, and how far to trust them."""
+    if version:
+        from importlib.metadata import version as installed
+
+        print(f"pikanid {installed('pikanid')}")
+        raise typer.Exit(0)
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+        raise typer.Exit(0)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code.
+
+    >>> main(["identify", "absent.csv", "--model", "sloshing"])
+    2
+    """
+    for stream in (sys.stdout, sys.stderr):
+        _never_fail_to_print(stream)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = app(args=words, prog_name="pikanid", standalone_mode=False)
+        sys.stdout.flush()
+    except errors.PikanidError as problem:
+        return _complain(str(problem), problem.exit_code)
+    except UsageError as problem:
+        command = " ".join(["pikanid", *(w for w in words[:1] if w in _commands())])
+        what = getattr(problem, "format_message", lambda: str(problem))()
+        return _complain(errors.usage(what, command), 2)
+    except BrokenPipeError:
+        # The reader has left: nothing is wrong, and Python must not flush once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as problem:
+        place = str(problem.filename or "the output")
+        return _complain(errors.cannot_write(place, problem.strerror or ""), 2)
+    except MemoryError:
+        return _complain(errors.out_of_memory(), 2)
+    except (KeyboardInterrupt, typer.Abort):
+        code = EXIT_INTERRUPTED
+    if code == EXIT_INTERRUPTED:
+        print("Interrupted.", file=sys.stderr)
+    return int(code or 0)
+
+
+def _complain(text: str, code: int) -> int:
+    from pikanid.reporting.console import complain
+
+    complain(text)
+    return code
+
+
+def _commands() -> list[str]:
+    return [c.name or getattr(c.callback, "__name__", "") for c in app.registered_commands]
+
+
+def _never_fail_to_print(stream: TextIO) -> None:
+    """Where a terminal has no χ or ±, print a question mark rather than stop."""
+    reconfigure = getattr(stream, "reconfigure", None)
+    if reconfigure is not None:
+        reconfigure(errors="replace")
+
+

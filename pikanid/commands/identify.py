@@ -1,0 +1,223 @@
+"""`pikanid identify`: recordings and a model in, parameters out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pikanid import errors
+from pikanid.commands.options import adjusted, assignments, check_outputs, quantity
+from pikanid.strategies import STRATEGIES
+
+if TYPE_CHECKING:
+    from pikanid.estimate import Estimate
+    from pikanid.model import Model
+    from pikanid.recording import Recording
+
+ALL = "all"
+EXAMPLES = """Examples:
+
+  pikanid identify run.csv --model sloshing --sigma 0.1deg
+
+  pikanid identify run.csv --model my.toml --strategy all --json out.json
+
+  pikanid identify a.csv b.csv --model sloshing --set l_theta=50mm --fix d_theta=0.15
+
+  pikanid identify run.xlsx --sheet Run2 --column theta=angle --model pendulum --plot fit.png
+
+Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
+
+Texts = Annotated[list[str], typer.Option()]
+
+
+def identify(
+    recordings: Annotated[list[str], typer.Argument(
+        metavar="RECORDING...", help="CSV, Excel, Parquet, MAT or NPZ; several are fitted jointly",
+        show_default=False)],
+    model: Annotated[str, typer.Option(
+        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
+        show_default=False)],
+    strategy: Annotated[str, typer.Option(
+        "--strategy", "-s", metavar="|".join([*STRATEGIES, ALL]), help="how to fit")] = "nls",
+    protocol: Annotated[str, typer.Option(
+        metavar="default|paper", help="settings: the best known, or those of the paper")] = "default",
+    sigma: Annotated[list[str], typer.Option(
+        metavar="[NAME=]VALUE|auto", show_default=False,
+        help="noise of an output, as 0.1deg or theta=0.1deg; auto estimates it")] = [],  # noqa: B006
+    set_: Annotated[list[str], typer.Option(
+        "--set", metavar="NAME=VALUE", show_default=False,
+        help="guess of a free parameter, or value of a fixed one")] = [],  # noqa: B006
+    fix: Annotated[list[str], typer.Option(
+        metavar="NAME[=VALUE]", help="do not estimate", show_default=False)] = [],  # noqa: B006
+    free: Annotated[list[str], typer.Option(
+        metavar="NAME", show_default=False,
+        help="estimate a parameter, or the initial value of a state")] = [],  # noqa: B006
+    column: Annotated[list[str], typer.Option(
+        metavar="NAME=COLUMN", show_default=False,
+        help="column of the file that holds a signal; t=COLUMN for time")] = [],  # noqa: B006
+    unit: Annotated[list[str], typer.Option(
+        metavar="NAME=UNIT", show_default=False,
+        help="unit of a signal, where the file does not say")] = [],  # noqa: B006
+    rate: Annotated[float | None, typer.Option(
+        metavar="HZ", help="sampling rate, where the file has no times")] = None,
+    sheet: Annotated[str | None, typer.Option(
+        metavar="NAME", help="sheet of a workbook, by name or number from 0")] = None,
+    start: Annotated[float | None, typer.Option("--from", metavar="S", help="start [s]")] = None,
+    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="end [s]")] = None,
+    decimate: Annotated[int, typer.Option(
+        metavar="N", min=1, help="use every N-th sample of the outputs")] = 1,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the starting points")] = 0,
+    json_: Annotated[str | None, typer.Option(
+        "--json", metavar="FILE", help="write the result as JSON (- for standard output)")] = None,
+    plot: Annotated[str | None, typer.Option(
+        metavar="FILE", help="draw data, fit and residuals (.png, .svg, .pdf)")] = None,
+    save: Annotated[str | None, typer.Option(
+        metavar="FILE", help="keep the whole estimate (.json, .json.gz), for Estimate.load")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+) -> int:
+    """Estimate a model's parameters from recordings, with standard errors and a verdict."""
+    _check_choice("--strategy", strategy, [*STRATEGIES, ALL])
+    _check_choice("--protocol", protocol, ["default", "paper"])
+    names = list(STRATEGIES) if strategy == ALL else [strategy]
+    if save is not None and len(names) > 1:
+        raise errors.BadSetting(errors.save_needs_one_strategy())
+    if start is not None and stop is not None and not start < stop:
+        raise errors.BadSetting(errors.reversed_window(start, stop))
+    check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),
+                   "--plot": (plot, [".png", ".svg", ".pdf"]),
+                   "--save": (save, [".json", ".json.gz"])}, [*recordings, model])
+    from pikanid import systems
+
+    chosen = adjusted(systems.find(model), set_, fix, free)
+    if not chosen.free_names:
+        raise errors.BadModel(errors.nothing_free(chosen.name))
+    columns = assignments("--column", column, "theta=angle")
+    units = assignments("--unit", unit, "theta=deg")
+    given = [_prepared(path, chosen, columns, units, rate, sheet, start, stop, decimate, sigma)
+             for path in recordings]
+    return _fit_and_tell(chosen, given, names, protocol, seed, json_, plot, save, quiet)
+
+
+def _check_choice(option: str, value: str, known: Sequence[str]) -> None:
+    if value not in known:
+        raise errors.BadSetting(errors.bad_value(option, value, f"one of {', '.join(known)}"))
+
+
+def _prepared(path: str, model: Model, columns: dict[str, str], units: dict[str, str],
+              rate: float | None, sheet: str | None, start: float | None, stop: float | None,
+              decimate: int, sigma: Sequence[str]) -> Recording:
+    from pikanid.recording import Recording
+
+    known = [*model.input_names, *model.output_names, "t", "time"]
+    for name in [*columns, *units]:
+        if name not in known:
+            raise errors.BadModel(errors.not_in_model("input or output", name, known))
+    rec = Recording.read(path, columns, rate, sheet, units)
+    # Declared as held, an input keeps its meaning when the recording is cut.
+    rec = rec.with_hold(**{i.name: i.hold for i in model.inputs
+                           if i.name in rec and rec[i.name].hold is None})
+    if start is not None or stop is not None:
+        rec = rec.window(start, stop)
+    if decimate > 1:
+        rec = rec.decimate(decimate, channels=model.output_names)
+    return _with_sigma(rec, model, sigma)
+
+
+def _with_sigma(rec: Recording, model: Model, texts: Sequence[str]) -> Recording:
+    """The noise of the outputs: one for all, one by name, or estimated from the recording."""
+    if list(texts) == ["auto"]:
+        from pikanid.noise import with_estimated_sigma
+
+        return with_estimated_sigma(rec, model.output_names)
+    common = [text for text in texts if "=" not in text]
+    named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
+    if len(common) > 1:
+        raise errors.BadSetting(errors.named_twice("--sigma", "all outputs"))
+    wanted = {**{o: common[0] for o in model.output_names if common}, **named}
+    made = {}
+    for name, text in wanted.items():
+        model.output(name)
+        own = rec[name].unit
+        # A bare number is in the model's unit, in which the results are printed too.
+        asked = quantity(text, model.output(name).unit or own, f"--sigma {name}", difference=True)
+        if not asked > 0:
+            raise errors.BadSetting(errors.sigma_not_positive(text))
+        made[name] = asked
+        if own and model.output(name).unit:
+            made[name] = quantity(f"{asked!r} {model.output(name).unit}", own, f"--sigma {name}",
+                                  difference=True)
+    return rec.with_sigma(made)
+
+
+def _make(name: str, protocol: str, seed: int) -> Any:
+    from pikanid.strategies import strategy
+
+    kind = strategy(name)
+    known = {f.name for f in fields(kind)}
+    options = {"protocol": protocol, "seed": seed}
+    return kind(**{key: value for key, value in options.items() if key in known})
+
+
+def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str], protocol: str,
+                  seed: int, json_: str | None, plot: str | None, save: str | None,
+                  quiet: bool) -> int:
+    from pikanid.reporting.console import complain, console, working
+
+    begun = time.perf_counter()
+    estimates: list[Estimate] = []
+    failed: dict[str, str] = {}
+    with working("fitting", len(names), quiet) as step:
+        for name in names:
+            step(name)
+            try:
+                found = _make(name, protocol, seed).fit(model, given)
+            except errors.PikanidError as problem:
+                if len(names) == 1:
+                    raise
+                failed[name] = str(problem)
+                continue
+            notes = [f"Recording '{r.name}': {note}" for r in given for note in r.notes]
+            estimates.append(replace(found, warnings=(*found.warnings, *notes)))
+    if not estimates:
+        complain(next(iter(failed.values())))
+        return errors.PikanidError.exit_code
+    seconds = time.perf_counter() - begun
+    _write(model, given, estimates, failed, len(names) > 1, seconds, json_, plot, save)
+    if not quiet and json_ != "-":
+        from pikanid.reporting.tables import show_estimates
+
+        show_estimates(console(), estimates, failed)
+    # With several strategies the question is whether the model explains the recording at all.
+    return 0 if any(estimate.ok for estimate in estimates) else errors.EXIT_MISFIT
+
+
+def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimate],
+           failed: dict[str, str], several: bool, seconds: float, json_: str | None,
+           plot: str | None, save: str | None) -> None:
+    from pathlib import Path
+
+    import pikanid
+    from pikanid.reporting import strict_json
+    from pikanid.writing import atomically
+
+    labels = [r.name for r in given]
+    if json_ is not None:
+        content = (strict_json.of_several(estimates, failed, model.name, labels,
+                                          pikanid.__version__, seconds)
+                   if several else strict_json.of_one(estimates[0], labels))
+        if json_ == "-":
+            print(strict_json.text(content), end="")
+        else:
+            atomically(Path(json_), strict_json.text(content).encode())
+    if plot is not None:
+        from pikanid.plots import plot_strategies, save_figure
+
+        figure = (plot_strategies({e.strategy: e.fits for e in estimates}, model.name)
+                  if len(estimates) > 1 else estimates[0].plot())
+        save_figure(figure, plot)
+    if save is not None:
+        estimates[0].save(save)

@@ -1,0 +1,160 @@
+"""What people write behind options: assignments, quantities with units, places to write to."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pikanid import errors
+
+if TYPE_CHECKING:
+    from pikanid.model import Model
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+
+
+def assignments(option: str, texts: Sequence[str], example: str) -> dict[str, str]:
+    """NAME=VALUE texts as a dictionary.
+
+    Raises:
+        BadSetting: If a text is no assignment, or a name comes twice.
+
+    >>> assignments("--set", ["l_theta=0.05"], "l_theta=0.05")
+    {'l_theta': '0.05'}
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        if not (sign and name.strip() and value.strip()):
+            raise errors.BadSetting(errors.not_an_assignment(option, text, example))
+        if name.strip() in found:
+            raise errors.BadSetting(errors.named_twice(option, name.strip()))
+        found[name.strip()] = value.strip()
+    return found
+
+
+def quantity(text: str, unit: str, where: str, difference: bool = False) -> float:
+    """A number in `unit`; a unit written behind it is converted, none means `unit` itself.
+
+    Args:
+        text: Such as ``"0.1deg"``, ``"45 mm"``, ``"1e-3"``.
+        unit: Wanted.
+        where: Named in messages.
+        difference: Whether it is a difference, as a standard deviation is: a sigma of 1 degC is
+            one of 1 K.
+
+    Raises:
+        BadSetting: If the text does not start with a finite number.
+        BadUnit: If its unit is unknown or of another kind.
+
+    >>> quantity("45 mm", "m", "l_theta")
+    0.045
+    """
+    match = _QUANTITY.fullmatch(text)
+    if match is None or not math.isfinite(float(match[1])):
+        raise errors.BadSetting(errors.not_a_quantity(text, where))
+    value, given = float(match[1]), match[2]
+    if not given:
+        return value
+    from pikanid import units
+
+    if not units.is_unit(given):
+        raise errors.BadUnit(errors.unknown_unit(given, where))
+    if not units.convertible(given, unit):
+        raise errors.BadUnit(errors.units_differ(given, unit, where))
+    if difference:
+        return value * units.factor(given, unit)
+    return float(units.convert(value, given, unit))
+
+
+def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),
+             free: Sequence[str] = ()) -> Model:
+    """The model with values set, parameters fixed or freed, and initial states freed.
+
+    Raises:
+        BadModel: If the model has no such parameter or state, or a value leaves its bounds.
+        BadSetting: If a text cannot be read, or a parameter is to be both free and fixed.
+
+    >>> from pikanid.systems import sloshing
+    >>> adjusted(sloshing(), ["l_theta=50mm"], fix=["d_theta=0.1"], free=["theta"]).free_names
+    ('l_theta', 'theta_0')
+    """
+    for name in free:
+        if name in model.state_names:
+            model = model.with_initial(**{name: "free"})
+        else:
+            model = model.free(name)
+    fixed = {}
+    for text in fix:
+        name, sign, value = text.partition("=")
+        if not name.strip() or (sign and not value.strip()) or name.strip() in fixed:
+            raise errors.BadSetting(errors.not_an_assignment("--fix", text, "d_theta=0.15"))
+        if name.strip() in free:
+            raise errors.BadSetting(errors.free_and_fixed(name.strip()))
+        fixed[name.strip()] = value.strip()
+    for name, value in fixed.items():
+        p = model.parameter(name)
+        number = quantity(value, p.unit, f"--fix {name}") if value else p.value
+        model = model.fix(**{name: number})
+    values = assignments("--set", set_, "l_theta=0.05")
+    return model.with_values({
+        name: quantity(value, model.parameter(name).unit, f"--set {name}")
+        for name, value in values.items()})
+
+
+def check_outputs(outputs: Mapping[str, tuple[str | None, Sequence[str]]],
+                  inputs: Sequence[str]) -> None:
+    """Refuse what could not be written in the end, before any work is done.
+
+    Args:
+        outputs: Option -> (path or None, endings that the name may have).
+        inputs: Paths that are read and must survive.
+
+    Raises:
+        BadSetting: Wrong ending, missing or unwritable folder, no regular file, an input, or two
+            options with one path.
+    """
+    taken: dict[str, str] = {}
+    for option, (path, endings) in outputs.items():
+        if path is None:
+            continue
+        _check_place(option, path, endings)
+        real = os.path.realpath(path)
+        if any(os.path.realpath(source) == real or _same(source, path) for source in inputs):
+            raise errors.BadSetting(errors.output_is_input(option, path))
+        if real in taken:
+            raise errors.BadSetting(errors.output_twice(taken[real], option, path))
+        taken[real] = option
+
+
+def _check_place(option: str, path: str, endings: Sequence[str]) -> None:
+    file = Path(path)
+    if not path.lower().endswith(tuple(endings)) or "\0" in path:
+        raise errors.BadSetting(errors.output_ending(option, path, endings))
+    folder = file.parent
+    try:
+        if not folder.is_dir():
+            raise errors.BadSetting(errors.output_folder(option, path, str(folder)))
+        if file.is_dir():
+            raise errors.BadSetting(errors.output_refused(option, path, "it is a folder"))
+        if file.exists() and not file.is_file():
+            raise errors.BadSetting(errors.output_refused(option, path, "it is no regular file"))
+        if len(os.fsencode(file.name)) > 200:
+            raise errors.BadSetting(errors.output_refused(option, path, "its name is too long"))
+    except OSError as failure:
+        why = failure.strerror or "the system refuses"
+        raise errors.BadSetting(errors.output_refused(option, path, why)) from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        why = f"the folder '{folder}' is not open for writing"
+        raise errors.BadSetting(errors.output_refused(option, path, why))
+
+
+def _same(source: str, path: str) -> bool:
+    try:
+        return os.path.samefile(source, path)
+    except (OSError, ValueError):
+        return False

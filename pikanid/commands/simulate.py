@@ -1,0 +1,121 @@
+"""`pikanid simulate`: a model and an excitation in, a recording out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pikanid import errors
+from pikanid.commands.options import adjusted, assignments, check_outputs, quantity
+
+if TYPE_CHECKING:
+    from pikanid.model import Model
+    from pikanid.recording import Recording
+
+BUILT_IN = ("two_pulse", "free_decay", "move", "planar_moves")
+EXAMPLES = """Examples:
+
+  pikanid simulate --model sloshing --sigma 0.1deg --out run.csv
+
+  pikanid simulate --model sloshing --set d_theta=0.3 --excitation planar_moves --duration 20 --out rich.csv
+
+  pikanid simulate --model my.toml --excitation motion.csv --seed 7 --out run.parquet
+
+A file given as --excitation holds the inputs; the outputs are sampled at its times."""
+
+
+def simulate(
+    model: Annotated[str, typer.Option(
+        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
+        show_default=False)],
+    out: Annotated[str, typer.Option(
+        "--out", "-o", metavar="FILE", show_default=False,
+        help="recording to write (.csv, .csv.gz, .tsv, .parquet)")],
+    excitation: Annotated[str, typer.Option(
+        "--excitation", "-e", metavar=f"{'|'.join(BUILT_IN)}|FILE",
+        help="what drives the model")] = "two_pulse",
+    sigma: Annotated[list[str], typer.Option(
+        metavar="[NAME=]VALUE", show_default=False,
+        help="noise of the outputs, as 0.1deg or theta=0.1deg; none by default")] = [],  # noqa: B006
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the noise")] = 0,
+    set_: Annotated[list[str], typer.Option(
+        "--set", metavar="NAME=VALUE", help="value of a parameter", show_default=False)] = [],  # noqa: B006
+    duration: Annotated[float, typer.Option(
+        metavar="S", help="of a built-in excitation [s]")] = 5.0,
+    rate: Annotated[float, typer.Option(
+        metavar="HZ", help="sampling rate of a built-in excitation")] = 100.0,
+    column: Annotated[list[str], typer.Option(
+        metavar="NAME=COLUMN", show_default=False,
+        help="column of the excitation's file that holds an input")] = [],  # noqa: B006
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+) -> int:
+    """Simulate a model and write what would be recorded."""
+    check_outputs({"--out": (out, [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".pq"])},
+                  [excitation, model])
+    from pikanid import systems
+    from pikanid.simulation import simulate as run
+
+    chosen = adjusted(systems.find(model), set_)
+    drive = _excitation(chosen, excitation, duration, rate, column)
+    made = run(chosen, drive, sigma=_sigmas(chosen, sigma), seed=seed)
+    if not chosen.inputs:
+        made = made.without(*drive.names)
+    made.write(out)
+    if not quiet:
+        from pikanid.reporting.console import console
+
+        screen = console()
+        screen.print(f"{out}: {chosen.name}, {made.start:g} s to {made.stop:g} s, "
+                     f"columns {', '.join(made.names)}", markup=False, soft_wrap=True)
+    return 0
+
+
+def _excitation(model: Model, name: str, duration: float, rate: float,
+                column: list[str]) -> Recording:
+    from pathlib import Path
+
+    from pikanid import excitation
+    from pikanid.recording import Recording
+
+    if name not in BUILT_IN:
+        import difflib
+
+        if "." not in name and not Path(name).exists():
+            close = difflib.get_close_matches(name, BUILT_IN, 1)
+            raise errors.BadSetting(errors.unknown_excitation(name, BUILT_IN, close))
+        rec = Recording.read(name, assignments("--column", column, "u_x=acceleration"))
+        rec = rec.with_hold(**{i.name: i.hold for i in model.inputs
+                               if i.name in rec and rec[i.name].hold is None})
+        if model.inputs and not any(i in rec for i in model.input_names):
+            raise errors.BadRecording(errors.nothing_to_simulate(name))
+        return rec
+    if not rate > 0:
+        raise errors.BadSetting(errors.bad_rate(rate))
+    # The profile drives the model's own inputs, in their own units.
+    required = [i for i in model.inputs if i.default is None] or list(model.inputs)
+    driven = required[:1]
+    channel = driven[0].name if driven else "u"
+    settings = {"duration": duration, "dt": 1 / rate}
+    if name in ("two_pulse", "move"):
+        rec = getattr(excitation, name)(channel=channel, **settings)
+    else:
+        rec = getattr(excitation, name)(channels=[i.name for i in required] or [channel], **settings)
+    for item in required:
+        if item.name in rec and item.unit:
+            rec = rec.with_unit(item.name, item.unit)
+    return rec
+
+
+def _sigmas(model: Model, texts: list[str]) -> dict[str, float]:
+    common = [text for text in texts if "=" not in text]
+    named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
+    if len(common) > 1:
+        raise errors.BadSetting(errors.named_twice("--sigma", "all outputs"))
+    wanted = {**{o: common[0] for o in model.output_names if common}, **named}
+    made = {name: quantity(text, model.output(name).unit, f"--sigma {name}", difference=True)
+            for name, text in wanted.items()}
+    for name, value in made.items():
+        if value < 0:
+            raise errors.BadSetting(errors.sigma_not_positive(wanted[name]))
+    return made

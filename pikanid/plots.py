@@ -1,0 +1,187 @@
+"""Figures of fits: measured against fitted, and what is left over.
+
+Every function returns a `matplotlib.figure.Figure` of its own and leaves pyplot, its list of open
+figures and matplotlib's settings alone.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.writing import atomically
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe & Ito, Color Universal Design (2008): told apart by colour-blind readers, too.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MEASURED = "#555555"
+BAND = "#BBBBBB"
+ENDINGS = (".png", ".svg", ".pdf")
+# Beyond this many samples markers merge into a band: draw a thin line instead.
+MANY = 2000
+DPI = 130
+
+
+class FitLike(Protocol):
+    """What is drawn of one output of one recording: see `pikanid.estimate.Fit`."""
+
+    @property
+    def recording(self) -> str: ...
+    @property
+    def output(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def t(self) -> np.ndarray: ...
+    @property
+    def measured(self) -> np.ndarray: ...
+    @property
+    def fitted(self) -> np.ndarray: ...
+    @property
+    def sigma(self) -> np.ndarray | None: ...
+
+
+def plot_fits(fits: Sequence[FitLike], title: str = "") -> Figure:
+    """Measured against fitted (left) and the residual (right), a row for every output.
+
+    The grey band of the residual is ±2σ where the noise σ is known.
+
+    >>> from types import SimpleNamespace
+    >>> t = np.linspace(0, 1, 50)
+    >>> fit = SimpleNamespace(recording="run", output="theta", unit="rad", t=t,
+    ...                       measured=np.sin(t), fitted=np.sin(t), sigma=None)
+    >>> [axes.get_ylabel() for axes in plot_fits([fit]).axes]
+    ['theta [rad]', 'residual [rad]']
+    """
+    return plot_strategies({"fitted": fits}, title)
+
+
+def plot_strategies(fits: Mapping[str, Sequence[FitLike]], title: str = "") -> Figure:
+    """As `plot_fits`, with one colour for every strategy; all of them fitted the same samples.
+
+    Parameters
+    ----------
+    fits : name in the legend -> fits, in the same order for every name
+    title : of the whole figure
+    """
+    rows = list(zip(*fits.values(), strict=True))
+    figure = new_figure(11.0, 0.7 + 2.7 * max(len(rows), 1))
+    if title:
+        figure.suptitle(title, fontsize="medium")
+    if not rows:
+        return figure
+    grid = figure.subplots(len(rows), 2, squeeze=False, sharex="row")
+    several = len({fit.recording for fit, *_ in rows}) > 1
+    for row, (left, right) in zip(rows, grid, strict=True):
+        _curves(left, dict(zip(fits, row, strict=True)))
+        _residuals(right, dict(zip(fits, row, strict=True)))
+        if several:
+            left.set_title(row[0].recording, fontsize="small", loc="left")
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]")
+    return figure
+
+
+def _curves(axes: Axes, fits: Mapping[str, FitLike]) -> None:
+    first = next(iter(fits.values()))
+    order = np.argsort(first.t, kind="stable")
+    style: dict[str, Any] = (
+        {"marker": ".", "markersize": 4, "linestyle": "none"}
+        if len(first.t) <= MANY else {"linewidth": 1.6})
+    axes.plot(first.t[order], first.measured[order], color=MEASURED, label="measured", **style)
+    for (name, fit), colour in zip(fits.items(), _cycled(len(fits)), strict=True):
+        order = np.argsort(fit.t, kind="stable")
+        axes.plot(fit.t[order], fit.fitted[order], color=colour, linewidth=1.2, label=name)
+    axes.set_ylabel(labelled(first.output, first.unit))
+    # Above the axes: inside, a legend would cover an oscillation somewhere.
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(fits) + 1, frameon=False,
+                fontsize="small", borderaxespad=0.1, handlelength=1.4)
+    tidy(axes)
+
+
+def _residuals(axes: Axes, fits: Mapping[str, FitLike]) -> None:
+    first = next(iter(fits.values()))
+    order = np.argsort(first.t, kind="stable")
+    if first.sigma is not None:
+        spread = 2 * first.sigma[order]
+        axes.fill_between(first.t[order], -spread, spread, color=BAND, alpha=0.5, linewidth=0,
+                          label="±2σ of the noise")
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small",
+                    borderaxespad=0.1, handlelength=1.4)
+    for fit, colour in zip(fits.values(), _cycled(len(fits)), strict=True):
+        order = np.argsort(fit.t, kind="stable")
+        axes.plot(fit.t[order], (fit.measured - fit.fitted)[order], color=colour, linewidth=0.7)
+    axes.axhline(0.0, color="black", linewidth=0.6)
+    axes.set_ylabel(labelled("residual", first.unit))
+    tidy(axes)
+
+
+def labelled(name: str, unit: str) -> str:
+    """An axis label; `$` and the like in a name mean themselves.
+
+    >>> labelled("theta", "rad"), labelled("x", "")
+    ('theta [rad]', 'x [-]')
+    """
+    return f"{name} [{unit or '-'}]".replace("$", r"\$")
+
+
+def tidy(axes: Axes) -> None:
+    """The look that all figures share."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, linewidth=0.4, alpha=0.5)
+    axes.tick_params(labelsize="small")
+    axes.margins(x=0.01)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inch] that pyplot knows nothing of and that a notebook shows."""
+    return _shown()(figsize=(width, height), layout="constrained")
+
+
+def image(figure: Figure, ending: str = ".png") -> bytes:
+    """A figure as the content of an image file, without the date."""
+    buffer = io.BytesIO()
+    dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}[ending]
+    figure.savefig(buffer, format=ending[1:], dpi=DPI, metadata=dates)
+    return buffer.getvalue()
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure to a .png, .svg or .pdf file, atomically.
+
+    Raises
+    ------
+    pikanid.errors.BadSetting : the name ends otherwise
+    pikanid.errors.BadRecording : the place cannot be written to
+    """
+    file = Path(path)
+    ending = file.suffix.lower()
+    if ending not in ENDINGS:
+        raise errors.BadSetting(errors.output_ending("The figure", str(path), ENDINGS))
+    atomically(file, image(figure, ending))
+
+
+def _cycled(count: int) -> list[str]:
+    return [COLOURS[k % len(COLOURS)] for k in range(count)]
+
+
+@cache
+def _shown() -> type[Figure]:
+    """Figure with the method by which notebooks show an object; made when matplotlib is needed."""
+    from matplotlib.figure import Figure as Plain
+
+    class Figure(Plain):
+        def _repr_png_(self) -> bytes:
+            return image(self)
+
+    return Figure

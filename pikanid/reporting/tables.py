@@ -1,0 +1,126 @@
+"""Tables of estimates and models, for a terminal or a pipe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from pikanid.reporting.console import sentence
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from pikanid.estimate import Estimate
+    from pikanid.model import Model
+
+VERDICTS = {"fits": "fits", "misfit": "MISFIT", "unknown": "not judged"}
+
+
+def table(*headers: str, numbers: Iterable[str] = ()) -> Table:
+    """An empty table; columns named in `numbers` are set to the right."""
+    from rich import box
+    from rich.table import Table
+
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    right = set(numbers)
+    for header in headers:
+        made.add_column(header, justify="right" if header in right else "left", overflow="fold")
+    return made
+
+
+def row(made: Table, *cells: str, style: str | None = None) -> None:
+    """Add a row of plain text: brackets in a unit are no markup."""
+    from rich.text import Text
+
+    made.add_row(*(Text(sentence(cell)) for cell in cells), style=style)
+
+
+def verdict(estimate: Estimate) -> str:
+    """The verdict in a word or two."""
+    return VERDICTS[estimate.adequacy.verdict] if estimate.converged else "not converged"
+
+
+def parameters(estimates: Sequence[Estimate]) -> Table:
+    """Estimate, standard error and 95 % interval of every parameter, by strategy if several."""
+    from pikanid.estimate import rounded
+
+    several = len(estimates) > 1
+    made = table(*(["strategy"] if several else []), "parameter", "estimate ± std. error",
+                 "95 % interval", "unit", *(["verdict", "time"] if several else []))
+    for estimate in estimates:
+        ends = [verdict(estimate), f"{estimate.seconds:.3g} s"] if several else []
+        first = [estimate.strategy] if several else []
+        style = None if estimate.ok else "yellow"
+        for f in estimate.free:
+            low, high = estimate.interval(f.name, recording=f.recording)
+            value = rounded(estimate.value(f.name, f.recording), estimate.std(f.name, f.recording))
+            interval = f"{low:.6g} … {high:.6g}" if low < high else "unknown"
+            row(made, *first, f.label, value, interval, f.unit, *ends, style=style)
+            first, ends = first and [""], ends and ["", ""]
+    return made
+
+
+def show_estimates(out: Console, estimates: Sequence[Estimate], failed: Mapping[str, str]) -> None:
+    """The table, the verdicts as sentences, and every warning once."""
+    head = estimates[0]
+    title = f"{head.model.name}: {head.n} samples"
+    if len(estimates) == 1:
+        title = f"{head.strategy} estimate of {title}, {head.seconds:.3g} s"
+    _say(out, title, "bold")
+    out.print()
+    out.print(parameters(estimates))
+    out.print()
+    for estimate in estimates:
+        prefix = f"{estimate.strategy}: " if len(estimates) > 1 else ""
+        _say(out, prefix + estimate.sentence(), "green" if estimate.ok else "bold red")
+    for text, owners in _shared_warnings(estimates).items():
+        who = "" if len(owners) == len(estimates) else f" ({', '.join(owners)})"
+        _say(out, f"Warning{who}: {text}", "yellow")
+    for name, why in failed.items():
+        _say(out, f"{name} could not be used: {why}", "yellow")
+
+
+def show_model(out: Console, model: Model, toml: str) -> None:
+    """Equations, parameters and the model file."""
+    from pikanid.expressions import to_text
+
+    _say(out, model.name, "bold")
+    out.print()
+    for name, equation in model.equations.items():
+        _say(out, f"  d({name})/dt = {to_text(equation)}")
+    for output in model.outputs:
+        _say(out, f"  measured {output.name} = {to_text(output.expression)}")
+    out.print()
+    signals = table("signal", "kind", "unit", "remark")
+    for state in model.states:
+        row(signals, state.name, "state", state.unit, f"starts at {to_text(state.initial)}")
+    for item in model.inputs:
+        missing = "must be recorded" if item.default is None else f"{item.default:g} if not recorded"
+        row(signals, item.name, "input", item.unit, f"{item.hold}-order hold, {missing}")
+    for output in model.outputs:
+        row(signals, output.name, "output", output.unit,
+            "" if output.sigma is None else f"sigma = {output.sigma:g}")
+    out.print(signals)
+    out.print()
+    values = table("parameter", "value", "unit", "role", "bounds", "description", numbers=["value"])
+    for p in model.parameters:
+        bounds = f"{p.bounds[0]:g} … {p.bounds[1]:g}"
+        row(values, p.name, f"{p.value:g}", p.unit, "estimated" if p.free else "fixed",
+            bounds if p.free else "", p.description)
+    out.print(values)
+    out.print()
+    _say(out, "# the same as a model file", "dim")
+    _say(out, toml)
+
+
+def _say(out: Console, text: str, style: str | None = None) -> None:
+    out.print(text, style=style, markup=False, soft_wrap=True)
+
+
+def _shared_warnings(estimates: Sequence[Estimate]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for estimate in estimates:
+        for text in estimate.warnings:
+            found.setdefault(sentence(text), []).append(estimate.strategy)
+    return found
