@@ -63,11 +63,11 @@ def settings(seed: int = 0) -> Iterator[Setting]:
                         grid,
                         horizon,
                         weight,
-                        n,
-                        m,
-                        even,
-                        kinks,
-                        seed + number,
+                        samples=n,
+                        collocation=m,
+                        even=even,
+                        kinks=kinks,
+                        seed=seed + number,
                     )
                     number += 1
 

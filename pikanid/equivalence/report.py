@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -101,12 +104,30 @@ class EquivalenceReport:
         ]
         return "\n\n".join(parts) + "\n"
 
+    def write(self, folder: str | os.PathLike[str]) -> Path:
+        """Write equivalence.md and its figure equivalence.png into ``folder``; the page's path."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        picture = io.BytesIO()
+        self.plot().savefig(picture, format="png", dpi=110)
+        text = self.to_markdown().replace(
+            "## What must differ", "![differences](equivalence.png)\n\n## What must differ", 1
+        )
+        for name, content in (
+            ("equivalence.png", picture.getvalue()),
+            ("equivalence.md", text.encode()),
+        ):
+            part = folder / f".{name}.{os.getpid()}.part"
+            part.write_bytes(content)
+            os.replace(part, folder / name)
+        return folder / "equivalence.md"
+
     def plot(self) -> Figure:
         """Every difference on a logarithmic axis: agreements, their bounds, and controls."""
         from matplotlib.figure import Figure
 
         labels = list(dict.fromkeys((row.must_differ, _label(row)) for row in self.rows))
-        figure = Figure(figsize=(8.0, 1.0 + 0.28 * len(labels)), layout="constrained")
+        figure = Figure(figsize=(10.0, 1.0 + 0.28 * len(labels)), layout="constrained")
         axes = figure.add_subplot()
         floor = 1e-17
         for height, (differs, label) in enumerate(labels):
@@ -118,7 +139,8 @@ class EquivalenceReport:
         axes.set_xscale("log")
         axes.set_yticks(range(len(labels)), [label for _, label in labels], fontsize=8)
         axes.invert_yaxis()
-        axes.set_xlabel("relative difference (bars: bounds; orange: must lie to their right)")
+        axes.set_xlabel("relative difference")
+        axes.set_title("bars: bounds; blue must lie to their left, orange to their right", size=9)
         axes.grid(axis="x", alpha=0.3)
         return figure
 

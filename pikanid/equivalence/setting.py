@@ -137,6 +137,7 @@ def motion(system: str, horizon: float, t: Array) -> Array:
         here = (t >= left) & (t <= right)
         if path.sol is None:
             raise errors.SimulationFailed(errors.not_finite(left, str(state)))
-        found[here] = path.sol(t[here])[0]
+        if here.any():
+            found[here] = path.sol(t[here])[0]
         state = path.y[:, -1]
     return found
