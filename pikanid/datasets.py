@@ -12,15 +12,17 @@ from __future__ import annotations
 import gzip
 import hashlib
 import os
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from pikanid import errors, origins
+from pikanid import datasets_origins as origins
+from pikanid import errors
 from pikanid.channel import Channel
-from pikanid.origins import Origin
+from pikanid.datasets_origins import Origin
 from pikanid.reading import csv, mat, spreadsheet
 from pikanid.recording import Recording
 
@@ -229,9 +231,12 @@ def _downloaded(origin: Origin) -> Path:
 
 
 def _checked(path: Path, origin: Origin) -> bytes:
-    content = path.read_bytes()
-    if path.suffix == ".gz":
-        content = gzip.decompress(content)
+    try:
+        content = path.read_bytes()
+        if path.suffix == ".gz":
+            content = gzip.decompress(content)
+    except (OSError, EOFError, zlib.error):
+        content = b""
     if hashlib.sha256(content).hexdigest() != origin.sha256:
         raise errors.DatasetUnavailable(errors.dataset_altered(str(path), origin.url))
     return content

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pikanid import channel as channels_of
-from pikanid import errors, resampling, units
+from pikanid import errors
 from pikanid.channel import Array, Channel, Hold
+from pikanid.recording_operations import Operations
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +28,7 @@ __all__ = ["Channel", "Hold", "Recording"]
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(Operations):
     """Signals measured together.
 
     Attributes:
@@ -193,24 +194,9 @@ class Recording:
     __hash__ = None  # type: ignore[assignment]  # equal by content, which no hash should walk
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the channels, in order."""
-        return tuple(self.channels)
-
-    @property
     def t(self) -> Array:
         """(N,) times [s] of the first channel."""
         return next(iter(self.channels.values())).time
-
-    @property
-    def start(self) -> float:
-        """First time of any channel [s]."""
-        return min((float(ch.time[0]) for ch in self.channels.values() if len(ch)), default=0.0)
-
-    @property
-    def stop(self) -> float:
-        """Last time of any channel [s]."""
-        return max((float(ch.time[-1]) for ch in self.channels.values() if len(ch)), default=0.0)
 
     def as_input(self, name: str, unit: str | None = None) -> Channel:
         """The channel `name`, fit to drive a model: rising times, nothing missing.
@@ -255,145 +241,8 @@ class Recording:
         stated = found if found.unit or not unit else replace(found, unit=unit)
         return stated.converted(stated.unit if unit is None else unit)
 
-    # --- preparing -------------------------------------------------------------------------------
-
-    def _with(self, channels: Mapping[str, Channel], *notes: str) -> Recording:
+    def _with(self, channels: Mapping[str, Channel], *notes: str) -> Self:
         return replace(self, channels=channels, notes=(*self.notes, *notes))
-
-    def window(self, start: float | None = None, stop: float | None = None) -> Recording:
-        """The part with start <= t <= stop; times stay as they are.
-
-        >>> rec = Recording.from_arrays([0, 1, 2, 3], {"y": [0, 1, 2, 3]})
-        >>> rec.window(1, 2)["y"].values.tolist()
-        [1.0, 2.0]
-        """
-        a = self.start if start is None else start
-        b = self.stop if stop is None else stop
-        cut = {key: resampling.window(ch, a, b) for key, ch in self.channels.items()}
-        return self._with(cut)
-
-    def split(self, at: float) -> tuple[Recording, Recording]:
-        """The part with t < at, and the part with t >= at.
-
-        >>> a, b = Recording.from_arrays([0, 1, 2, 3], {"y": [0, 1, 2, 3]}).split(2)
-        >>> a.t.tolist(), b.t.tolist()
-        ([0.0, 1.0], [2.0, 3.0])
-        """
-        before = {
-            key: resampling.window(ch, self.start, at, closed=False)
-            for key, ch in self.channels.items()
-        }
-        return self._with(before), self.window(start=at)
-
-    def decimate(
-        self, n: int, filter: bool = False, channels: Iterable[str] | None = None
-    ) -> Recording:
-        """Every n-th sample of every channel, or of `channels`.
-
-        A channel with a declared hold is an input that is known between its samples: it is
-        thinned only where that leaves the held function as it was, and never filtered; otherwise
-        it keeps its full rate, and a note says so.
-
-        Args:
-            n: Keep samples 0, n, 2n, ...
-            filter: Low-pass first (zero phase), so that nothing aliases.
-            channels: Names of the channels to thin; all by default.
-
-        Raises:
-            BadSetting: If n < 1.
-            BadRecording: If a channel is missing, or `filter` meets gaps or uneven times.
-
-        >>> rec = Recording.from_arrays([0, 1, 2, 3, 4], {"y": [0, 1, 2, 3, 4]})
-        >>> rec.decimate(2)["y"].values.tolist()
-        [0.0, 2.0, 4.0]
-        """
-        if n != int(n) or n < 1:
-            raise errors.BadSetting(errors.bad_stride(n))
-        thin, notes = dict(self.channels), []
-        for key in self.names if channels is None else channels:
-            ch = self[key]
-            if ch.hold is not None:
-                if resampling.survives_stride(ch, int(n)):
-                    thin[key] = resampling.stride(ch, int(n))
-                else:
-                    notes.append(f"Input '{key}' keeps its full rate: thinning would change it.")
-            elif filter:
-                thin[key] = resampling.filtered_stride(ch, int(n), self.name)
-            else:
-                thin[key] = resampling.stride(ch, int(n))
-        return self._with(thin, *notes)
-
-    def rename(self, names: Mapping[str, str]) -> Recording:
-        """Channels under new names: old name -> new name.
-
-        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).rename({"y": "theta"}).names
-        ('theta',)
-        """
-        for old in names:
-            self[old]
-        renamed = [names.get(key, key) for key in self.names]
-        for key in renamed:
-            if renamed.count(key) > 1:
-                raise errors.BadRecording(errors.channel_twice(key, self.name))
-        return self._with(dict(zip(renamed, self.channels.values(), strict=True)))
-
-    def with_channels(self, *channels: Channel) -> Recording:
-        """With channels added, or replaced where the name is the same.
-
-        >>> rec = Recording.from_arrays([0, 1], {"y": [0, 1]})
-        >>> rec.with_channels(Channel("u", [0, 1], [1, 1])).names
-        ('y', 'u')
-        """
-        return self._with({**self.channels, **{ch.name: ch for ch in channels}})
-
-    def with_channel(self, channel: Channel) -> Recording:
-        """With one channel added or replaced."""
-        return self.with_channels(channel)
-
-    def without(self, *names: str) -> Recording:
-        """Without these channels.
-
-        >>> Recording.from_arrays([0, 1], {"y": [0, 1], "u": [0, 0]}).without("u").names
-        ('y',)
-        """
-        for key in names:
-            self[key]
-        return self._with({key: ch for key, ch in self.channels.items() if key not in names})
-
-    def with_sigma(
-        self, sigma: Mapping[str, Any] | None = None, /, **more: ArrayLike | None
-    ) -> Recording:
-        """With noise standard deviations, in the channels' own units; None takes one away.
-
-        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).with_sigma(y=0.1)["y"].sigma
-        0.1
-        """
-        given = {**(sigma or {}), **more}
-        return self.with_channels(*(replace(self[k], sigma=s) for k, s in given.items()))
-
-    def with_unit(self, name: str, unit: str) -> Recording:
-        """With another unit text on a channel whose values are right and whose unit is not.
-
-        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).with_unit("y", "mm")["y"].unit
-        'mm'
-        """
-        return self.with_channels(replace(self[name], unit=units.parse(unit)))
-
-    def with_hold(self, **hold: Hold) -> Recording:
-        """With the hold of inputs declared.
-
-        >>> Recording.from_arrays([0, 1], {"u": [0, 1]}).with_hold(u="first")["u"].hold
-        'first'
-        """
-        return self.with_channels(*(replace(self[k], hold=h) for k, h in hold.items()))
-
-    def shift(self, name: str, seconds: float) -> Recording:
-        """With one channel moved later by `seconds`.
-
-        >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).shift("y", 0.5)["y"].time.tolist()
-        [0.5, 1.5]
-        """
-        return self.with_channels(replace(self[name], time=self[name].time + seconds))
 
     # --- leaving ---------------------------------------------------------------------------------
 

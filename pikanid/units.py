@@ -1,7 +1,7 @@
 """Physical units: reading unit texts, and converting arrays between them.
 
-Unit texts are read by a small grammar of our own (names, ``*`` ``/`` ``^`` and parentheses); only
-single names such as ``mV`` reach pint, so that nothing a file contains is ever evaluated.  Angles
+Unit texts are read by a small grammar of our own (`pikanid.units_grammar`); only single names such
+as ``mV`` reach pint, so that nothing a file contains is ever evaluated.  Angles
 are radians and count as dimensionless, as in the SI: ``1/(s^2*rad^2)`` and ``1/s^2`` convert.
 
 >>> from pikanid import units
@@ -22,24 +22,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pikanid import errors
+from pikanid.units_grammar import Powers, powers, written
 
 if TYPE_CHECKING:
     import pint
-
-Powers = dict[str, Fraction]
 
 # Already in normal form: these cost no import of pint (0.4 s).
 _PLAIN = frozenset(
     ["", "1", "s", "m", "rad", "deg", "V", "N", "kg", "m/s", "m/s^2", "rad/s", "rad/s^2"]
 )
 _OFFSET = frozenset(["degC", "degF"])
-_NOTHING = frozenset(["", "1", "-", "--", "none", "dimensionless", "unitless"])
 _SYMBOLS = {"Ω": "ohm", "°C": "degC", "°F": "degF", "°R": "degR", "°": "deg", "Å": "angstrom"}
 _SPOKEN = {"°": "deg", "°C": "degC", "°F": "degF", "%": "percent"}
-_TOKEN = re.compile(r"\s*(\*\*|[*/^()·⋅]|[+-]?\d+(?:\.\d+)?|%|°[CF]?|[^\W\d_]\w*)\s*")
-_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_LONGEST = 80
-_LARGEST_POWER = 12
 
 
 @lru_cache(maxsize=1)
@@ -73,7 +67,7 @@ def parse(text: str) -> str:
 
 @lru_cache(maxsize=512)
 def _parse(text: str) -> str:
-    return _written(_powers(text))
+    return written(powers(text, _symbol))
 
 
 def is_unit(text: str) -> bool:
@@ -157,18 +151,18 @@ def product(*factors: tuple[str, int]) -> str:
     """
     total: Powers = {}
     for text, power in factors:
-        for name, exponent in _powers(parse(text)).items():
+        for name, exponent in powers(parse(text), _symbol).items():
             total[name] = total.get(name, Fraction(0)) + exponent * power
-    return _written({name: power for name, power in total.items() if power})
+    return written({name: power for name, power in total.items() if power})
 
 
 def _unit(normal: str, delta: bool = False) -> pint.Unit:
     """pint's unit; temperature scales lose their offset in products, or when `delta` asks."""
     registry = _registry()
-    powers = _powers(normal)
-    scale = not delta and list(powers.values()) == [1]
+    found = powers(normal, _symbol)
+    scale = not delta and list(found.values()) == [1]
     unit = registry.Unit("")
-    for name, power in powers.items():
+    for name, power in found.items():
         known = name if scale or name not in _OFFSET else f"delta_{name}"
         unit = unit * registry.Unit(known) ** (
             int(power) if power.denominator == 1 else float(power)
@@ -178,103 +172,13 @@ def _unit(normal: str, delta: bool = False) -> pint.Unit:
 
 def _fitting(source: str, target: str, a: pint.Unit, b: pint.Unit) -> tuple[pint.Unit, pint.Unit]:
     # pint takes 1 Hz for 1 rad/s; whether a cycle or a radian is meant makes a factor of 2 pi.
-    cycles = any("Hz" in x and "rad" in y for x, y in ((source, target), (target, source)))
+    cycles = any(
+        "Hz" in x and "rad" in y and "Hz" not in y and not re.search("rad|deg|turn", x)
+        for x, y in ((source, target), (target, source))
+    )
     if cycles or not a.is_compatible_with(b):
         raise errors.BadUnit(errors.units_differ(source, target))
     return a, b
-
-
-def _powers(text: str) -> Powers:
-    """Units and their exponents, in the order in which they are written."""
-    if text.casefold() in _NOTHING:
-        return {}
-    if len(text) > _LONGEST:
-        raise errors.BadUnit(errors.unknown_unit(text))
-    tokens = _tokens(text)
-    powers, end = _product(tokens, 0, text)
-    if end != len(tokens):
-        raise errors.BadUnit(errors.unknown_unit(text))
-    return {name: power for name, power in powers.items() if power}
-
-
-def _tokens(text: str) -> list[str]:
-    # A superscript is a power without its sign: m² is m^2.
-    plain = re.sub(
-        "[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+", lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text.strip()
-    )
-    tokens: list[str] = []
-    position = 0
-    while position < len(plain):
-        found = _TOKEN.match(plain, position)
-        if found is None:
-            raise errors.BadUnit(errors.unknown_unit(text))
-        token = found[1]
-        tokens.append({"**": "^", "·": "*", "⋅": "*"}.get(token, token))
-        position = found.end()
-    return tokens
-
-
-def _product(tokens: list[str], start: int, text: str) -> tuple[Powers, int]:
-    """``term (('*' | '/' | nothing) term)*``; a missing sign between two terms multiplies."""
-    total, position = _term(tokens, start, text)
-    while position < len(tokens) and tokens[position] != ")":
-        sign = 1
-        if tokens[position] in "*/":
-            sign = 1 if tokens[position] == "*" else -1
-            position += 1
-        powers, position = _term(tokens, position, text)
-        for name, power in powers.items():
-            total[name] = total.get(name, Fraction(0)) + sign * power
-    return total, position
-
-
-def _term(tokens: list[str], position: int, text: str) -> tuple[Powers, int]:
-    """A name, ``1`` or a parenthesis, with an optional power."""
-    if position >= len(tokens):
-        raise errors.BadUnit(errors.unknown_unit(text))
-    token = tokens[position]
-    if token == "(":
-        powers, position = _product(tokens, position + 1, text)
-        if position >= len(tokens) or tokens[position] != ")":
-            raise errors.BadUnit(errors.unknown_unit(text))
-    elif token == "1":
-        powers = {}
-    else:
-        powers = _named(token, text)
-    position += 1
-    if position < len(tokens) and tokens[position] == "^":
-        exponent, position = _exponent(tokens, position + 1, text)
-        powers = {name: power * exponent for name, power in powers.items()}
-    return powers, position
-
-
-def _exponent(tokens: list[str], position: int, text: str) -> tuple[Fraction, int]:
-    """A number, or a number or fraction in parentheses: ``2``, ``-2``, ``0.5``, ``(1/2)``."""
-    if position < len(tokens) and tokens[position] == "(":
-        stop = tokens.index(")", position) if ")" in tokens[position:] else len(tokens)
-        inside, position = "".join(tokens[position + 1 : stop]), stop + 1
-    else:
-        inside, position = "".join(tokens[position : position + 1]), position + 1
-    if not re.fullmatch(r"[+-]?\d{1,4}(\.\d{1,6})?|[+-]?\d{1,4}/\d{1,4}", inside, re.ASCII):
-        raise errors.BadUnit(errors.unknown_unit(text))
-    top, _, bottom = inside.partition("/")
-    if bottom and int(bottom) == 0:
-        raise errors.BadUnit(errors.unknown_unit(text))
-    value = Fraction(top) / Fraction(bottom or 1)
-    if abs(value) > _LARGEST_POWER:
-        raise errors.BadUnit(errors.unknown_unit(text))
-    return value, position
-
-
-def _named(token: str, text: str) -> Powers:
-    symbol = _symbol(token)
-    if symbol:
-        return {symbol: Fraction(1)}
-    # "m/s2" is common in the headers of instruments.
-    name, power = token[:-1], token[-1:]
-    if power in tuple("234") and (symbol := _symbol(name)):
-        return {symbol: Fraction(power)}
-    raise errors.BadUnit(errors.unknown_unit(text))
 
 
 @lru_cache(maxsize=512)
@@ -291,21 +195,3 @@ def _symbol(name: str) -> str:
         return ""
     symbol = _SYMBOLS.get(symbol, symbol.replace("µ", "u").replace("Ω", "ohm"))
     return symbol if symbol.isidentifier() else spoken
-
-
-def _written(powers: Powers) -> str:
-    above = [_power(name, power) for name, power in powers.items() if power > 0]
-    below = [_power(name, -power) for name, power in powers.items() if power < 0]
-    if not below:
-        return "*".join(above)
-    bottom = below[0] if len(below) == 1 else f"({'*'.join(below)})"
-    return f"{'*'.join(above) or '1'}/{bottom}"
-
-
-def _power(name: str, power: Fraction) -> str:
-    if power == 1:
-        return name
-    if power.denominator == 1:
-        return f"{name}^{power}"
-    decimal = f"{float(power):.6g}"
-    return f"{name}^{decimal}" if Fraction(decimal) == power else f"{name}^({power})"
