@@ -31,7 +31,10 @@ pytestmark = pytest.mark.kan
 
 @pytest.fixture(scope="module")
 def report() -> EquivalenceReport:
-    return run_checks(quick=True)
+    parts: list[str] = []
+    found = run_checks(quick=True, progress=parts.append)
+    assert len(parts) > 20 and parts[-1] == "degree 2 at the end"
+    return found
 
 
 def rows(report: EquivalenceReport, check: str, quantity: str | None = None) -> list[Check]:
