@@ -53,7 +53,7 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
     >>> judge([r], [np.full(500, 1.0)], [r], 2).verdict
     'misfit'
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     count = sum(map(len, residuals))
     dof = max(count - n_free, 1)
@@ -61,7 +61,7 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
         return Adequacy(np.nan, dof, np.nan, "unknown", "none")
     if all(s is not None for s in sigmas):
         value = float(sum(np.sum((r / s) ** 2) for r, s in zip(residuals, sigmas, strict=True)))
-        p = float(chi2.sf(value, dof))
+        p = float(chdtrc(dof, value))
         return Adequacy(value, dof, p, "fits" if p >= alpha else "misfit", "given")
     value, threshold = 0.0, 0.0
     for r, s, y in zip(residuals, sigmas, data, strict=True):
@@ -71,7 +71,7 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
         threshold += len(r)
     # the noise is itself estimated, and coloured noise fools differences: ask for a factor of four
     verdict: Verdict = "misfit" if value > 4 * threshold else "fits"
-    return Adequacy(value, dof, float(chi2.sf(value, dof)), verdict, "differences")
+    return Adequacy(value, dof, float(chdtrc(dof, value)), verdict, "differences")
 
 
 def difference_noise(y: np.ndarray, order: int = 4) -> float:

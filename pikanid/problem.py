@@ -32,6 +32,8 @@ class HeldInput:
     def at(self, t: np.ndarray, delay: float = 0.0, side: Literal["left", "right"] = "right"
            ) -> np.ndarray:
         """Values at times t (M,), `delay` seconds late; outside the record its end values."""
+        if len(self.time) == 1:
+            return np.full(len(t), self.values[0])
         shifted = np.asarray(t, float) - delay
         if self.hold == "first":
             return np.interp(shifted, self.time, self.values)
@@ -205,15 +207,26 @@ class Problem:
 
     def columns(self, r: int) -> tuple[np.ndarray, np.ndarray]:
         """Positions in p and in θ of the parameters that recording r is estimated with."""
+        return self._columns[r]
+
+    @functools.cached_property
+    def _columns(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
         names = self.model.parameter_names
-        here = [(names.index(f.name), k) for k, f in enumerate(self.free)
-                if f.recording in (None, r)]
-        pairs = np.array(here, dtype=np.int64).reshape(-1, 2)
-        return pairs[:, 0], pairs[:, 1]
+        found = []
+        for r in range(len(self.experiments)):
+            here = [(names.index(f.name), k) for k, f in enumerate(self.free)
+                    if f.recording in (None, r)]
+            pairs = np.array(here, dtype=np.int64).reshape(-1, 2)
+            found.append((pairs[:, 0].copy(), pairs[:, 1].copy()))
+        return tuple(found)
+
+    @functools.cached_property
+    def _values(self) -> np.ndarray:
+        return np.array(list(self.model.values.values()))
 
     def parameters(self, theta: np.ndarray, r: int) -> np.ndarray:
         """All parameters p (P,) of recording r."""
-        p = np.array(list(self.model.values.values()))
+        p = self._values.copy()
         inside, outside = self.columns(r)
         p[inside] = theta[outside]
         return p

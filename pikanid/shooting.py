@@ -52,7 +52,8 @@ class Shooting:
                 signal = min(float(np.ptp(s.y)) for s in samples if len(s.t))
                 known = all(s.sigma is not None for s in samples)
                 tolerance = min(tolerance * (10 if known else 1e5), 1e-3 * signal)
-            self.steps.append(simulator.choose_steps(p, tolerance, self.method))
+            known = old[r] if old and accuracy == "fine" else None
+            self.steps.append(simulator.choose_steps(p, tolerance, self.method, known))
         self._at = None
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
@@ -71,23 +72,27 @@ class Shooting:
         return self._evaluate(theta)[1]
 
     def _evaluate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if self._kept is None or self._at is None or not np.array_equal(self._at, theta):
+        if self._kept is None or self._at is None or (self._at != theta).any():
             self._at, self._kept = np.array(theta), self._simulate(theta)
         return self._kept
 
     def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        jacobian = np.zeros((self.rows, len(theta)))
-        predicted = np.empty(self.rows)
-        row = 0
-        for response, (_, outside) in zip(self.responses(theta), self.columns, strict=True):
-            if not response.finished:
-                return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
-            end = row + len(response.y)
-            predicted[row:end] = response.y
-            jacobian[row:end, outside] = response.sensitivity
-            row = end
+        responses = self.responses(theta)
+        if not all(r.finished for r in responses):
+            return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
+        if len(responses) == 1:
+            predicted, jacobian = responses[0].y, responses[0].sensitivity
+        else:
+            predicted = np.concatenate([r.y for r in responses])
+            jacobian = np.zeros((self.rows, len(theta)))
+            row = 0
+            for r, (_, outside) in zip(responses, self.columns, strict=True):
+                jacobian[row:row + len(r.y), outside] = r.sensitivity
+                row += len(r.y)
+        predicted -= self.y
+        predicted *= self.weights
         jacobian *= self.weights[:, None]
-        return (predicted - self.y) * self.weights, jacobian
+        return predicted, jacobian
 
     def adequacy(self, theta: np.ndarray) -> Adequacy:
         """The χ² verdict at θ."""

@@ -105,7 +105,7 @@ def covariance(jacobian: np.ndarray, estimated: np.ndarray) -> np.ndarray:
     n = jacobian.shape[1]
     result = np.full((n, n), np.nan)
     inside = np.flatnonzero(estimated)
-    J = jacobian[:, inside]
+    J = np.linalg.qr(jacobian[:, inside], mode="r")
     norms = np.linalg.norm(J, axis=0) if len(inside) else np.empty(0)
     seen = norms > 0
     block = np.zeros((len(inside), len(inside)))
@@ -124,9 +124,9 @@ def identifiability_warnings(jacobian: np.ndarray, free: Sequence[FreeParameter]
                              estimated: np.ndarray, limit: float = 1e6) -> list[str]:
     """Sentences about parameters, or combinations of them, that the data do not determine."""
     names = [f.label for f, e in zip(free, estimated, strict=True) if e]
-    J = jacobian[:, estimated]
     if not names:
         return []
+    J = np.linalg.qr(jacobian[:, estimated], mode="r")
     norms = np.linalg.norm(J, axis=0)
     notes = [errors.no_influence(n) for n, size in zip(names, norms, strict=True) if size == 0]
     seen = norms > 0

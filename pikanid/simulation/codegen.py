@@ -82,6 +82,8 @@ class Writer:
         self.u = [symbol(n) for n in model.input_names]
         self.p = [symbol(n) for n in model.parameter_names]
         self.s = [switch_symbol(k) for k in range(len(lowered.switches))]
+        # an input whose delay is not estimated has values that no parameter moves
+        self.still = not any(i.delay.free_symbols for i in model.inputs)
         self.v = [sp.Symbol(f"_v_{n}", real=True) for n in model.input_names]
 
     def unpack(self, exprs: Sequence[sp.Expr]) -> list[str]:
@@ -125,7 +127,7 @@ class Writer:
             if values:
                 targets.append((f"{values}[{r}]", e))
             by_x.append(self._partials(e, self.x, f"_x{r}", targets))
-            by_u.append(self._partials(e, self.u, f"_u{r}", targets))
+            by_u.append([] if self.still else self._partials(e, self.u, f"_u{r}", targets))
             for k, q in enumerate(self.p):
                 derivative = e.diff(q)
                 if derivative != 0:
@@ -139,9 +141,10 @@ class Writer:
         body += self.block([*targets, *edge_targets], splines) + edge_lines
         body += ["for a in range(len(act)):", "    k = act[a]"]
         for r in range(len(exprs)):
-            terms = [f"{n}*S[{j}, a]" if n != "1" else f"S[{j}, a]" for j, n in by_x[r]]
+            terms = [f"{n}*S[a, {j}]" if n != "1" else f"S[a, {j}]" for j, n in by_x[r]]
             terms += [f"{n}*ud[{j}, a]" for j, n in by_u[r]]
-            body.append(f"    {out}[{r}, a] = " + " + ".join([*terms, f"fp[{r}, k]"]))
+            place = f"dS[a, {r}]" if out == "dS" else f"{out}[{r}, a]"
+            body.append(f"    {place} = " + " + ".join([*terms, f"fp[{r}, k]"]))
         return _function(name, arguments, body)
 
     def _partials(self, e: sp.Expr, symbols: Sequence[sp.Symbol], prefix: str,

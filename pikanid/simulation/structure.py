@@ -15,7 +15,8 @@ class Structure:
         self.model = model
         self.key = (model.state_names, model.input_names, model.parameter_names,
                     tuple(model.equations.values()),
-                    tuple(o.expression for o in model.outputs), model.splines)
+                    tuple(o.expression for o in model.outputs), model.splines,
+                    any(i.delay.free_symbols for i in model.inputs))
         self._hash = hash(self.key)
 
     def __hash__(self) -> int:

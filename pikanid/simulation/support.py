@@ -57,6 +57,7 @@ class Work(NamedTuple):
     fx: np.ndarray
     matrix: np.ndarray
     change: np.ndarray
+    right: np.ndarray
     still: np.ndarray
     constant: np.ndarray
     none: np.ndarray
@@ -71,15 +72,15 @@ def make_work(n: int, m: int, P: int, q: int, k: int, A: int, stages: int,
     """Scratch for n states, m inputs, P parameters, q outputs, k switches, A sensitivities."""
     big = max(n, k)
     return Work(
-        np.empty((stages, n)), np.empty((stages, n, A)), np.empty(n), np.empty((n, A)),
-        np.empty(n), np.empty((n, A)), np.empty(n), np.empty((n, A)),
+        np.empty((stages, n)), np.empty((stages, A, n)), np.empty(n), np.empty((A, n)),
+        np.empty(n), np.empty((A, n)), np.empty(n), np.empty((A, n)),
         np.empty(m), np.empty(m), np.empty(m), np.zeros((m, A)),
         np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(q), np.empty((q, A)),
         np.zeros((n, P + 1)), np.zeros((q, P + 1)), np.zeros((k, P + 1)), np.zeros((k, P + 1)),
         np.empty(k), np.empty(k), np.empty(k), np.empty(k), np.zeros((k, k)), np.zeros((n, k)),
         np.empty((k, A)), np.empty((k, A)), np.empty((k, A)), np.empty(k, np.int64),
-        np.eye(n), np.empty((n, n)), np.empty((big, big)), np.empty((big, 1)), np.zeros((m, n)),
-        np.full(n, P, np.int64), np.empty((n, 0)), np.empty((m, 0)), np.empty(0, np.int64),
+        np.eye(n), np.empty((n, n)), np.empty((big, big)), np.empty((big, 1)), np.empty((n, A)), np.zeros((m, n)),
+        np.full(n, P, np.int64), np.empty((0, n)), np.empty((m, 0)), np.empty(0, np.int64),
         np.empty((rows, width)))
 
 

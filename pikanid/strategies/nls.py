@@ -74,7 +74,7 @@ class NLS:
             if k == 1 and self.starts == "auto" and self.protocol == "default" and (
                     best is not None and shooting.explains(best.theta)):
                 break
-            found = self._minimise(shooting, start)
+            found = self.one_start(shooting, start)
             if found is None:
                 continue
             history.append({"start": float(k), "cost": found.cost,
@@ -89,20 +89,22 @@ class NLS:
             "nls", problem, shooting, best.theta, converged=best.converged, history=history,
             settings=settings, seed=self.seed, begun=begun)
 
-    def _minimise(self, shooting: Shooting, start: np.ndarray) -> Optimum | None:
-        """One local fit: coarse steps first, then steps fine enough for the final digits."""
+    def one_start(self, shooting: Shooting, start: np.ndarray) -> Optimum | None:
+        """One local fit from θ = start: coarse steps first, then steps fine enough to finish.
+
+        None where the model cannot be simulated at the start.
+        """
         evaluations = 0
         theta, found = start, None
         if self.segments > 1:
             led = multiple_shooting(shooting, start, self.segments)
             theta = start if led is None else led
-        for accuracy, tolerance in (("coarse", max(1e-6, self.tolerance)), ("fine", self.tolerance)):
+        for accuracy, tolerance in (
+                ("coarse", max(1e-4, self.tolerance)), ("fine", self.tolerance)):
             try:
-                changed = shooting.choose_steps(theta, accuracy)
+                shooting.choose_steps(theta, accuracy)
             except errors.SimulationFailed:
                 return None
-            if found is not None and not changed:
-                break
             found = minimise(shooting.residual, shooting.jacobian, theta, shooting.problem.lower,
                              shooting.problem.upper, tolerance, self.max_evaluations)
             evaluations += found.evaluations

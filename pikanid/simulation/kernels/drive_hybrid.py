@@ -117,7 +117,7 @@ def cross(k, t, x, S, ta, ua, v, ud, p, mode, act, w):
         for a in range(A):
             when = -w.gS[k, a] / rate
             for i in range(N):
-                S[i, a] += (before[i] - after[i]) * when
+                S[a, i] += (before[i] - after[i]) * when
 
 
 @called
@@ -142,7 +142,7 @@ def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
         for i in range(N):
             x[i] = w.xn[i]
             for a in range(len(act)):
-                S[i, a] = w.Sn[i, a]
+                S[a, i] = w.Sn[a, i]
         done = h if which < 0 else done + part
         if which >= 0:
             cross(which, t + done, x, S, ta, ua, v, ud, p, mode, act, w)

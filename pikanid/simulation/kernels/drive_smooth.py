@@ -12,5 +12,5 @@ def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
     for i in range(N):
         x[i] = w.xn[i]
         for a in range(len(act)):
-            S[i, a] = w.Sn[i, a]
+            S[a, i] = w.Sn[a, i]
     return 0

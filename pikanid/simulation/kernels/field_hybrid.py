@@ -77,4 +77,4 @@ def field(t, x, S, u, v, ud, p, mode, act, w, f, dS):
             push = w.Fs[r, w.index[i]]
             if push != 0.0:
                 for a in range(A):
-                    dS[r, a] += push * w.ds[i, a]
+                    dS[a, r] += push * w.ds[i, a]

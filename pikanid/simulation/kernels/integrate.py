@@ -37,7 +37,7 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
     for r in range(n):
         x[r] = x0[r]
         for a in range(A):
-            S[r, a] = S0[r, a]
+            S[a, r] = S0[a, r]
     L = len(T)
     for i in range(L):
         last = i == L - 1
@@ -57,7 +57,7 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
                     field_value(T[i], x, held, v, p, mode, w, after)
                     for a in range(A):
                         for r in range(n):
-                            S[r, a] += (before[r] - after[r]) * dtau_in[j, a]
+                            S[a, r] += (before[r] - after[r]) * dtau_in[j, a]
             if delayed:
                 for j in range(M):
                     for a in range(A):
@@ -85,6 +85,6 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
 def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first, output,
               row, inside, X, Y, J):
     """`run` with its scratch; the only function of a model that Python calls."""
-    w = make_work(N, M, P, Q, K, S0.shape[1], STAGES, BUFFERS[0], BUFFERS[1])
+    w = make_work(N, M, P, Q, K, len(act), STAGES, BUFFERS[0], BUFFERS[1])
     return run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, np.ones(K), w,
                Seen(first, output, row, inside), X, Y, J)

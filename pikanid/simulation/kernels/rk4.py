@@ -11,7 +11,7 @@ def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
         for i in range(n):
             xt[i] = x[i] if stage == 0 else x[i] + c * h * kx[stage - 1, i]
             for a in range(A):
-                St[i, a] = S[i, a] if stage == 0 else S[i, a] + c * h * kS[stage - 1, i, a]
+                St[a, i] = S[a, i] if stage == 0 else S[a, i] + c * h * kS[stage - 1, a, i]
         ts = t + c * h
         for j in range(M):
             u[j] = ua[j] + v[j] * (ts - ta)
@@ -19,6 +19,6 @@ def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
     for i in range(n):
         xn[i] = x[i] + h / 6.0 * (kx[0, i] + 2.0 * kx[1, i] + 2.0 * kx[2, i] + kx[3, i])
         for a in range(A):
-            Sn[i, a] = S[i, a] + h / 6.0 * (
-                kS[0, i, a] + 2.0 * kS[1, i, a] + 2.0 * kS[2, i, a] + kS[3, i, a])
+            Sn[a, i] = S[a, i] + h / 6.0 * (
+                kS[0, a, i] + 2.0 * kS[1, a, i] + 2.0 * kS[2, a, i] + kS[3, a, i])
     return True

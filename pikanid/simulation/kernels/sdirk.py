@@ -36,7 +36,7 @@ def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
             field(ts, xt, w.eye, u, v, w.still, p, mode, w.constant, w, w.f, fx)
             for i in range(n):
                 for j in range(n):
-                    matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * h * fx[i, j]
+                    matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * h * fx[j, i]
                     if not math.isfinite(matrix[i, j]):
                         return False
             for i in range(n):
@@ -57,20 +57,26 @@ def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
             for i in range(n):
                 xt[i] = start[i] + 0.25 * h * kx[stage, i]
                 for a in range(A):
-                    St[i, a] = S[i, a]
+                    St[a, i] = S[a, i]
                     for j in range(stage):
-                        St[i, a] += h * SDIRK[stage, j] * kS[j, i, a]
+                        St[a, i] += h * SDIRK[stage, j] * kS[j, a, i]
             field(ts, xt, St, u, v, ud, p, mode, act, w, w.f, kS[stage])
             for i in range(n):
                 for j in range(n):
-                    matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * h * fx[i, j]
-            solve_small(matrix[:n, :n], kS[stage])
+                    matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * h * fx[j, i]
+            for i in range(n):
+                for a in range(A):
+                    w.right[i, a] = kS[stage, a, i]
+            solve_small(matrix[:n, :n], w.right[:, :A])
+            for i in range(n):
+                for a in range(A):
+                    kS[stage, a, i] = w.right[i, a]
     for i in range(n):
         xn[i] = x[i]
         for a in range(A):
-            Sn[i, a] = S[i, a]
+            Sn[a, i] = S[a, i]
         for j in range(5):
             xn[i] += h * SDIRK[4, j] * kx[j, i]
             for a in range(A):
-                Sn[i, a] += h * SDIRK[4, j] * kS[j, i, a]
+                Sn[a, i] += h * SDIRK[4, j] * kS[j, a, i]
     return True

@@ -1,0 +1,79 @@
+"""Turn pytest-benchmark's JSON into reports/performance.md.
+
+Usage: python benchmarks/performance.py BENCHMARKS.json PERFORMANCE.md
+
+Ratios are against the entry that its group marks as the reference, measured in the same run.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import platform
+import sys
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+LIBRARIES = ("numpy", "scipy", "sympy", "numba", "casadi", "torch", "pykan")
+
+
+def main(source: str, target: str) -> None:
+    """Read one file, write the other (atomically)."""
+    data = json.loads(Path(source).read_text())
+    groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for entry in data["benchmarks"]:
+        groups[entry["group"] or "other"].append(entry)
+    lines = ["# Performance", "", _setting(), ""]
+    for name, entries in groups.items():
+        lines += _table(name, entries)
+    path = Path(target)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    with os.fdopen(handle, "w") as file:
+        file.write("\n".join(lines))
+    os.replace(temporary, path)
+
+
+def _setting() -> str:
+    versions = []
+    for name in ("pikanid", *LIBRARIES):
+        try:
+            versions.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return (f"Written by `make bench`. Python {platform.python_version()}, {os.cpu_count()} cores, "
+            f"one thread; {', '.join(versions)}. Times are medians; machines differ, so read the "
+            "ratios, which come from one run.")
+
+
+def _table(name: str, entries: list[dict[str, Any]]) -> list[str]:
+    base = next((e["stats"]["median"] for e in entries if e["extra_info"].get("reference")), None)
+    notes = sorted({k for e in entries for k in e["extra_info"] if k != "reference"})
+    head = ["", "median", "spread (IQR)", "ratio", *notes]
+    lines = [f"## {name}", "", "| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1)]
+    for e in sorted(entries, key=lambda e: e["stats"]["median"]):
+        s = e["stats"]
+        ratio = f"{s['median'] / base:.2f}" if base else ""
+        mark = " (reference)" if e["extra_info"].get("reference") else ""
+        extra = [str(e["extra_info"].get(k, "")) for k in notes]
+        lines.append("| " + " | ".join(
+            [_label(e["name"]) + mark, _time(s["median"]), _time(s["iqr"]), ratio, *extra]) + " |")
+    return [*lines, ""]
+
+
+def _label(name: str) -> str:
+    name = name.removeprefix("test_")
+    return name[name.index("[") + 1:-1] if "[" in name else name.replace("_", " ")
+
+
+def _time(seconds: float) -> str:
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
+        if seconds * factor >= 1:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e9:.3g} ns"
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:3])
