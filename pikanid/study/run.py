@@ -1,0 +1,71 @@
+"""The whole study, step by step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from pikanid import errors
+from pikanid.strategies import STRATEGIES
+from pikanid.study import pendulum, slosh
+
+SEED = 0
+# Only what is quick is repeated: the study is to stay a matter of minutes.
+REPEATABLE = 1.0  # [s] a fit
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What was found; `missing` says why there is no real recording."""
+
+    slosh: tuple[slosh.Result, ...]
+    spread: tuple[slosh.Spread, ...]
+    pendulum: tuple[pendulum.Result, ...]
+    swing: pendulum.Swing | None
+    missing: str
+    seeds: int
+    seconds: float
+
+
+def count_steps(strategies: Sequence[str] = tuple(STRATEGIES)) -> int:
+    """How many steps `run` announces at most."""
+    noisy = sum(1 for s in slosh.SCENARIOS if s.noise)
+    return 1 + len(strategies) * (len(slosh.SCENARIOS) + noisy + 1)
+
+
+def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
+        step: Callable[[str], None] = lambda text: None) -> Study:
+    """Fit everything.
+
+    Args:
+        seeds: Noisy recordings in each repetition, 0, 1, ..., seeds - 1; 0 leaves it out.
+        strategies: Short names.
+        step: Called with the name of every step before it is done.
+    """
+    begun = time.perf_counter()
+    step("compiling the model")
+    slosh.fit(slosh.SCENARIOS[1], "nls", SEED)  # timed fits are warm
+    singles = []
+    for scenario in slosh.SCENARIOS:
+        for name in strategies:
+            step(f"slosh, {scenario.label}, {name}")
+            singles.append(slosh.fit(scenario, name, SEED))
+    spreads = []
+    for result in singles:
+        if not result.scenario.noise or seeds < 1:
+            continue
+        step(f"slosh, {result.scenario.label}, {result.strategy}, {seeds} seeds")
+        if result.estimate is not None and result.estimate.seconds < REPEATABLE:
+            spreads.append(slosh.repeated(result.scenario, result.strategy, range(seeds)))
+    swing, missing, real = None, "", []
+    try:
+        swing = pendulum.load()
+    except errors.DatasetUnavailable as problem:
+        missing = str(problem)
+    if swing is not None:
+        for name in strategies:
+            step(f"real pendulum, {name}")
+            real.append(pendulum.fit(swing, name))
+    return Study(tuple(singles), tuple(spreads), tuple(real), swing, missing, seeds,
+                 time.perf_counter() - begun)
