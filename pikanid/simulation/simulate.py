@@ -46,8 +46,9 @@ def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str,
     """
     model = model.with_values(parameters or {})
     times = np.asarray(excitation.t if t is None else t, dtype=float)
-    inputs = excitation.without(*(n for n in model.output_names if n in excitation.channels))
-    wanted = with_outputs(model, inputs, times)
+    ramp = np.linspace(0.0, 1.0, len(times))  # only the times of a placeholder mean something
+    wanted = excitation.with_channels(
+        *(Channel(o.name, times, ramp, o.unit) for o in model.outputs))
     simulator = Simulator(model, bind(model, wanted))
     p = np.array(list(model.values.values()))
     if tolerance is None:
@@ -63,7 +64,7 @@ def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str,
         s = sigma if isinstance(sigma, int | float) else sigma.get(o.name, 0.0)
         noisy = y + rng.normal(0.0, s, len(y)) if s > 0 else y
         channels.append(Channel(o.name, times, noisy, o.unit, s if s > 0 else None))
-    return inputs.with_channels(*channels)
+    return excitation.with_channels(*channels)
 
 
 def with_outputs(model: Model, recording: Recording, t: np.ndarray | None = None) -> Recording:
