@@ -148,7 +148,7 @@ class Simulator:
         Parameters
         ----------
         tolerance : of the outputs, in their own units; default 1e-8 of the largest output
-        known : steps whose error has been found close to p: shorter ones follow from its order
+        known : coarser steps in use: shorter ones follow from the method's order, checked at p
 
         Raises
         ------
@@ -156,12 +156,10 @@ class Simulator:
         """
         grid = self.grid(p)
         spacing = float(np.median(np.diff(grid.T)))
-        if known is not None and tolerance and 0 < known.error < 1e3 * tolerance:
-            # in the asymptotic regime an error foretells those of shorter steps
-            factor = (tolerance / (2 * known.error)) ** 0.25
-            if factor >= 1:
-                return known
-            return Steps(known.method, known.longest * factor, known.error * factor**4)
+        if known is not None and tolerance:
+            foretold = self._foretold(p, tolerance, known)
+            if foretold is not None:
+                return foretold
         candidates: list[Method] = ["explicit", "implicit"] if method == "auto" else [method]
         best: Steps | None = None
         failure = Response(*(np.empty(0),) * 4)
@@ -187,6 +185,20 @@ class Simulator:
                 errors.too_many_events(failure.stopped_at) if failure.status == 2
                 else errors.not_finite(failure.stopped_at, self._where(p)))
         return best
+
+    def _foretold(self, p: np.ndarray, tolerance: float, known: Steps) -> Steps | None:
+        """Steps for `tolerance` by the known order, checked at p; None where that does not hold."""
+        if not known.error > 0:
+            return None
+        ratio = min((tolerance / (4 * known.error)) ** 0.25, 0.5)
+        finer = Steps(known.method, known.longest * ratio)
+        rough, fine = self._outputs(p, known), self._outputs(p, finer)
+        if not rough.finished or not fine.finished:
+            return None
+        gap = float(np.abs(fine.y - rough.y).max(initial=0.0))
+        error = gap * ratio**4 / (1 - ratio**4)
+        asymptotic = gap < 1e-3 * float(np.abs(fine.y).max(initial=0.0))
+        return Steps(known.method, finer.longest, error) if asymptotic and error <= tolerance else None
 
     def _where(self, p: np.ndarray) -> str:
         return ", ".join(f"{n} = {v:.4g}" for n, v in zip(
