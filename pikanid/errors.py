@@ -599,6 +599,20 @@ def relaxation_locked(lam: float, kept: float) -> str:
     )
 
 
+def relaxation_smears() -> str:
+    return (
+        "The model is not smooth (sign, abs, clip ...): splines smear its switches, which biases "
+        "the parameters. Compare with the strategy NLS."
+    )
+
+
+def relaxation_stuck(lam: float, kept: float) -> str:
+    return (
+        f"λ stays at {kept:.3g}: at {lam:.3g} the fit got no further. The estimate may still be "
+        "biased towards the splines; compare it with the strategy NLS."
+    )
+
+
 def grid_not_settled(gap: float, intervals: int) -> str:
     return (
         f"With {intervals} intervals, the last halving still moved a parameter by {gap:.2g} "

@@ -125,9 +125,7 @@ def chirp(
     """A sine whose frequency rises exponentially from `low` to `high` [Hz].
 
     Each octave gets the same time: phase 2π·low·T/ln(r)·(r^{t/T} - 1) with r = high/low.
-
-    Raises:
-        BadSetting: Unless 0 < low < high < half the sampling rate.
+    BadSetting is raised unless 0 < low < high < half the sampling rate.
 
     >>> chirp(0.5, 5.0, duration=2.0).names
     ('u_x',)
@@ -199,7 +197,7 @@ def move(
     Args:
         distance: To travel [m], negative for backwards.
         duration: Of the recording [s].
-        dt: Sampling interval [s].
+        dt: [s].
         start: When the move begins [s].
         acceleration: Bound [m/s²].
         velocity: Bound [m/s].

@@ -60,6 +60,7 @@ def channels(table: Table, request: Request, where: str) -> Result:
             for found in available
             if found not in taken
             and found.name not in mapped
+            and found.name.casefold() not in _TIME_NAMES
             and not found.name.startswith((OWN_TIME, OWN_SIGMA))
         ]
     made: list[Channel] = []

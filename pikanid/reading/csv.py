@@ -42,7 +42,7 @@ def read(content: bytes, where: str, delimiter: str | None, decimal: str | None)
         lines, numbers = lines[1:], numbers[1:]
     if not lines:
         raise errors.BadRecording(errors.no_rows(where))
-    delimiter = delimiter or _delimiter(lines[:_SAMPLE])
+    delimiter = delimiter or _delimiter(lines[:_SAMPLE], where)
     rows, numbers = _split(lines, numbers, delimiter, where)
     rows, numbers = _squared(rows, numbers, where)
     return from_rows(where, rows, numbers, decimal or _decimal(rows, delimiter))  # type: ignore[arg-type]
@@ -67,18 +67,20 @@ def _lines(text: str) -> tuple[list[str], list[int]]:
     return [every[k] for k in kept], [k + 1 for k in kept]
 
 
-def _delimiter(lines: list[str]) -> str:
+def _delimiter(lines: list[str], where: str) -> str:
     """The sign that cuts (nearly) every line into the same number of cells."""
-    best, best_score = ",", (0.0, 0)
+    best, best_share = ",", 0.0
     for sign in _DELIMITERS:
-        rows = list(csv.reader(_tidy(lines, sign), delimiter=sign, skipinitialspace=sign == " "))
+        try:
+            rows = list(csv.reader(_tidy(lines, sign), delimiter=sign))
+        except csv.Error:
+            raise errors.BadRecording(errors.binary_junk(where)) from None
         width, count = Counter(len(row) for row in rows).most_common(1)[0]
         if width < 2:
             continue
-        # A comma that parts most lines evenly may still be a decimal sign: earlier signs win ties.
-        score = (count / len(rows), 0)
-        if score > best_score:
-            best, best_score = sign, score
+        # A comma that parts all lines evenly may still be a decimal sign: earlier signs win ties.
+        if count / len(rows) > best_share:
+            best, best_share = sign, count / len(rows)
     single = all(_COMMA_NUMBER.fullmatch(line) for line in lines[1:]) and len(lines) > 1
     if best == "," and single and "," not in lines[0]:
         return "\t"  # one column with decimal commas

@@ -39,8 +39,8 @@ NAMES = {
 # What the parsers of other people raise on damaged bytes: they promise no closed list.
 FOREIGN_FAILURES: tuple[type[Exception], ...] = (
     ValueError, TypeError, LookupError, AttributeError, ArithmeticError, AssertionError, OSError,
-    EOFError, RuntimeError, MemoryError, SyntaxError, BufferError, struct.error, zlib.error,
-    zipfile.BadZipFile,
+    EOFError, RuntimeError, NameError, MemoryError, SyntaxError, BufferError, struct.error,
+    zlib.error, zipfile.BadZipFile,
 )  # fmt: skip
 
 
@@ -85,14 +85,14 @@ def kind_and_content(path: str | os.PathLike[str]) -> tuple[str, bytes, str]:
         kind = actual  # Excel itself opens either under both endings
     if actual and actual != kind:
         raise errors.BadRecording(errors.wrong_ending(where, NAMES[actual], NAMES[kind]))
-    if not actual and kind != "csv" and not (kind == "mat" and len(content) > 128):
+    if not actual and kind != "csv":
         raise errors.BadRecording(errors.damaged(where, NAMES[kind]))
     stem = Path(file.stem).stem if packed else file.stem
     return kind, content, stem or where
 
 
 def _sniff(content: bytes) -> str:
-    """The kind that the first bytes give away, "" for text, level-4 MAT or rubbish."""
+    """The kind that the first bytes give away, "" for text or rubbish."""
     marks = {
         b"\x1f\x8b": "gzip",
         b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1": "xls",
@@ -104,6 +104,8 @@ def _sniff(content: bytes) -> str:
     for mark, kind in marks.items():
         if content.startswith(mark):
             return kind
+    if content[124:128] in (b"\x00\x01IM", b"\x01\x00MI"):
+        return "mat"  # other programs introduce themselves in the first 116 bytes
     if not content.startswith(b"PK\x03\x04"):
         return ""
     # The names of the members stand in plain text before each of them.

@@ -1,4 +1,4 @@
-"""MATLAB files: level 4 and 5 (scipy) and 7.3 (HDF5, h5py), structures and cells flattened.
+"""MATLAB files: level 5 (`mat5`) and 7.3 (HDF5, h5py), structures and cells flattened.
 
 ``Theta1.signals.values`` is a field of nested structures, ``Y_id.2`` the second cell of a cell
 array; counting starts at 1, as in MATLAB.
@@ -7,13 +7,13 @@ array; counting starts at 1, as in MATLAB.
 from __future__ import annotations
 
 import io
-import warnings
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from pikanid import errors
+from pikanid.reading import mat5
 from pikanid.reading.arrays import columns
 from pikanid.reading.door import FOREIGN_FAILURES, NAMES
 from pikanid.reading.table import Table
@@ -41,40 +41,10 @@ def arrays(content: bytes, where: str) -> dict[str, np.ndarray]:
 
 
 def _v5(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
-    import scipy.io
-    from scipy.io.matlab import MatReadError
-
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # on duplicate variables and functions
-            variables = scipy.io.loadmat(io.BytesIO(content))  # type: ignore[arg-type]
-        return [
-            leaf
-            for name, value in variables.items()
-            if not name.startswith("__")
-            for leaf in _flat(name, value, 0)
-        ]
-    except (*FOREIGN_FAILURES, MatReadError):  # type: ignore[misc]
+        return list(mat5.leaves(content))
+    except FOREIGN_FAILURES:
         raise errors.BadRecording(errors.damaged(where, NAMES["mat"])) from None
-
-
-def _flat(path: str, value: Any, depth: int) -> Iterator[tuple[str, np.ndarray]]:
-    array = np.asarray(value)
-    if depth > _DEEPEST:
-        return
-    if array.dtype.names:
-        many = array.size > 1
-        for k, element in enumerate(array.ravel()[:_MOST_CELLS]):
-            for field in array.dtype.names:
-                inner = f"{path}.{k + 1}.{field}" if many else f"{path}.{field}"
-                yield from _flat(inner, element[field], depth + 1)
-    elif array.dtype == object:
-        if array.size == 1 and array.ndim == 0:
-            return  # an object of a class: nothing of it is known
-        for k, element in enumerate(array.ravel(order="F")[:_MOST_CELLS]):
-            yield from _flat(f"{path}.{k + 1}", element, depth + 1)
-    elif array.dtype.kind in "fiub":
-        yield path, array
 
 
 def _v73(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:

@@ -1,0 +1,157 @@
+"""Real recordings: found in the folder, checked, cut as their authors cut them."""
+
+from __future__ import annotations
+
+import gzip
+import itertools
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pikanid import datasets
+from pikanid import datasets_origins as origins
+from pikanid.errors import BadSetting, DatasetUnavailable
+
+
+@pytest.fixture
+def offline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """No network and an empty cache; returns an empty folder of recordings."""
+    import pooch
+    import requests
+
+    def refuse(*_: object, **__: object) -> None:
+        raise requests.ConnectionError("no network")
+
+    monkeypatch.setattr(pooch.HTTPDownloader, "__call__", refuse)
+    monkeypatch.setattr(pooch, "os_cache", lambda _: tmp_path / "cache")
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    monkeypatch.setenv(datasets.FOLDER, str(folder))
+    return folder
+
+
+def test_without_network_and_cache_it_says_what_to_do(offline: Path) -> None:
+    with pytest.raises(DatasetUnavailable) as caught:
+        datasets.silverbox()
+    sentence = str(caught.value)
+    assert "silverbox/SNLS80mV.mat" in sentence
+    assert "raw.githubusercontent.com/biaslab/nsi-silverbox/728f07e" in sentence
+    assert "PIKANID_DATA" in sentence
+
+
+def test_a_folder_that_is_not_there(offline: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(datasets.FOLDER, str(offline / "missing"))
+    with pytest.raises(DatasetUnavailable, match="cannot be downloaded"):
+        datasets.falling_balls()
+
+
+@pytest.mark.parametrize("damage", [b"", b"something else"])
+def test_an_altered_file_is_refused(offline: Path, damage: bytes) -> None:
+    path = offline / origins.SILVERBOX.local
+    path.parent.mkdir()
+    path.write_bytes(damage)
+    with pytest.raises(DatasetUnavailable, match="checksum"):
+        datasets.silverbox()
+    packed = offline / f"{origins.FREE_SWING.local}.gz"
+    packed.parent.mkdir()
+    packed.write_bytes(gzip.compress(b"x" * 1000)[:20])
+    with pytest.raises(DatasetUnavailable, match="checksum"):
+        datasets.single_pendulum_free_swing()
+
+
+def test_the_cache_is_used_without_network(
+    recordings_folder: Path, offline: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    origin = origins.FALLING_BALLS
+    cached = tmp_path / "cache" / origin.local
+    cached.parent.mkdir(parents=True)
+    shutil.copyfile(recordings_folder / origin.local, cached)
+    monkeypatch.delenv(datasets.FOLDER)
+    assert datasets.falling_balls().name == "Baseball, drop 1"
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: datasets.single_pendulum("half"),  # type: ignore[arg-type]
+        lambda: datasets.silverbox("half"),  # type: ignore[arg-type]
+        lambda: datasets.falling_balls("cannon ball"),
+        lambda: datasets.falling_balls(drop=3),  # type: ignore[arg-type]
+        lambda: datasets.slosh_lar("half"),
+    ],
+)
+def test_what_there_is_not(call: object) -> None:
+    with pytest.raises(BadSetting, match=r"There is no .* \(known: "):
+        call()  # type: ignore[operator]
+
+
+def test_every_origin_is_pinned() -> None:
+    every = [origins.SINGLE_PENDULUM, origins.FREE_SWING, origins.SILVERBOX, origins.FALLING_BALLS]
+    every += [origin for name in datasets.SLOSH_MOTIONS for origin in origins.slosh(name)]
+    assert len({origin.sha256 for origin in every}) == len(every) == 34
+    for origin in every:
+        assert len(origin.commit) == 40
+        assert len(origin.sha256) == 64
+        assert " " not in origin.url
+
+
+# --- the recordings themselves -------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("recordings_folder")
+def test_single_pendulum_follows_on() -> None:
+    pieces = datasets.single_pendulum("all")
+    assert [len(piece.t) for piece in pieces] == [9167] * 5 + [9166]
+    assert pieces == datasets.single_pendulum() + datasets.single_pendulum("held_out")
+    for before, after in itertools.pairwise(pieces):
+        assert after.start - before.stop == pytest.approx(0.001)
+    theta = pieces[0].as_output("theta", "rad")
+    assert theta.values[0] == pytest.approx(1.52316373 - np.pi)
+    rate = np.gradient(theta.values, theta.time)
+    assert np.corrcoef(rate, pieces[0]["theta_dot"].values)[0, 1] > 0.999
+
+
+@pytest.mark.usefixtures("recordings_folder")
+def test_free_swing_comes_to_rest() -> None:
+    theta = datasets.single_pendulum_free_swing()["theta"]
+    assert theta.time[0] == 60.0
+    assert np.max(np.abs(theta.values)) < 0.07
+    assert np.ptp(theta.values[theta.time > 66]) < 0.001
+
+
+@pytest.mark.usefixtures("recordings_folder")
+def test_silverbox_is_cut_officially() -> None:
+    lengths = {"train": 65062, "held_out": 21688, "arrow": 40475, "arrow_no_extrapolation": 32000}
+    for part, length in lengths.items():
+        rec = datasets.silverbox(part)  # type: ignore[arg-type]
+        assert len(rec.t) == length
+        assert 1 / rec["u"].interval == pytest.approx(610.35, abs=0.01)
+    whole = datasets.silverbox("all")["u"].values
+    np.testing.assert_array_equal(datasets.silverbox("held_out")["u"].values, whole[105712:127400])
+
+
+@pytest.mark.usefixtures("recordings_folder")
+@pytest.mark.parametrize("ball", datasets.BALLS)
+def test_balls_fall(ball: str) -> None:
+    for drop in (1, 2):
+        rec = datasets.falling_balls(ball.lower().replace(" ", "_"), drop)  # type: ignore[arg-type]
+        h, v = rec.as_output("h", "m"), rec.as_output("v", "m/s")
+        assert 40 < len(h) < 65
+        assert h.values[0] > 44
+        assert v.values[-1] < -10
+
+
+@pytest.mark.usefixtures("recordings_folder")
+@pytest.mark.parametrize("name", datasets.SLOSH_MOTIONS)
+def test_sloshing_runs_have_motion_and_heights(name: str) -> None:
+    rec = datasets.slosh_lar(name)
+    assert rec.names == ("x", "y", "z", "qx", "qy", "qz", "qw", "h")
+    assert rec["x"].interval == pytest.approx(0.002)
+    assert rec["h"].interval == pytest.approx(1 / 59.94, rel=1e-2)
+    assert rec.as_output("h", "m").values.max() < 0.1
+    attitude = np.array([rec[key].values for key in ("qx", "qy", "qz", "qw")])
+    np.testing.assert_allclose(np.linalg.norm(attitude, axis=0), 1, atol=1e-9)
+    idle = rec.window(0, 0.9)
+    assert np.ptp(idle["x"].values) < 1e-3

@@ -1,0 +1,188 @@
+"""Noise models: what they find in quiet stretches, what they claim, and how they whiten."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pikanid import noise, noise_ar
+from pikanid.channel import Channel
+from pikanid.errors import BadRecording
+from pikanid.noise_quiet import find_quiet
+from pikanid.recording import Recording
+
+DT = 0.01
+SIGMA = 0.002
+
+
+def coloured(n: int, rho: float, seed: int) -> np.ndarray:
+    """AR(1) noise of unit variance."""
+    e = np.random.default_rng(seed).standard_normal(n + 500)
+    return lfilter([np.sqrt(1 - rho**2)], [1, -rho], e)[500:]
+
+
+def swing(rho: float, seed: int, rest: float = 4.0) -> Channel:
+    """A decaying swing of 14 rad/s that starts after `rest` seconds of stillness."""
+    t = np.arange(int((rest + 6) / DT)) * DT
+    moving = np.where(t > rest, 0.2 * np.exp(-0.3 * (t - rest)) * np.sin(14 * (t - rest)), 0.0)
+    return Channel("theta", t, moving + SIGMA * coloured(len(t), rho, seed), "rad")
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
+def test_a_quiet_stretch_is_found_and_used(rho: float) -> None:
+    models = [noise.estimate(swing(rho, seed)) for seed in range(30)]
+    assert all(model.source == "quiet stretch" for model in models)
+    assert all(model.stop < 4.2 and model.n > 200 for model in models)
+    scores = np.array([(model.sigma - SIGMA) / model.sigma_std for model in models])
+    assert np.mean(np.abs(scores) < 2) > 0.85
+    assert abs(scores.mean()) < 1.0
+    first = np.array([model.ar[0] if len(model.ar) else 0.0 for model in models])
+    assert first.mean() == pytest.approx(rho, abs=0.06)
+
+
+def test_a_short_stretch_says_how_little_it_knows() -> None:
+    """20 samples leave a correlation of about ±0.2 and a variance of about ±34 %."""
+    model = noise.estimate(swing(0.5, 0), quiet=(0.0, 0.2))
+    assert 18 <= model.n <= 22
+    fitted = noise_ar.burg(0.002 * coloured(20, 0.5, 3), 1)
+    assert float(np.sqrt(fitted.covariance[0, 0])) == pytest.approx(0.2, abs=0.05)
+    assert 2 * fitted.sigma_std / fitted.sigma == pytest.approx(0.34, rel=0.5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_busy_signal_has_no_quiet_stretch(seed: int) -> None:
+    t = np.arange(2000) * DT
+    tones = sum(np.sin(2 * np.pi * f * t + f) for f in (0.5, 1.3, 2.1, 3.7))
+    busy = Channel("y", t, tones + SIGMA * coloured(2000, 0.0, seed))
+    assert find_quiet(busy) is None
+    model = noise.estimate(busy)
+    assert model.source == "highest frequencies"
+    assert model.white
+    assert model.sigma == pytest.approx(SIGMA, rel=0.12)
+    assert "highest frequencies" in str(model)
+
+
+@pytest.mark.parametrize("n", [31, 51, 101])
+def test_an_oscillation_is_not_taken_for_noise(n: int) -> None:
+    """A sparse record of a swing looks like coloured noise to a careless fit."""
+    t = np.arange(n) * 0.1
+    y = Channel("y", t, 0.1 * np.exp(-0.25 * t) * np.sin(14.8 * t))
+    assert find_quiet(y) is None
+
+
+def test_a_stuck_sensor_is_not_quiet() -> None:
+    t = np.arange(600) * DT
+    y = np.where(t < 3, 0.5, np.sin(9 * t))
+    assert find_quiet(Channel("y", t, y)) is None
+    with pytest.raises(BadRecording, match="shows no noise"):
+        noise.estimate(Channel("y", t, y), quiet=(0.0, 2.0))
+
+
+def test_rounding_counts_as_noise() -> None:
+    step = 0.01
+    t = np.arange(3000) * DT
+    y = Channel("y", t, np.round(0.3 * np.sin(1.3 * t) / step) * step)
+    sigma, _ = noise.high_band_sigma(y)
+    assert sigma >= step / np.sqrt(12) * 0.999
+
+
+def test_outliers_and_gaps_do_not_disturb_the_highest_frequencies() -> None:
+    t = np.arange(4000) * DT
+    y = np.sin(2 * t) + SIGMA * coloured(4000, 0.0, 1)
+    y[::101] += 1.0
+    y[50:60] = np.nan
+    assert noise.high_band_sigma(Channel("y", t, y))[0] == pytest.approx(SIGMA, rel=0.15)
+
+
+def test_claimed_errors_of_the_highest_frequencies() -> None:
+    t = np.arange(800) * DT
+    results = [
+        noise.high_band_sigma(Channel("y", t, np.sin(3 * t) + coloured(800, 0.0, seed)))
+        for seed in range(100)
+    ]
+    sigma, claimed = np.array(results).T
+    assert np.std(sigma) == pytest.approx(claimed.mean(), rel=0.3)
+    assert sigma.mean() == pytest.approx(1.0, abs=0.03)
+
+
+def test_too_short_to_say() -> None:
+    with pytest.raises(BadRecording, match="only"):
+        noise.estimate(Channel("y", np.arange(5.0), np.arange(5.0) ** 2))
+    with pytest.raises(BadRecording, match="only"):
+        noise.estimate(swing(0, 0), quiet=(100.0, 101.0))
+
+
+# --- AR models and whitening ---------------------------------------------------------------------
+
+
+def model_of(ar: list[float], sigma: float = 0.5) -> noise.NoiseModel:
+    a = np.array(ar)
+    rho = noise_ar.autocorrelation(a, len(a) + 1)
+    innovation = sigma * float(np.sqrt(1 - a @ rho[1:]))
+    p = len(a)
+    return noise.NoiseModel(
+        sigma, 0.01, a, np.eye(p), innovation, DT, "quiet stretch", 0.0, 1.0, 100
+    )
+
+
+@pytest.mark.parametrize("ar", [[], [0.5], [-0.7], [1.2, -0.5], [0.4, 0.2, 0.1], [0.1, 0, 0, 0.5]])
+def test_whitening_is_the_inverse_covariance(ar: list[float]) -> None:
+    model = model_of(ar)
+    n = 40
+    lags = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    covariance = model.autocovariance(n)[lags]
+    r = np.random.default_rng(0).standard_normal((n, 3))
+    white = model.whiten(r)
+    np.testing.assert_allclose(white.T @ white, r.T @ np.linalg.solve(covariance, r), rtol=1e-9)
+    np.testing.assert_allclose(model.whiten(r[:, 1]), white[:, 1])
+
+
+@pytest.mark.parametrize("ar", [[0.5], [1.2, -0.5], [0.4, 0.2, 0.1]])
+def test_autocovariance_is_that_of_the_process(ar: list[float]) -> None:
+    model = model_of(ar, 1.0)
+    e = np.random.default_rng(2).standard_normal(400_000) * model.innovation
+    x = lfilter([1.0], np.concatenate([[1.0], -np.array(ar)]), e)[1000:]
+    measured = [float(np.mean(x[k:] * x[: len(x) - k])) for k in range(6)]
+    np.testing.assert_allclose(model.autocovariance(6), measured, atol=0.03)
+
+
+def test_whitening_starts_anew_after_a_gap() -> None:
+    model = model_of([0.8])
+    r = np.random.default_rng(0).standard_normal(30)
+    t = np.arange(30) * DT
+    t[12:] += 0.5
+    pieces = np.concatenate([model.whiten(r[:12]), model.whiten(r[12:])])
+    np.testing.assert_allclose(model.whiten(r, t), pieces)
+    with pytest.raises(BadRecording, match="estimate it from the thinned signal"):
+        model.whiten(r, np.arange(30) * 0.1)
+
+
+def test_whitened_coloured_noise_is_white() -> None:
+    """Why any of this is needed: raw AR(1) residuals fail every whiteness test."""
+    channel = swing(0.6, 7)
+    model = noise.estimate(channel)
+    fresh = SIGMA * coloured(2000, 0.6, 99)
+    white = model.whiten(fresh)
+    lag_one = float(np.corrcoef(white[1:], white[:-1])[0, 1])
+    assert abs(lag_one) < 0.15 < 0.5 < float(np.corrcoef(fresh[1:], fresh[:-1])[0, 1])
+    assert np.std(white) == pytest.approx(1.0, rel=0.15)
+
+
+def test_burg_recovers_a_second_order_process() -> None:
+    e = np.random.default_rng(0).standard_normal(20_000)
+    x = lfilter([1.0], [1.0, -1.2, 0.5], e)
+    model = noise_ar.fit(x - x.mean())
+    error = model.coefficients[:2] - [1.2, -0.5]
+    assert len(model.coefficients) >= 2
+    assert np.all(np.abs(error) < 4 * np.sqrt(np.diag(model.covariance)[:2]))
+
+
+def test_sigma_is_attached_with_a_note() -> None:
+    theta = swing(0.0, 0)
+    rec = Recording({"theta": theta, "u": Channel("u", theta.time, theta.time, hold="zero")})
+    told = noise.with_estimated_sigma(rec)
+    assert float(np.asarray(told["theta"].sigma)) == pytest.approx(SIGMA, rel=0.1)
+    assert told["u"].sigma is None
+    assert "quiet stretch" in told.notes[0]
+    assert noise.with_estimated_sigma(told) == told
