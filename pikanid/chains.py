@@ -56,7 +56,8 @@ def find_chains(model: Model, form: Form = "second_order") -> Chains:
             if _reaches(follows, after, state):  # x' = y, y' = x: a circle has no last equation
                 continue
             follows[state] = after
-    root, order, top = [-1] * len(names), [0] * len(names), []
+    root, order = [-1] * len(names), [0] * len(names)
+    top: list[int] = []
     for first in range(len(names)):
         if first in follows.values():
             continue

@@ -18,59 +18,21 @@ from scipy import sparse
 
 from pikanid import errors
 from pikanid.adequacy import difference_noise
-from pikanid.approximators import Approximator, Array, LinearApproximator
+from pikanid.approximators import Array, LinearApproximator
+from pikanid.approximators.tables import Table, anchor
 from pikanid.chains import Chains
 from pikanid.expressions import symbol
-from pikanid.approximators.tables import Table, anchor
+from pikanid.functional_rows import AnyApproximator, Part, Rows, Sites, by_coefficients
 from pikanid.problem import Problem, Samples, delays
 from pikanid.simulation.vectorfield import VectorField
 
+__all__ = ["Functional", "Part", "Penalty", "Rows", "Sites", "bind"]
+
 Penalty = Literal["physics", "roughness"]
-AnyApproximator = Approximator | LinearApproximator
 
 # Rows for an initial state that cannot be eliminated weigh as much as data of this 1/σ: about 1e-6
 # of the units of the model's states.
 START_WEIGHT = 1e6
-
-
-@dataclass(frozen=True, eq=False)
-class Sites:
-    """Where one family of residuals is taken: M times, E residuals each."""
-
-    t: Array  # (M,)
-    u: Array  # (M, m)
-    weight: Array  # (M, E): square root of the quadrature weight, or 1/σ
-    states: tuple[Table, ...]  # one per state
-    tops: tuple[Table, ...] = ()  # highest derivative of each approximator: E of them
-    target: Array | None = None  # (M, 1): the samples
-    output: int = 0  # which output they are samples of
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One recording's share: its approximators (one per chain) and residual families."""
-
-    approximators: tuple[AnyApproximator, ...]
-    data: tuple[Sites, ...]
-    physics: Sites
-    start: Sites | None  # heavy rows for the initial state, where it cannot be eliminated
-    held: NDArray[np.int64]  # coefficients fixed by the initial state
-    hold: Array  # (k, n): c[held] = hold @ x0
-
-    @property
-    def n_coefficients(self) -> int:
-        """Number of coefficients of the recording's approximators together."""
-        return int(self.physics.tops[-1].part.stop)
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Weighted residuals of a family (M, E) and their partial derivatives; None means zero."""
-
-    residual: Array  # (M, E)
-    by_state: Array | None  # (M, E, n)
-    by_top: Array | None  # (M, E): residual e depends on the top of approximator e alone
-    by_theta: Array | None  # (M, E, b): columns `problem.columns(r)`
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +81,16 @@ class Functional:
         x0 = self.problem.experiments[r].initial(self.problem.parameters(theta, r))
         full[part.held] = part.hold @ x0
         return full
+
+    def resting(self, r: int, theta: Array) -> Array:
+        """Coefficients (n,) of recording r with every spline constant at its initial value."""
+        part = self.parts[r]
+        x0 = self.problem.experiments[r].initial(self.problem.parameters(theta, r))
+        coefficients = np.zeros(part.n_coefficients)
+        for state, (i, q) in enumerate(zip(self.chains.root, self.chains.order, strict=True)):
+            if q == 0:  # B-splines sum to one
+                coefficients[part.physics.tops[i].part] = x0[state]
+        return self.complete(r, coefficients, theta)
 
     def hold_jacobian(self, r: int, theta: Array) -> Array | None:
         """d c[held] / d θ (k, b) in the columns of `problem.columns(r)`; None where constant."""
@@ -201,7 +173,7 @@ class Functional:
             _, columns = self.problem.columns(r)
             own, border = [], []
             for sites, rows in zip(self.families(r), self.rows(r, c, theta, lam), strict=True):
-                own.append(_by_coefficients(sites, rows, c))
+                own.append(by_coefficients(sites, rows, c))
                 dense = np.zeros((rows.residual.size, theta.size))
                 if rows.by_theta is not None:
                     dense[:, columns] = rows.by_theta.reshape(rows.residual.size, -1)
@@ -281,26 +253,3 @@ def _output_delays(problem: Problem) -> Array:
                 raise errors.BadSetting(errors.relaxation_cannot_see(
                     names, f"the delay of {what} '{item.name}'"))
     return delays(model.outputs, model, np.array(list(model.values.values())))
-
-
-def _by_coefficients(sites: Sites, rows: Rows, c: Array) -> sparse.csr_array:
-    """Chain rule through the tables, rows ordered as `residual.ravel()` (M·E, n)."""
-    count, width = rows.residual.shape
-    total = sparse.csr_array((count * width, c.size))
-    for e in range(width):
-        # Row m·E + e of the stack, as a matrix that spreads a family's M rows into it.
-        spread = sparse.csr_array(
-            (np.ones(count), (np.arange(count) * width + e, np.arange(count))),
-            shape=(count * width, count))
-        pieces = []
-        if rows.by_state is not None:
-            pieces += [(rows.by_state[:, e, s], table) for s, table in enumerate(sites.states)]
-        if rows.by_top is not None:
-            pieces.append((rows.by_top[:, e], sites.tops[e]))
-        for weight, table in pieces:
-            scaled = sparse.csr_array(table.jacobian(c)).multiply(weight[:, None]).tocsr()
-            placed = sparse.csr_array(
-                (scaled.data, scaled.indices + table.part.start, scaled.indptr),
-                shape=(count, c.size))
-            total = total + spread @ placed
-    return total

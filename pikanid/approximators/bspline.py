@@ -96,7 +96,7 @@ class BSpline:
         if low < 0:
             first, _ = self.local(t, 0)
             return first, np.zeros((t.size, self.degree + 1))
-        # The outermost knots carry nothing of lower degree; left in, they would hide the last piece.
+        # The outermost knots carry nothing of lower degree, and would hide the last piece.
         inner = self.knots[derivative : self.knots.size - derivative]
         matrix = SciPyBSpline.design_matrix(t, inner, low)
         values = matrix.data.reshape(t.size, low + 1)

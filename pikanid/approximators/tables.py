@@ -52,6 +52,12 @@ class Table:
         assert self.matrix is not None
         return self.matrix
 
+    @property
+    def window(self) -> tuple[NDArray[np.int64], Array]:
+        """First coefficient (M,) and local basis values (M, width) of a linear approximator."""
+        assert self.first is not None and self.local is not None
+        return self.first, self.local
+
     def jacobian(self, coefficients: Array) -> Matrix:
         """Derivative of `values` by the approximator's own coefficients (M, n_part)."""
         if self.matrix is not None:

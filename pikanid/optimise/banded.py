@@ -88,8 +88,8 @@ class BandedAssembler:
                 stacked[..., w:w + b] = row.by_theta
             stacked[..., -1] = row.residual
             gram = _gram(stretches, stacked)
-            lower_a, lower_b = stretches.lower
-            band += np.bincount(stretches.band.ravel(), gram[:, lower_a, lower_b].ravel(), band.size)
+            products = gram[:, stretches.lower[0], stretches.lower[1]]
+            band += np.bincount(stretches.band.ravel(), products.ravel(), band.size)
             into = stretches.columns.ravel()
             slope += np.bincount(into, gram[:, :w, -1].ravel(), n)
             if row.by_theta is not None:
@@ -111,11 +111,11 @@ def local_jacobian(sites: Sites, rows: Rows) -> Array:
     for s, table in enumerate(sites.states):
         if rows.by_state is not None:
             at, size, _ = blocks[table.part.start]
-            out[:, :, at:at + size] += rows.by_state[:, :, s, None] * table.local[:, None, :]
+            out[:, :, at:at + size] += rows.by_state[:, :, s, None] * table.window[1][:, None, :]
     for e, table in enumerate(sites.tops):
         if rows.by_top is not None:
             at, size, _ = blocks[table.part.start]
-            out[:, e, at:at + size] += rows.by_top[:, e, None] * table.local
+            out[:, e, at:at + size] += rows.by_top[:, e, None] * table.window[1]
     return out
 
 
@@ -125,8 +125,9 @@ def _blocks(sites: Sites) -> dict[int, tuple[int, int, Ints]]:
     at = 0
     for table in (*sites.states, *sites.tops):
         if table.part.start not in blocks:
-            size = table.local.shape[1]
-            blocks[table.part.start] = (at, size, table.first)
+            first, values = table.window
+            size = values.shape[1]
+            blocks[table.part.start] = (at, size, first)
             at += size
     return blocks
 

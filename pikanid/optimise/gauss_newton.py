@@ -8,7 +8,6 @@ inside the box.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -201,12 +200,17 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     return np.clip(change, lower, upper)
 
 
+# A stop without decrease counts as converged up to this many times one datum's share of the cost:
+# the estimate is then within a tenth of a standard error.
+ROUNDING = 1e-2
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """Where Gauss-Newton stopped."""
 
     at: Linearisation
-    step: Step  # the step that would come next: tiny where converged
+    step: Step  # the undamped step that would come next: tiny where converged
     iterations: int
     converged: bool
 
@@ -221,26 +225,31 @@ def gauss_newton(system: BandedSystem, point: Point, lam: float, lower: Array, u
     """
     at = system.linearise(point, lam)
     share = 1.0 / max(1, system.functional.n_data)
-    damping, done, step = 0.0, 0, _damped_step(system, at, lower, upper, 0.0)
-    while done < iterations:
-        if step.promised <= tolerance * share * at.cost:
-            return Outcome(at, step, done, True)
+    damping, done = 0.0, 0
+    step = damped_step(system, at, lower, upper, damping)
+    while step.promised > tolerance * share * at.cost:
+        if done == iterations:
+            return Outcome(at, damped_step(system, at, lower, upper, 0.0), done, False)
         for _ in range(20):
             trial = system.linearise(system.moved(at.point, step), lam)
             if np.isfinite(trial.cost) and trial.cost <= at.cost - 1e-4 * step.promised:
                 break
             damping = max(1e-4, 8.0 * damping)
-            step = _damped_step(system, at, lower, upper, damping)
-        else:  # no decrease at any damping: rounding has been reached
-            return Outcome(at, step, done, step.promised <= 1e-9 * at.cost)
+            step = damped_step(system, at, lower, upper, damping)
+        else:  # no decrease at any damping: rounding, or a kink
+            step = damped_step(system, at, lower, upper, 0.0)
+            return Outcome(at, step, done, step.promised <= ROUNDING * share * at.cost)
         at, done = trial, done + 1
         damping = 0.0 if damping < 1e-6 else 0.1 * damping
-        step = _damped_step(system, at, lower, upper, damping)
-    return Outcome(at, step, done, False)
+        step = damped_step(system, at, lower, upper, damping)
+    if damping > 0.0:
+        step = damped_step(system, at, lower, upper, 0.0)
+    return Outcome(at, step, done, True)
 
 
-def _damped_step(system: BandedSystem, at: Linearisation, lower: Array, upper: Array,
-                 damping: float) -> Step:
+def damped_step(system: BandedSystem, at: Linearisation, lower: Array, upper: Array,
+                damping: float) -> Step:
+    """The step at a damping, or at the least one that makes the matrices positive definite."""
     while True:
         try:
             return system.step(at, lower, upper, damping)

@@ -65,10 +65,16 @@ class Fixed:
 class Continuation:
     """λ up by `factor` until no parameter moves by more than `settled` standard errors.
 
-    What a finite λ biases falls as 1/λ, so that after a move of Δ no more than Δ/(factor - 1) is
-    left.  That holds for splines with as many coefficients as physics conditions.
+    Where the splines can meet the physics for any θ, what a finite λ biases falls as 1/λ: after a
+    move of Δ no more than Δ/(factor - 1) is left.  `lockable` splines cannot (smoother than the
+    equation, they have fewer coefficients than there are physics conditions): their physics cost
+    λ·P has a floor that rises as λ, and a larger λ locks the fit (1/l -> 0 minimises the physics
+    alone).  The stage before that is then the result.  `noise_cost` is the data cost that noise
+    alone explains; below half of it the splines still follow the noise, and a rise means nothing.
     """
 
+    noise_cost: float
+    lockable: bool = False
     start: float = 1.0
     factor: float = 100.0
     settled: float = 0.05
@@ -77,62 +83,29 @@ class Continuation:
     warmup: int = 3
 
     def next(self, past: Sequence[Stage]) -> float | None:
-        """The next λ, or None where the estimate has settled or λ has its limit."""
+        """The next λ, or None where the estimate has settled, locked, or got no further."""
         if not past:
             return self.start
-        settled = len(past) >= 3 and _move(past, -1, self.relative) <= self.settled
-        return None if settled or past[-1].lam >= self.limit else past[-1].lam * self.factor
-
-    def keep(self, past: Sequence[Stage]) -> int:
-        """The last stage."""
-        return len(past) - 1
-
-
-@dataclass(frozen=True)
-class Cautious:
-    """λ up by `factor`, back one step where the splines themselves become the limit.
-
-    Splines smoother than the equation have fewer coefficients than there are physics conditions;
-    a large λ locks them (1/l -> 0 minimises the physics alone).  The sign: where the physics could
-    be met, its cost λ·P falls as 1/λ; where the discretisation leaves a floor, it rises as λ.
-    `noise_cost` is the data cost that noise alone explains; below half of it the splines still
-    follow the noise, and a rise means nothing.
-    """
-
-    noise_cost: float
-    start: float = 1.0
-    factor: float = 10.0
-    settled: float = 0.05
-    relative: float = 1e-6
-    limit: float = 1e12
-    warmup: int = 3
-
-    def next(self, past: Sequence[Stage]) -> float | None:
-        """The next λ, or None where the estimate has settled or the splines began to lock."""
-        if not past:
-            return self.start
-        calm = len(past) >= 3 and _move(past, -1, self.relative) <= self.settled
-        if calm or self._locked(past) or past[-1].lam >= self.limit:
+        last = past[-1]
+        if self._locked(past) or last.lam >= self.limit or (
+                len(past) > 1 and not last.converged):
             return None
-        return past[-1].lam * self.factor
+        settled = len(past) >= 3 and (
+            moved(past[-2].theta, last.theta, past[-2].std, self.relative) <= self.settled)
+        return None if settled else last.lam * self.factor
 
     def keep(self, past: Sequence[Stage]) -> int:
-        """The last stage before the lock."""
-        return len(past) - (2 if self._locked(past) else 1)
+        """The last stage before a lock or a failure to converge."""
+        bad = self._locked(past) or (len(past) > 1 and not past[-1].converged)
+        return len(past) - (2 if bad else 1)
 
     def _locked(self, past: Sequence[Stage]) -> bool:
-        if len(past) < 2:
+        if not self.lockable or len(past) < 2:
             return False
         last, before = past[-1], past[-2]
         floor = last.physics_cost > 0.5 * self.factor * before.physics_cost
         misfit = last.data_cost > 1.5 * max(self.noise_cost, before.data_cost)
         return misfit or (floor and last.data_cost > 0.5 * self.noise_cost)
-
-
-def _move(past: Sequence[Stage], index: int, relative: float) -> float:
-    """Move into stage `index`, in the standard errors of the stage before it."""
-    before, after = past[index - 1], past[index]
-    return moved(before.theta, after.theta, before.std, relative)
 
 
 def moved(before: Array, after: Array, std: Array, relative: float) -> float:
@@ -143,5 +116,5 @@ def moved(before: Array, after: Array, std: Array, relative: float) -> float:
     """
     if after.size == 0:
         return 0.0
-    scale = std + relative / 0.05 * np.abs(after) + np.finfo(float).tiny
+    scale = np.maximum(std + relative / 0.05 * np.abs(after), 1e-150)
     return float(np.max(np.abs(after - before) / scale))

@@ -11,13 +11,14 @@ protocol and for those who ask.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.approximators import Array
+from pikanid.approximators import Array, LinearApproximator
 from pikanid.approximators.bspline import (
     BSpline,
     aligned_breakpoints,
@@ -37,6 +38,33 @@ Quadrature = Literal["gauss", "integral", "sum"]
 # First spacing: this many radians of the fastest linearised motion an interval.
 RADIANS = 1.5
 PAPER_INTERVALS = 80
+
+
+class Discretisation(Protocol):
+    """What a relaxation needs to know of its approximators and physics nodes."""
+
+    @property
+    def knots(self) -> str:
+        """How the knots were placed."""
+
+    @property
+    def quadrature(self) -> str:
+        """How the physics is summed."""
+
+    @property
+    def degree(self) -> int:
+        """Degree of the longest chain's approximator."""
+
+    @property
+    def n_intervals(self) -> int:
+        """Intervals of all recordings together."""
+
+    def splines(self, problem: Problem, chains: Chains
+                ) -> Sequence[tuple[LinearApproximator, ...]]:
+        """One approximator a chain, for every recording."""
+
+    def nodes(self, problem: Problem, chains: Chains) -> Sequence[tuple[Array, Array]]:
+        """Times and weights of the physics residual, for every recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,14 +137,16 @@ def default_grid(problem: Problem, field: VectorField, chains: Chains, *, degree
     """Collocation grid: breakpoints at all switches, between them as fine as the motion asks.
 
     The first spacing is 1.5 radians of the fastest eigenvalue of ∂f/∂x at the initial state and
-    guess (or the duration over `intervals`).  Four Gauss points an interval, order 8; two where the
-    inputs switch so often that the switches alone resolve the motion.
+    guess, at most four samples or a 64th of the duration (or the duration over `intervals`).
+    Four Gauss points an interval, order 8; two where the inputs switch so often that the switches
+    alone resolve the motion.
     """
     breakpoints, crowded = [], 0
     for r, experiment in enumerate(problem.experiments):
         duration = experiment.t1 - experiment.t0
         if intervals is None:
-            spacing = min(duration / 8, RADIANS / max(_rate(problem, field, r), 1e-300))
+            coarse = duration / np.clip(experiment.n_samples / 4, 8, 64)
+            spacing = min(coarse, RADIANS / max(fastest_rate(problem, field, r), 1e-300))
             spacing = max(spacing, duration / (4 * experiment.n_samples + 64))
         else:
             spacing = duration / intervals
@@ -153,7 +183,7 @@ def paper_intervals(problem: Problem) -> int:
     return max(4, min(PAPER_INTERVALS, samples // 2))
 
 
-def _rate(problem: Problem, field: VectorField, r: int) -> float:
+def fastest_rate(problem: Problem, field: VectorField, r: int) -> float:
     """Largest |eigenvalue| of ∂f/∂x [1/s] at the initial state, over the inputs met."""
     experiment: Experiment = problem.experiments[r]
     p = problem.parameters(problem.guess, r)

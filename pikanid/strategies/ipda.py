@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from pikanid import errors
 from pikanid.chains import Form, find_chains
 from pikanid.estimate import Estimate
 from pikanid.model import Model
-from pikanid.optimise.schedules import Cautious, Continuation, Fixed, Schedule
+from pikanid.optimise.schedules import Continuation, Fixed, Schedule
 from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
@@ -32,6 +32,7 @@ from pikanid.strategies.relaxed_estimate import relaxed_estimate
 PAPER_DEGREE = 3
 PAPER_LAMBDA = 1e-4
 PAPER_WARMUP = 15
+STEADY_STARTS = (1e4, 1e8)
 
 
 @dataclass(frozen=True)
@@ -108,19 +109,23 @@ def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
     else:
         degree = settings.degree or (PAPER_DEGREE if paper else max(chains.lengths) + 3)
         grid = chosen_grid(
-            problem, chosen, degree=degree, intervals=settings.intervals or paper_intervals(problem),
+            problem, chosen, degree=degree,
+            intervals=settings.intervals or paper_intervals(problem),
             quadrature=settings.physics or ("sum" if paper else "gauss"))
 
-    def schedule(noise: float) -> Schedule:
+    def plans(noise: float) -> list[Schedule]:
         if settings.lam is not None or paper:
             warmup = PAPER_WARMUP if settings.warmup is None else settings.warmup
-            return Fixed(_paper_lambda(problem) if settings.lam is None else settings.lam, warmup)
-        warmup = 3 if settings.warmup is None else settings.warmup
+            return [Fixed(settings.lam or _paper_lambda(problem), warmup)]
+        gentle = Continuation(noise**2 * problem.n_samples, grid.locks,
+                              warmup=3 if settings.warmup is None else settings.warmup)
         if grid.locks:
-            return Cautious(noise**2 * problem.n_samples, warmup=warmup)
-        return Continuation(warmup=warmup)
+            return [replace(gentle, factor=10.0)]
+        # Weak physics at first tolerates a bad guess; where that goes astray, strong physics keeps
+        # to the guess, as shooting does.
+        return [gentle, *(replace(gentle, start=start, warmup=0) for start in STEADY_STARTS)]
 
-    return relax(setup, grid, schedule, refine=settle)
+    return relax(setup, grid, plans, refine=settle)
 
 
 def _paper_lambda(problem: Problem) -> float:

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from pikanid import errors
 from pikanid.approximators import Array
@@ -35,6 +35,7 @@ PAPER_DEGREE = 3
 # The smoothed derivative of order m + SMOOTHER is penalised by default; the regression needs m.
 SMOOTHER = 1
 MOST_INTERVALS_A_SAMPLE = 0.5
+SWITCHES_A_SAMPLE = 0.05
 REGRESSION_STEPS = 50
 
 
@@ -90,7 +91,8 @@ def fit_decoupled(problem: Problem, settings: PDA) -> RelaxedFit:
     chains = find_chains(problem.model, settings.form)
     degree = settings.degree or (PAPER_DEGREE if paper else max(chains.lengths) + 3)
     grid = chosen_grid(
-        problem, settings.knots or ("adaptive" if paper else "aligned"), degree=degree,
+        problem, settings.knots or ("adaptive" if paper or _crowded(problem) else "aligned"),
+        degree=degree,
         intervals=settings.intervals or (paper_intervals(problem) if paper else _fine(problem)),
         quadrature=settings.physics or ("sum" if paper else "gauss"))
     given = not paper and not start_is_estimated(problem)
@@ -118,8 +120,7 @@ def smooth_data(system: BandedSystem, rho: float | None) -> Smoothed:
     """
     functional = system.functional
     theta = functional.problem.guess
-    flat = Point(tuple(functional.complete(r, np.zeros(part.n_coefficients), theta)
-                       for r, part in enumerate(functional.parts)), theta)
+    flat = Point(tuple(functional.resting(r, theta) for r in range(len(functional.parts))), theta)
     found = smooth(system, flat, rho)
     unseen = [functional.problem.model.state_names[functional.chains.root.index(i)]
               for i in range(len(functional.chains.top)) if not _is_seen(functional, i)]
@@ -210,6 +211,12 @@ def _is_seen(functional: Functional, chain: int) -> bool:
     model = functional.problem.model
     names = {model.state_names[s] for s, i in enumerate(functional.chains.root) if i == chain}
     return any(names & {q.name for q in o.expression.free_symbols} for o in model.outputs)
+
+
+def _crowded(problem: Problem) -> bool:
+    """Whether inputs switch so often that splines free to bend at every switch smooth nothing."""
+    switches = sum(e.breakpoints().size for e in problem.experiments)
+    return switches > 8 + SWITCHES_A_SAMPLE * problem.n_samples
 
 
 def _fine(problem: Problem) -> int:

@@ -7,14 +7,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pikanid import errors
 from pikanid.approximators import Array
-from pikanid.approximators.bspline import BSpline
 from pikanid.chains import Chains
 from pikanid.functional import Functional, Sites, bind
 from pikanid.optimise.covariance import effective_parameters, theta_covariance
@@ -28,13 +27,19 @@ from pikanid.optimise.gauss_newton import (
 from pikanid.optimise.schedules import Schedule, Stage, moved
 from pikanid.optimise.smoothing import Smoothed, smooth
 from pikanid.problem import Problem
+from pikanid.simulation.lowering import lower_model
 from pikanid.simulation.vectorfield import VectorField
-from pikanid.strategies.grids import Grid
+from pikanid.strategies.first_points import from_simulation, transfer
+from pikanid.strategies.grids import Discretisation, Grid
 
 # The grid is fine enough once halving it moves no parameter by more than this many standard errors.
 GRID_SETTLED = 0.05
 MAX_REFINEMENTS = 6
-MAX_ITERATIONS = 200  # at one λ
+# A move this large says that the coarser grid misled the fit: it starts anew on the finer one.
+GRID_MISLED = 10.0
+MAX_ITERATIONS = 100  # at one λ
+# A data cost up to this multiple of what noise explains ends the search for a better path.
+EXPLAINED = 1.5
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
 RELATIVE = 1e-6
 
@@ -54,7 +59,7 @@ class RelaxedFit:
     naive_covariance: Array
     coefficients: tuple[Array, ...] = field(repr=False)
     functional: Functional = field(repr=False)
-    grid: Grid = field(repr=False)
+    grid: Discretisation = field(repr=False)
     lam: float
     stages: tuple[Stage, ...] = field(repr=False)
     data_cost: float
@@ -99,7 +104,7 @@ class Setup:
     weighted: bool
     nondimensional: bool  # λ in units of N·σ²/(T·s²), s the size of the physics terms
 
-    def functional(self, grid: Grid) -> Functional:
+    def functional(self, grid: Discretisation) -> Functional:
         """Eq. (2) on a grid."""
         return bind(self.problem, self.field, self.chains, grid.splines(self.problem, self.chains),
                     grid.nodes(self.problem, self.chains), given_start=self.given_start,
@@ -114,10 +119,9 @@ def start_is_estimated(problem: Problem) -> bool:
 
 
 def first_point(functional: Functional) -> tuple[Point, Smoothed | None]:
-    """Splines smoothed through the data, θ at its guess; flat splines where data say too little."""
+    """Splines smoothed through the data, θ at its guess; flat ones where data say too little."""
     theta = functional.problem.guess
-    flat = tuple(functional.complete(r, np.zeros(part.n_coefficients), theta)
-                 for r, part in enumerate(functional.parts))
+    flat = tuple(functional.resting(r, theta) for r in range(len(functional.parts)))
     smoothed = smooth(BandedSystem(functional.smoothing()), Point(flat, theta))
     return (Point(flat, theta), None) if smoothed is None else (smoothed.point, smoothed)
 
@@ -144,38 +148,73 @@ def physics_scale(functional: Functional, point: Point, sigma: float) -> Array:
     return size * np.sqrt(total / functional.n_data) / sigma
 
 
-def relax(setup: Setup, grid: Grid, schedule: Callable[[float], Schedule], *,
+def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]], *,
           refine: bool) -> RelaxedFit:
     """Fit Eq. (2): smooth, warm up, follow the λ-schedule, refine the grid until it has settled.
 
-    `schedule` is called with the noise level of the data rows: 1 where they are divided by σ.
+    `plans` is called with the noise level of the data rows (1 where they are divided by σ); the
+    schedules after the first are tried only until one explains the data.
 
     Raises:
         BadSetting: If the splines cannot carry the model, or a delay is to be estimated.
     """
+    system, stages, outcome, notes = _from_data(setup, grid, plans)
+    if lower_model(setup.problem.model).switches:
+        notes.append(errors.relaxation_smears())
+        refine = False  # no grid settles while a kink wanders through it
+    gap = 0.0
+    for _ in range(MAX_REFINEMENTS if refine else 0):
+        grid, before, lam = grid.refined(), outcome, stages[-1].lam
+        coarse = system.functional
+        finer = setup.functional(grid).with_scale(coarse.scale)
+        system = BandedSystem(finer)
+        outcome = gauss_newton(system, transfer(coarse, finer, before.at.point), lam,
+                               setup.problem.lower, setup.problem.upper)
+        stages.append(_stage(system, lam, outcome))
+        gap = moved(before.at.point.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
+        if gap > GRID_MISLED or not outcome.converged:
+            system, stages, outcome, notes = _from_data(setup, grid, plans)
+        if gap <= GRID_SETTLED:
+            break
+    if gap > GRID_SETTLED:
+        notes.append(errors.grid_not_settled(gap, grid.n_intervals))
+    if not outcome.converged:
+        notes.append(errors.not_converged(stages[-1].lam))
+    return conclude(setup, grid, system, outcome, stages, notes)
+
+
+def _from_data(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
+               ) -> tuple[BandedSystem, list[Stage], Outcome, list[str]]:
+    """The whole way on one grid: smooth the data, scale the physics, follow λ."""
     functional = setup.functional(grid)
     point, smoothed = first_point(functional)
     noise = noise_level(functional, smoothed)
     if setup.nondimensional:
         functional = functional.with_scale(physics_scale(functional, point, noise))
     system = BandedSystem(functional)
-    stages, outcome, notes = follow(system, point, schedule(noise))
-    lam, gap = stages[-1].lam, 0.0
-    for _ in range(MAX_REFINEMENTS if refine else 0):
-        grid = grid.refined()
-        finer = setup.functional(grid).with_scale(functional.scale)
-        start = transfer(functional, finer, outcome.at.point)
-        functional, system, before = finer, BandedSystem(finer), outcome.at.point.theta
-        outcome = gauss_newton(system, start, lam, setup.problem.lower, setup.problem.upper)
-        stages.append(_stage(system, lam, outcome))
-        gap = moved(before, outcome.at.point.theta, stages[-1].std, RELATIVE)
-        if gap <= GRID_SETTLED:
+    return (system, *_best_path(system, point, plans(noise), noise))
+
+
+def _best_path(system: BandedSystem, point: Point, plans: Sequence[Schedule],
+               noise: float) -> tuple[list[Stage], Outcome, list[str]]:
+    enough = EXPLAINED * noise**2 * system.functional.n_data
+    paths = []
+    start: Point | None = point
+    for k, plan in enumerate(plans):
+        if k == 1:
+            start = from_simulation(system.functional)
+        if start is None:
             break
-    if gap > GRID_SETTLED:
-        notes.append(errors.grid_not_settled(gap, grid.n_intervals))
-    if not outcome.converged:
-        notes.append(errors.not_converged(lam))
-    return _conclude(setup, grid, system, outcome, stages, notes)
+        stages, outcome, notes = follow(system, start, plan)
+        good = outcome.converged and not notes
+        # Both parts of the cost: a path that ended at a weak λ fits data at the physics' expense.
+        explains = outcome.at.cost <= enough
+        paths.append(((good, explains, stages[-1].lam * (not good), -outcome.at.cost),
+                      stages, outcome, notes))
+        if good and explains:
+            break
+    _, stages, outcome, notes = max(paths, key=lambda path: path[0])
+    return stages, outcome, notes
 
 
 def follow(system: BandedSystem, point: Point,
@@ -196,29 +235,9 @@ def follow(system: BandedSystem, point: Point,
         stages.append(_stage(system, lam, outcomes[-1]))
         lam = plan.next(stages)
     kept = plan.keep(stages)
-    notes = [errors.relaxation_locked(stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
+    notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
+        stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
     return stages[:kept + 1], outcomes[kept], notes
-
-
-def transfer(old: Functional, new: Functional, point: Point) -> Point:
-    """The same trajectories on a finer grid: interpolation at the Greville points of its knots.
-
-    Exact, because the spaces are nested.
-    """
-    from scipy.interpolate import make_interp_spline
-
-    coefficients = []
-    for r, (before, after) in enumerate(zip(old.parts, new.parts, strict=True)):
-        pieces = []
-        for i, fine in enumerate(after.approximators):
-            coarse = before.approximators[i]
-            assert isinstance(coarse, BSpline) and isinstance(fine, BSpline)
-            own = point.coefficients[r][before.physics.tops[i].part]
-            t = fine.greville
-            values = coarse.values(t, own)
-            pieces.append(make_interp_spline(t, values, fine.degree, t=fine.knots).c)
-        coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
-    return Point(tuple(coefficients), point.theta)
 
 
 def noise_level(functional: Functional, smoothed: Smoothed | None) -> float:
@@ -260,8 +279,9 @@ def _stage(system: BandedSystem, lam: float, outcome: Outcome) -> Stage:
                  outcome.at.physics_cost, outcome.iterations, outcome.converged)
 
 
-def _conclude(setup: Setup, grid: Grid, system: BandedSystem, outcome: Outcome,
+def conclude(setup: Setup, grid: Discretisation, system: BandedSystem, outcome: Outcome,
               stages: list[Stage], notes: list[str]) -> RelaxedFit:
+    """Covariances and effective parameters at the end of a fit."""
     at, step = outcome.at, outcome.step
     effective = effective_parameters(system, at, step)
     noise = row_noise(system.functional, at, effective)

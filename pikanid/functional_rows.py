@@ -1,0 +1,77 @@
+"""The parts of Eq. (2): where residuals are taken, and what they are at an iterate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pikanid.approximators import Approximator, Array, LinearApproximator
+from pikanid.approximators.tables import Table
+
+AnyApproximator = Approximator | LinearApproximator
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """Where one family of residuals is taken: M times, E residuals each."""
+
+    t: Array  # (M,)
+    u: Array  # (M, m)
+    weight: Array  # (M, E): square root of the quadrature weight, or 1/σ
+    states: tuple[Table, ...]  # one per state
+    tops: tuple[Table, ...] = ()  # highest derivative of each approximator: E of them
+    target: Array | None = None  # (M, 1): the samples
+    output: int = 0  # which output they are samples of
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One recording's share: its approximators (one per chain) and residual families."""
+
+    approximators: tuple[AnyApproximator, ...]
+    data: tuple[Sites, ...]
+    physics: Sites
+    start: Sites | None  # heavy rows for the initial state, where it cannot be eliminated
+    held: NDArray[np.int64]  # coefficients fixed by the initial state
+    hold: Array  # (k, n): c[held] = hold @ x0
+
+    @property
+    def n_coefficients(self) -> int:
+        """Number of coefficients of the recording's approximators together."""
+        return int(self.physics.tops[-1].part.stop)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Weighted residuals of a family (M, E) and their partial derivatives; None means zero."""
+
+    residual: Array  # (M, E)
+    by_state: Array | None  # (M, E, n)
+    by_top: Array | None  # (M, E): residual e depends on the top of approximator e alone
+    by_theta: Array | None  # (M, E, b): columns `problem.columns(r)`
+
+
+def by_coefficients(sites: Sites, rows: Rows, c: Array) -> sparse.csr_array:
+    """Jacobian (M·E, n) of a family by a recording's coefficients, rows as `residual.ravel()`."""
+    count, width = rows.residual.shape
+    total = sparse.csr_array((count * width, c.size))
+    for e in range(width):
+        # Row m·E + e of the stack, as a matrix that spreads a family's M rows into it.
+        spread = sparse.csr_array(
+            (np.ones(count), (np.arange(count) * width + e, np.arange(count))),
+            shape=(count * width, count))
+        pieces = []
+        if rows.by_state is not None:
+            pieces += [(rows.by_state[:, e, s], table) for s, table in enumerate(sites.states)]
+        if rows.by_top is not None:
+            pieces.append((rows.by_top[:, e], sites.tops[e]))
+        for weight, table in pieces:
+            scaled = sparse.csr_array(table.jacobian(c)).multiply(weight[:, None]).tocsr()
+            placed = sparse.csr_array(
+                (scaled.data, scaled.indices + table.part.start, scaled.indptr),
+                shape=(count, c.size))
+            total = total + spread @ placed
+    return total
