@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, TextIO
+from typing import Annotated, Any, TextIO
 
 import typer
 
@@ -20,6 +20,8 @@ from pikanid.commands.models import EXAMPLES as MODELS
 from pikanid.commands.models import models
 from pikanid.commands.simulate import EXAMPLES as SIMULATE
 from pikanid.commands.simulate import simulate
+from pikanid.commands.study import EXAMPLES as STUDY
+from pikanid.commands.study import study
 
 EXIT_INTERRUPTED = 130
 EXAMPLES = """Examples:
@@ -33,7 +35,7 @@ EXAMPLES = """Examples:
 Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
 
 # What typer raises for wrong usage; where its base class lives depends on the version.
-UsageError: type[Exception] = typer.BadParameter.__mro__[2]
+UsageError: Any = typer.BadParameter.__mro__[2]
 
 app = typer.Typer(
     name="pikanid", add_completion=False, rich_markup_mode="rich",
@@ -41,6 +43,7 @@ app = typer.Typer(
 app.command(epilog=IDENTIFY)(identify)
 app.command(epilog=SIMULATE)(simulate)
 app.command(epilog=MODELS)(models)
+app.command(epilog=STUDY)(study)
 
 
 @app.callback(invoke_without_command=True, epilog=EXAMPLES)
@@ -75,8 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain(str(problem), problem.exit_code)
     except UsageError as problem:
         command = " ".join(["pikanid", *(w for w in words[:1] if w in _commands())])
-        what = getattr(problem, "format_message", lambda: str(problem))()
-        return _complain(errors.usage(what, command), 2)
+        # Unlike str(), it names the option.
+        return _complain(errors.usage(problem.format_message(), command), 2)
     except BrokenPipeError:
         # The reader has left: nothing is wrong, and Python must not flush once more at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -101,7 +104,7 @@ def _complain(text: str, code: int) -> int:
 
 
 def _commands() -> list[str]:
-    return [c.name or getattr(c.callback, "__name__", "") for c in app.registered_commands]
+    return [str(getattr(command.callback, "__name__", "")) for command in app.registered_commands]
 
 
 def _never_fail_to_print(stream: TextIO) -> None:

@@ -27,6 +27,9 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MEASURED = "#555555"
 BAND = "#BBBBBB"
 ENDINGS = (".png", ".svg", ".pdf")
+# Curves that lie upon each other stay visible: later ones are thinner, and their gaps differ.
+WIDTHS = (2.2, 1.7, 1.3, 1.0, 0.8, 0.7)
+DASHES = ("-", (0, (5, 3)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 3)), (0, (8, 4)))
 # Beyond this many samples markers merge into a band: draw a thin line instead.
 MANY = 2000
 DPI = 130
@@ -99,9 +102,9 @@ def _curves(axes: Axes, fits: Mapping[str, FitLike]) -> None:
         {"marker": ".", "markersize": 4, "linestyle": "none"}
         if len(first.t) <= MANY else {"linewidth": 1.6})
     axes.plot(first.t[order], first.measured[order], color=MEASURED, label="measured", **style)
-    for (name, fit), colour in zip(fits.items(), _cycled(len(fits)), strict=True):
+    for k, (name, fit) in enumerate(fits.items()):
         order = np.argsort(fit.t, kind="stable")
-        axes.plot(fit.t[order], fit.fitted[order], color=colour, linewidth=1.2, label=name)
+        axes.plot(fit.t[order], fit.fitted[order], label=name, **stroke(k, 0.7))
     axes.set_ylabel(labelled(first.output, first.unit))
     # Above the axes: inside, a legend would cover an oscillation somewhere.
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(fits) + 1, frameon=False,
@@ -118,9 +121,9 @@ def _residuals(axes: Axes, fits: Mapping[str, FitLike]) -> None:
                           label="±2σ of the noise")
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small",
                     borderaxespad=0.1, handlelength=1.4)
-    for fit, colour in zip(fits.values(), _cycled(len(fits)), strict=True):
+    for k, fit in enumerate(fits.values()):
         order = np.argsort(fit.t, kind="stable")
-        axes.plot(fit.t[order], (fit.measured - fit.fitted)[order], color=colour, linewidth=0.7)
+        axes.plot(fit.t[order], (fit.measured - fit.fitted)[order], **stroke(k, 0.45))
     axes.axhline(0.0, color="black", linewidth=0.6)
     axes.set_ylabel(labelled("residual", first.unit))
     tidy(axes)
@@ -141,6 +144,16 @@ def tidy(axes: Axes) -> None:
     axes.grid(True, linewidth=0.4, alpha=0.5)
     axes.tick_params(labelsize="small")
     axes.margins(x=0.01)
+
+
+def stroke(k: int, scale: float = 1.0) -> dict[str, Any]:
+    """Colour, width and dashes of the k-th curve that shows the same quantity.
+
+    >>> stroke(0)["color"]
+    '#0072B2'
+    """
+    k %= len(COLOURS)
+    return {"color": COLOURS[k], "linewidth": scale * WIDTHS[k], "linestyle": DASHES[k]}
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -169,10 +182,6 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     if ending not in ENDINGS:
         raise errors.BadSetting(errors.output_ending("The figure", str(path), ENDINGS))
     atomically(file, image(figure, ending))
-
-
-def _cycled(count: int) -> list[str]:
-    return [COLOURS[k % len(COLOURS)] for k in range(count)]
 
 
 @cache

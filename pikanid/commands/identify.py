@@ -31,8 +31,6 @@ EXAMPLES = """Examples:
 
 Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
 
-Texts = Annotated[list[str], typer.Option()]
-
 
 def identify(
     recordings: Annotated[list[str], typer.Argument(
@@ -44,7 +42,8 @@ def identify(
     strategy: Annotated[str, typer.Option(
         "--strategy", "-s", metavar="|".join([*STRATEGIES, ALL]), help="how to fit")] = "nls",
     protocol: Annotated[str, typer.Option(
-        metavar="default|paper", help="settings: the best known, or those of the paper")] = "default",
+        metavar="default|paper",
+        help="settings: the best known, or those of the paper")] = "default",
     sigma: Annotated[list[str], typer.Option(
         metavar="[NAME=]VALUE|auto", show_default=False,
         help="noise of an output, as 0.1deg or theta=0.1deg; auto estimates it")] = [],  # noqa: B006
@@ -76,7 +75,8 @@ def identify(
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", help="draw data, fit and residuals (.png, .svg, .pdf)")] = None,
     save: Annotated[str | None, typer.Option(
-        metavar="FILE", help="keep the whole estimate (.json, .json.gz), for Estimate.load")] = None,
+        metavar="FILE",
+        help="keep the whole estimate (.json, .json.gz), for Estimate.load")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
 ) -> int:
     """Estimate a model's parameters from recordings, with standard errors and a verdict."""

@@ -18,7 +18,7 @@ EXAMPLES = """Examples:
 
   pikanid simulate --model sloshing --sigma 0.1deg --out run.csv
 
-  pikanid simulate --model sloshing --set d_theta=0.3 --excitation planar_moves --duration 20 --out rich.csv
+  pikanid simulate --model sloshing --set d_theta=0.3 --excitation move --out move.csv
 
   pikanid simulate --model my.toml --excitation motion.csv --seed 7 --out run.parquet
 
@@ -100,7 +100,8 @@ def _excitation(model: Model, name: str, duration: float, rate: float,
     if name in ("two_pulse", "move"):
         rec = getattr(excitation, name)(channel=channel, **settings)
     else:
-        rec = getattr(excitation, name)(channels=[i.name for i in required] or [channel], **settings)
+        channels = [i.name for i in required] or [channel]
+        rec = getattr(excitation, name)(channels=channels, **settings)
     for item in required:
         if item.name in rec and item.unit:
             rec = rec.with_unit(item.name, item.unit)

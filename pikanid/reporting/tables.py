@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from pikanid.reporting.console import sentence
 
@@ -21,11 +22,13 @@ def table(*headers: str, numbers: Iterable[str] = ()) -> Table:
     """An empty table; columns named in `numbers` are set to the right."""
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     right = set(numbers)
     for header in headers:
-        made.add_column(header, justify="right" if header in right else "left", overflow="fold")
+        side: Literal["right", "left"] = "right" if header in right else "left"
+        made.add_column(Text(header), justify=side, overflow="fold")
     return made
 
 
@@ -55,10 +58,24 @@ def parameters(estimates: Sequence[Estimate]) -> Table:
         for f in estimate.free:
             low, high = estimate.interval(f.name, recording=f.recording)
             value = rounded(estimate.value(f.name, f.recording), estimate.std(f.name, f.recording))
-            interval = f"{low:.6g} … {high:.6g}" if low < high else "unknown"
+            interval = between(low, high)
             row(made, *first, f.label, value, interval, f.unit, *ends, style=style)
             first, ends = first and [""], ends and ["", ""]
     return made
+
+
+def between(low: float, high: float) -> str:
+    """An interval, with three digits of its width.
+
+    >>> between(0.04499268, 0.04503131), between(float("nan"), float("nan"))
+    ('0.0449927 … 0.0450313', 'unknown')
+    """
+    if not (math.isfinite(low) and math.isfinite(high)) or low >= high:
+        return "unknown"
+    digits = 2 - math.floor(math.log10(high - low))
+    if not 0 <= digits <= 10 or max(abs(low), abs(high)) >= 1e6:
+        return f"{low:.6g} … {high:.6g}"
+    return f"{low:.{digits}f} … {high:.{digits}f}"
 
 
 def show_estimates(out: Console, estimates: Sequence[Estimate], failed: Mapping[str, str]) -> None:
@@ -96,7 +113,8 @@ def show_model(out: Console, model: Model, toml: str) -> None:
     for state in model.states:
         row(signals, state.name, "state", state.unit, f"starts at {to_text(state.initial)}")
     for item in model.inputs:
-        missing = "must be recorded" if item.default is None else f"{item.default:g} if not recorded"
+        given = item.default
+        missing = "must be recorded" if given is None else f"{given:g} if not recorded"
         row(signals, item.name, "input", item.unit, f"{item.hold}-order hold, {missing}")
     for output in model.outputs:
         row(signals, output.name, "output", output.unit,

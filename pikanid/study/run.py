@@ -19,9 +19,9 @@ REPEATABLE = 1.0  # [s] a fit
 class Study:
     """What was found; `missing` says why there is no real recording."""
 
-    slosh: tuple[slosh.Result, ...]
-    spread: tuple[slosh.Spread, ...]
-    pendulum: tuple[pendulum.Result, ...]
+    slosh_fits: tuple[slosh.Result, ...]
+    spreads: tuple[slosh.Spread, ...]
+    pendulum_fits: tuple[pendulum.Result, ...]
     swing: pendulum.Swing | None
     missing: str
     seeds: int

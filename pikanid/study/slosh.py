@@ -8,9 +8,8 @@ as the root mean square error over the seeds in units of the Cramér-Rao bound.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import pi
-from typing import Any
 
 import numpy as np
 
@@ -93,17 +92,10 @@ def recording(scenario: Scenario, seed: int) -> Recording:
     return full.decimate(scenario.stride, channels=["theta"])
 
 
-def make(name: str, seed: int = 0) -> Any:
-    """A strategy with its default settings, and its own starting points for a seed if it has any."""
-    kind = strategy(name)
-    has_seed = any(f.name == "seed" for f in fields(kind))
-    return kind(seed=seed) if has_seed else kind()
-
-
 def fit(scenario: Scenario, name: str, seed: int) -> Result:
     """One strategy, started at Table II's p0, on one noisy recording."""
     try:
-        found = make(name).fit(model().with_values(START), recording(scenario, seed))
+        found = strategy(name)().fit(model().with_values(START), recording(scenario, seed))
     except errors.PikanidError as problem:
         return Result(scenario, name, None, str(problem))
     return Result(scenario, name, found)

@@ -1,0 +1,57 @@
+"""`pikanid study`: the main job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pikanid import errors
+
+EXAMPLES = """Examples:
+
+  pikanid study
+
+  pikanid study --seeds 100 --out /tmp/reports
+
+  PIKANID_DATA=recordings pikanid study
+
+The real recording is taken from the folder named in PIKANID_DATA, or downloaded once; without it
+the study says what is missing and goes on."""
+
+
+def study(
+    out: Annotated[str, typer.Option(
+        "--out", "-o", metavar="FOLDER", help="folder of the report")] = "reports",
+    seeds: Annotated[int, typer.Option(
+        metavar="N", min=0, help="noisy recordings in each repetition; 0 for none")] = 20,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="write the report only")] = False,
+) -> int:
+    """Compare the strategies on the slosh profile and on a real recording; write a report."""
+    folder = _folder(out)
+    from pikanid.reporting.console import console, working
+    from pikanid.reporting.study_report import show, write
+    from pikanid.study.run import count_steps, run
+
+    with working("study", count_steps(), quiet) as step:
+        found = run(seeds, step=step)
+    written = write(found, folder)
+    if not quiet:
+        screen = console()
+        show(screen, found)
+        screen.print()
+        for path in written:
+            screen.print(f"written: {path}", markup=False, soft_wrap=True)
+    return 0
+
+
+def _folder(text: str) -> Path:
+    """The report's folder, made if need be, before any work is done."""
+    folder = Path(text)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as failure:
+        why = getattr(failure, "strerror", "") or "the system refuses"
+        raise errors.BadSetting(errors.output_refused("--out", text, why)) from None
+    return folder
