@@ -85,6 +85,10 @@ class Channel:
 
     __hash__ = None  # type: ignore[assignment]  # equal by content, which no hash should walk
 
+    def __reduce__(self) -> tuple[type[Channel], tuple[object, ...]]:
+        # Made anew in the other process, so that its arrays are read-only there too.
+        return Channel, tuple(getattr(self, field.name) for field in fields(self))
+
     @property
     def interval(self) -> float:
         """Median sampling interval [s]; NaN with fewer than two samples.
@@ -166,6 +170,28 @@ def check_alive(channel: Channel, where: str) -> None:
     finite = channel.values[np.isfinite(channel.values)]
     if np.all(finite == finite[0]):
         raise errors.BadRecording(errors.constant_output(where, channel.name, float(finite[0])))
+
+
+def summary(ch: Channel) -> tuple[str, ...]:
+    """Name, unit, sampling, range, gaps, hold and noise of a channel in words.
+
+    >>> summary(Channel("y", [0.0, 0.5], [1.0, 2.0], "m"))[:4]
+    ('y', '[m]', '2 samples, every 0.5 s', '1 to 2')
+    """
+    finite = ch.values[np.isfinite(ch.values)]
+    span = f"{finite.min():.4g} to {finite.max():.4g}" if finite.size else "no values"
+    gaps = len(ch) - finite.size
+    rate = f"every {ch.interval:.6g} s" if ch.uniform else "uneven times"
+    sigma = "" if ch.sigma is None else f"sigma {np.median(ch.sigma):.3g}"
+    return (
+        ch.name,
+        f"[{ch.unit}]" if ch.unit else "",
+        f"{len(ch)} samples, {rate}",
+        span,
+        f"{gaps} missing" if gaps else "",
+        f"hold {ch.hold}" if ch.hold else "",
+        sigma,
+    )
 
 
 def _numbers(values: ArrayLike, name: str, what: str) -> Array:

@@ -193,6 +193,10 @@ class Recording(Operations):
 
     __hash__ = None  # type: ignore[assignment]  # equal by content, which no hash should walk
 
+    def __reduce__(self) -> tuple[type[Recording], tuple[object, ...]]:
+        # A read-only mapping cannot be sent to another process; what it shows can.
+        return Recording, (dict(self.channels), self.name, self.notes, dict(self.unreadable))
+
     @property
     def t(self) -> Array:
         """(N,) times [s] of the first channel."""
@@ -265,7 +269,7 @@ class Recording(Operations):
         writing.write(self.channels, path)
 
     def __repr__(self) -> str:
-        rows = [_summary(ch) for ch in self.channels.values()]
+        rows = [channels_of.summary(ch) for ch in self.channels.values()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = [f"Recording '{self.name}': {self.start:g} s to {self.stop:g} s"]
         for row in rows:
@@ -277,24 +281,9 @@ class Recording(Operations):
         from html import escape
 
         rows = "".join(
-            "<tr>" + "".join(f"<td>{escape(part)}</td>" for part in _summary(ch)) + "</tr>"
+            "<tr>"
+            + "".join(f"<td>{escape(part)}</td>" for part in channels_of.summary(ch))
+            + "</tr>"
             for ch in self.channels.values()
         )
         return f"<table><caption>{escape(self.name)}</caption>{rows}</table>"
-
-
-def _summary(ch: Channel) -> tuple[str, ...]:
-    finite = ch.values[np.isfinite(ch.values)]
-    span = f"{finite.min():.4g} to {finite.max():.4g}" if finite.size else "no values"
-    gaps = len(ch) - finite.size
-    rate = f"every {ch.interval:.6g} s" if ch.uniform else "uneven times"
-    sigma = "" if ch.sigma is None else f"sigma {np.median(ch.sigma):.3g}"
-    return (
-        ch.name,
-        f"[{ch.unit}]" if ch.unit else "",
-        f"{len(ch)} samples, {rate}",
-        span,
-        f"{gaps} missing" if gaps else "",
-        f"hold {ch.hold}" if ch.hold else "",
-        sigma,
-    )

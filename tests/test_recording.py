@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +52,12 @@ def test_equality_is_by_content() -> None:
     gap = Recording.from_arrays([0, 1, 2], {"y": [0, np.nan, 1]})
     assert gap == Recording.from_arrays([0, 1, 2], {"y": [0, np.nan, 1]})
     assert gap != "recording"
+
+
+def test_other_processes_and_copies_get_the_same() -> None:
+    for again in (pickle.loads(pickle.dumps(swing())), copy.deepcopy(swing())):
+        assert again == swing()
+        assert not again["theta"].values.flags.writeable
 
 
 @pytest.mark.parametrize(
