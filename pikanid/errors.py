@@ -143,7 +143,7 @@ def no_channels(where: str) -> str:
 def missing_channel(where: str, name: str, known: Iterable[str], close: Sequence[str] = ()) -> str:
     return (
         f"'{where}' has no column '{name}'; it has: {_listed(known)}.{_did_you_mean(close)} "
-        "Map it with columns={'name in the model': 'column in the file'}."
+        f"Map it: --column {name}=COLUMN, or columns={{'{name}': 'column in the file'}} in Python."
     )
 
 
@@ -291,8 +291,9 @@ def header_twice(where: str, header: str) -> str:
 
 def no_time(where: str, known: Iterable[str]) -> str:
     return (
-        f"'{where}' has no time column among: {_listed(known)}. Name it with "
-        "columns={'t': 'its header'} or give the sampling rate in Hz with rate=."
+        f"'{where}' has no time column among: {_listed(known)}. Name it "
+        "(--column t=COLUMN, in Python columns={'t': 'its header'}) or give the sampling rate in Hz "
+        "(--rate, in Python rate=)."
     )
 
 
@@ -752,3 +753,10 @@ def nothing_to_simulate(name: str) -> str:
 
 def out_of_memory() -> str:
     return "There is not enough memory for this: shorten the recording, or thin it with --decimate."
+
+
+def lbfgs_stopped(steps: int, gradient: float) -> str:
+    return (
+        f"L-BFGS stopped after {steps} steps with a gradient of norm {gradient:.2g}: it is not at a "
+        "minimum, and the estimate depends on where it stopped."
+    )

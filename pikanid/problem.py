@@ -248,7 +248,8 @@ def bind(model: Model, recording: Recording, need_outputs: bool = True) -> Exper
 
 
 def _held(recording: Recording, item: Input) -> HeldInput:
-    if item.name not in recording.channels and item.default is not None:
+    known = item.name in recording.channels or item.name in recording.unreadable
+    if not known and item.default is not None:
         return HeldInput(item.name, np.array([recording.start]), np.array([item.default]), "zero")
     channel = recording.as_input(item.name, _unit(recording, item))
     return HeldInput(item.name, channel.time, channel.values, channel.hold or item.hold)

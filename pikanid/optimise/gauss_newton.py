@@ -162,6 +162,8 @@ def _eliminate(normal: BandedNormal, k: int, held_by_theta: Array | None) -> Eli
 def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Array:
     """Minimum of ½dᵀMd + sᵀd over lower <= d <= upper, by active sets (M positive definite).
 
+    Entries whose row of M is zero stay at zero.
+
     >>> box_minimum(np.diag([1.0, 2.0]), np.array([-3.0, -2.0]), np.zeros(2), np.array([2.0, 9.0]))
     array([2., 1.])
 
@@ -171,12 +173,13 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     if slope.size == 0:
         return np.zeros(0)
     diagonal = np.diag(matrix)
-    change, bound = np.clip(0.0, lower, upper), lower >= upper
+    # A parameter without influence here (damping of a body at rest) stays where it is.
+    change, bound = np.clip(0.0, lower, upper), (lower >= upper) | (diagonal == 0.0)
     if bound.all():
         return change
     if not np.all(diagonal[~bound] > 0.0):
-        raise LinAlgError("a parameter has no influence")
-    root = np.sqrt(np.where(bound, 1.0, diagonal))
+        raise LinAlgError("the reduced matrix is not positive definite")
+    root = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     for _ in range(4 * slope.size + 4):
         free = np.flatnonzero(~bound)
         if free.size:
@@ -193,7 +196,7 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
         if free.size == slope.size:
             return change
         pull = (matrix @ change + slope) / root
-        wrong = np.where(bound & (lower < upper), np.where(change <= lower, -pull, pull), 0.0)
+        wrong = np.where(bound & (lower < upper) & (diagonal > 0.0), np.where(change <= lower, -pull, pull), 0.0)
         if wrong.max() <= 1e-12 * max(1.0, float(np.abs(slope / root).max())):
             break
         bound[int(np.argmax(wrong))] = False

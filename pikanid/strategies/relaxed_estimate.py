@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -42,9 +42,16 @@ class SplineTrajectories:
                                 in zip(self.chains.root, self.chains.order, strict=True)])
 
 
+class Curves(Protocol):
+    """Approximated states, however they are represented."""
+
+    def states(self, t: Array, recording: int = 0) -> Array:
+        """Approximated states (M, n) of a recording at times t (M,) [s]."""
+
+
 def relaxed_estimate(strategy: str, fit: RelaxedFit, settings: Mapping[str, Any],
-                     begun: float) -> Estimate:
-    """Assemble the `Estimate` of a relaxation strategy."""
+                     begun: float, curves: Curves | None = None) -> Estimate:
+    """Assemble the `Estimate` of a relaxation strategy; `curves` are its splines by default."""
     used = {**settings, "knots": fit.grid.knots, "degree": fit.grid.degree,
             "intervals": fit.grid.n_intervals, "physics": fit.grid.quadrature, "lam": fit.lam,
             "data_cost": fit.data_cost, "physics_cost": fit.physics_cost,
@@ -55,7 +62,7 @@ def relaxed_estimate(strategy: str, fit: RelaxedFit, settings: Mapping[str, Any]
          "iterations": float(s.iterations),
          **{f.label: float(v) for f, v in zip(fit.problem.free, s.theta, strict=True)}}
         for s in fit.stages]
-    curves = trajectories(fit)
+    curves = trajectories(fit) if curves is None else curves
     shooting = Shooting(fit.problem)
     try:
         shooting.choose_steps(fit.theta, "fine")
@@ -85,7 +92,7 @@ def trajectories(fit: RelaxedFit) -> SplineTrajectories:
                               tuple(coefficients))
 
 
-def _unsimulated(strategy: str, fit: RelaxedFit, curves: SplineTrajectories,
+def _unsimulated(strategy: str, fit: RelaxedFit, curves: Curves,
                  history: list[dict[str, float]], settings: Mapping[str, Any]) -> Estimate:
     """The model diverges at the estimate: all there is to show are the splines."""
     problem, functional = fit.problem, fit.functional

@@ -1,0 +1,97 @@
+"""Grids of a PIKAN: uniform pykan knots, the known kinks beside them, Gauss nodes in between.
+
+pykan's knots are uniform and simple, so that its curve is smoother than a trajectory whose input
+switches.  The jumps of the derivatives at a switch are therefore added as basis functions of their
+own (`ShallowKAN` kinks), from the order of the differential equation up to the degree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.approximators import Array
+from pikanid.approximators.kan import ShallowKAN, build_kan
+from pikanid.approximators.tables import gauss_nodes
+from pikanid.chains import Chains
+from pikanid.problem import Problem
+
+
+@dataclass(frozen=True)
+class KanGrid:
+    """`intervals` uniform grid cells for every recording.
+
+    Parameters
+    ----------
+    degree : spline degree k of the edges
+    exact_switches : whether to add kinks where an input switches
+    nodes_at : "gauss" (integral, no node straddles a switch) or "samples" (sum over `count` evenly
+        spaced collocation points, Table II)
+    base : "zero" (w_b = 0) or "silu"
+    seed : of pykan's initial coefficients, which a fit overwrites
+    """
+
+    intervals: int
+    degree: int = 5
+    exact_switches: bool = True
+    quadrature: Literal["gauss", "sum"] = "gauss"
+    count: int = 501
+    base: Literal["zero", "silu"] = "zero"
+    seed: int = 0
+
+    knots = "kan"
+    locks = True
+
+    @property
+    def n_intervals(self) -> int:
+        """Grid cells of a recording."""
+        return self.intervals
+
+    def splines(self, problem: Problem, chains: Chains) -> list[tuple[ShallowKAN, ...]]:
+        """One shallow KAN a chain, for every recording.
+
+        Raises:
+            BadSetting: If the degree cannot carry the order of the differential equation.
+        """
+        longest = max(chains.lengths)
+        if self.degree < longest + 1:
+            raise errors.BadSetting(errors.degree_too_low(self.degree, longest))
+        found = []
+        for e in problem.experiments:
+            switches = self._switches(e.breakpoints(), e.t0, e.t1)
+            found.append(tuple(
+                ShallowKAN(
+                    build_kan([1, 1], grid=self.intervals, k=self.degree, base=self.base,
+                              grid_range=(e.t0, e.t1), seed=self.seed),
+                    kinks=switches, orders=range(m, self.degree + 1))
+                for m in chains.lengths))
+        return found
+
+    def _switches(self, times: Array, start: float, stop: float) -> list[float]:
+        if not self.exact_switches:
+            return []
+        # more kinks than a few a cell would make the basis dependent: then the grid must resolve them
+        spacing = (stop - start) / self.intervals
+        if len(times) > 1 and np.min(np.diff(times)) < 2 * spacing:
+            times = times[np.concatenate([[True], np.diff(times) >= 2 * spacing])]
+        return [float(t) for t in times]
+
+    def nodes(self, problem: Problem, chains: Chains) -> list[tuple[Array, Array]]:
+        """Times and weights of the physics residual, for every recording."""
+        found = []
+        for e in problem.experiments:
+            if self.quadrature == "sum":
+                t = np.linspace(e.t0, e.t1, self.count)
+                found.append((t, np.ones(self.count)))
+                continue
+            cells = np.linspace(e.t0, e.t1, self.intervals + 1)
+            panels = np.union1d(cells, e.breakpoints()) if self.exact_switches else cells
+            found.append(gauss_nodes(panels, 3))
+        return found
+
+    def refined(self) -> KanGrid:
+        """Every cell halved."""
+        return replace(self, intervals=2 * self.intervals)
