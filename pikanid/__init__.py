@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pikanid.model import Input, Model, Output, Parameter, State
     from pikanid.recording import Channel, Recording
     from pikanid.simulation import simulate
-    from pikanid.strategies import IPDA, NLS, PDA
+    from pikanid.strategies import IPDA, NLS, PDA, PIKAN
 
 __version__ = version("pikanid")
 
@@ -37,6 +37,7 @@ _HOMES: dict[str, str | None] = {
     "NLS": "pikanid.strategies",
     "PDA": "pikanid.strategies",
     "IPDA": "pikanid.strategies",
+    "PIKAN": "pikanid.strategies",
     "simulate": "pikanid.simulation",
     "systems": None,
     "excitation": None,
@@ -56,6 +57,7 @@ __all__ = [
     "NLS",
     "PDA",
     "IPDA",
+    "PIKAN",
     "simulate",
     "systems",
     "excitation",

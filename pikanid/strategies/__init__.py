@@ -1,6 +1,6 @@
 """The identification strategies: one method a file, one result type.
 
-NLS shoots (Eq. 1); PDA and iPDA relax the ODE (Eq. 2, Table I).  Classes are imported when they
+NLS shoots (Eq. 1); PDA, iPDA and PIKAN relax the ODE (Eq. 2, Table I).  Classes are imported when they
 are first used.
 """
 
@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from pikanid.strategies.ipda import IPDA
     from pikanid.strategies.nls import NLS
     from pikanid.strategies.pda import PDA
+    from pikanid.strategies.pikan import PIKAN
 
-__all__ = ["IPDA", "NLS", "PDA", "STRATEGIES", "strategy"]
+__all__ = ["IPDA", "NLS", "PDA", "PIKAN", "STRATEGIES", "strategy"]
 
 # name on the command line -> class; in the order of the paper's tables
-STRATEGIES = {"nls": "NLS", "pda": "PDA", "ipda": "IPDA"}
+STRATEGIES = {"nls": "NLS", "pda": "PDA", "ipda": "IPDA", "pikan": "PIKAN"}
 
 
 def strategy(name: str) -> Any:
