@@ -143,7 +143,7 @@ def no_channels(where: str) -> str:
 def missing_channel(where: str, name: str, known: Iterable[str], close: Sequence[str] = ()) -> str:
     return (
         f"'{where}' has no column '{name}'; it has: {_listed(known)}.{_did_you_mean(close)} "
-        f"Map it: --column {name}=COLUMN, or columns={{'{name}': 'column in the file'}} in Python."
+        "Map it with --column NAME=COLUMN (in Python columns={'name in the model': 'its header'})."
     )
 
 

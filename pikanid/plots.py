@@ -39,19 +39,32 @@ class FitLike(Protocol):
     """What is drawn of one output of one recording: see `pikanid.estimate.Fit`."""
 
     @property
-    def recording(self) -> str: ...
+    def recording(self) -> str:
+        """Name of the recording."""
+
     @property
-    def output(self) -> str: ...
+    def output(self) -> str:
+        """Name of the output."""
+
     @property
-    def unit(self) -> str: ...
+    def unit(self) -> str:
+        """Unit of the output."""
+
     @property
-    def t(self) -> np.ndarray: ...
+    def t(self) -> np.ndarray:
+        """Times (N,) [s]."""
+
     @property
-    def measured(self) -> np.ndarray: ...
+    def measured(self) -> np.ndarray:
+        """Samples (N,)."""
+
     @property
-    def fitted(self) -> np.ndarray: ...
+    def fitted(self) -> np.ndarray:
+        """What the model says (N,)."""
+
     @property
-    def sigma(self) -> np.ndarray | None: ...
+    def sigma(self) -> np.ndarray | None:
+        """Standard deviation of the noise (N,), or None."""
 
 
 def plot_fits(fits: Sequence[FitLike], title: str = "") -> Figure:

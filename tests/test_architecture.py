@@ -39,7 +39,7 @@ ROWS = (
     ("mismatch",),
     ("concealed",),
     ("reporting",),
-    ("cli", "__main__"),
+    ("cli", "commands", "__main__"),
 )
 
 # Seconds to import, or optional: never at the top of a module that `import pikanid` can reach.

@@ -45,8 +45,8 @@ def identify(
         metavar="default|paper",
         help="settings: the best known, or those of the paper")] = "default",
     sigma: Annotated[list[str], typer.Option(
-        metavar="[NAME=]VALUE|auto", show_default=False,
-        help="noise of an output, as 0.1deg or theta=0.1deg; auto estimates it")] = [],  # noqa: B006
+        metavar="[NAME=]VALUE", show_default=False,
+        help="standard deviation of the noise, as 0.1deg or theta=0.1deg")] = [],  # noqa: B006
     set_: Annotated[list[str], typer.Option(
         "--set", metavar="NAME=VALUE", show_default=False,
         help="guess of a free parameter, or value of a fixed one")] = [],  # noqa: B006
@@ -111,11 +111,15 @@ def _prepared(path: str, model: Model, columns: dict[str, str], units: dict[str,
               rate: float | None, sheet: str | None, start: float | None, stop: float | None,
               decimate: int, sigma: Sequence[str]) -> Recording:
     from pikanid.recording import Recording
+    from pikanid.units import is_unit
 
     known = [*model.input_names, *model.output_names, "t", "time"]
     for name in [*columns, *units]:
         if name not in known:
             raise errors.BadModel(errors.not_in_model("input or output", name, known))
+    for name, text in units.items():
+        if not is_unit(text):
+            raise errors.BadUnit(errors.unknown_unit(text, f"--unit {name}"))
     rec = Recording.read(path, columns, rate, sheet, units)
     # Declared as held, an input keeps its meaning when the recording is cut.
     rec = rec.with_hold(**{i.name: i.hold for i in model.inputs
@@ -128,11 +132,7 @@ def _prepared(path: str, model: Model, columns: dict[str, str], units: dict[str,
 
 
 def _with_sigma(rec: Recording, model: Model, texts: Sequence[str]) -> Recording:
-    """The noise of the outputs: one for all, one by name, or estimated from the recording."""
-    if list(texts) == ["auto"]:
-        from pikanid.noise import with_estimated_sigma
-
-        return with_estimated_sigma(rec, model.output_names)
+    """The noise of the outputs: one for all, or one by name."""
     common = [text for text in texts if "=" not in text]
     named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
     if len(common) > 1:

@@ -37,7 +37,7 @@ def simulate(
         help="what drives the model")] = "two_pulse",
     sigma: Annotated[list[str], typer.Option(
         metavar="[NAME=]VALUE", show_default=False,
-        help="noise of the outputs, as 0.1deg or theta=0.1deg; none by default")] = [],  # noqa: B006
+        help="standard deviation of the noise, as 0.1deg or theta=0.1deg; none by default")] = [],  # noqa: B006
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the noise")] = 0,
     set_: Annotated[list[str], typer.Option(
         "--set", metavar="NAME=VALUE", help="value of a parameter", show_default=False)] = [],  # noqa: B006

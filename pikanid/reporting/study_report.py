@@ -37,7 +37,7 @@ def show(out: Console, study: Study) -> None:
     if study.spreads:
         _head(out, f"Errors over {study.seeds} seeds, in units of the Cramér-Rao bound")
         out.print(sheets.spread(study).to_rich())
-    _head(out, "Real recording: free swing of a pendulum arm, viscous pendulum")
+    _head(out, "Real recording: free swing of a pendulum arm, viscous pendulum; RMSE [rad]")
     if study.missing:
         out.print(f"Left out: {study.missing}", markup=False, soft_wrap=True)
     else:
@@ -74,9 +74,9 @@ def write(study: Study, folder: Path) -> list[Path]:
 
 def text(study: Study, pictures: Mapping[str, str]) -> str:
     """The report; `pictures` maps the names of the figures to their files."""
-    parts = ["# Study of the strategies", _introduction(), "## Slosh pendulum",
-             _slosh_text(), "### Dense: N = 501", sheets.slosh(study, "dense").to_markdown(),
-             "### Sparse: N = 51", sheets.slosh(study, "sparse").to_markdown(),
+    dense, sparse = (sheets.slosh(study, s, paper=True).to_markdown() for s in ("dense", "sparse"))
+    parts = ["# Study of the strategies", _introduction(), "## Slosh pendulum", _slosh_text(),
+             "### Dense: N = 501", dense, "### Sparse: N = 51", sparse,
              _picture("slosh-trajectories", pictures)]
     if study.spreads:
         parts += ["### Repeated seeds", _spread_text(study), sheets.spread(study).to_markdown(),
@@ -100,9 +100,9 @@ def _picture(name: str, pictures: Mapping[str, str]) -> str:
 
 def _introduction() -> str:
     return ("Written by `pikanid study`. Every strategy with its default settings, on the "
-            "simulated slosh profile of Table II and on a real recording. \"Verdict\" is the χ² test of the "
-            "model simulated at the estimate: a strategy whose parameters do not reproduce the "
-            "recording is a misfit, whatever its own curve looks like.")
+            "simulated slosh profile of Table II and on a real recording. \"Verdict\" is the χ² "
+            "test of the model simulated at the estimate: a strategy whose parameters do not "
+            "reproduce the recording is a misfit, whatever its own curve looks like.")
 
 
 def _slosh_text() -> str:
@@ -125,11 +125,11 @@ def _pendulum_text(study: Study) -> str:
     train, held = study.swing.train, study.swing.held_out
     return (f"K. Kaheman et al., arXiv 2205.06231; 1 kHz, every {pendulum.STRIDE}th sample used. "
             f"Length, damping and the state at t = 0 are estimated on {train.start:.1f} s to "
-            f"{train.stop:.1f} s. Held-out RMSE: the fitted model runs on from t = 0 through "
-            f"{held.start:.1f} s to {held.stop:.1f} s, data that it has not seen and whose start "
-            f"it is not told. Restarted RMSE: the state at {held.start:.1f} s is estimated from the "
-            f"{pendulum.FIRST:g} s that follow, with the parameters held, and the model runs from "
-            "there. That both are far above the encoder's step of 0.00016 rad is the point: a "
+            f"{train.stop:.1f} s. RMSE [rad], held-out: the fitted model runs on from t = 0 "
+            f"through {held.start:.1f} s to {held.stop:.1f} s, data that it has not seen and whose start "
+            f"it is not told. Restarted: the state at {held.start:.1f} s is estimated from "
+            f"the {pendulum.FIRST:g} s that follow, with the parameters held, and the model runs "
+            "from there. That both are far above the encoder's step of 0.00016 rad is the point: a "
             "viscous pendulum does not explain this arm.")
 
 

@@ -45,22 +45,24 @@ def verdict(estimate: Estimate) -> str:
 
 
 def parameters(estimates: Sequence[Estimate]) -> Table:
-    """Estimate, standard error and 95 % interval of every parameter, by strategy if several."""
+    """Every parameter with its standard error; with its 95 % interval too if there is one fit."""
     from pikanid.estimate import rounded
 
     several = len(estimates) > 1
-    made = table(*(["strategy"] if several else []), "parameter", "estimate ± std. error",
-                 "95 % interval", "unit", *(["verdict", "time"] if several else []))
+    made = (table("strategy", "parameter", "estimate ± std. error", "unit", "verdict", "time")
+            if several else
+            table("parameter", "estimate ± std. error", "95 % interval", "unit"))
     for estimate in estimates:
-        ends = [verdict(estimate), f"{estimate.seconds:.3g} s"] if several else []
-        first = [estimate.strategy] if several else []
         style = None if estimate.ok else "yellow"
-        for f in estimate.free:
-            low, high = estimate.interval(f.name, recording=f.recording)
+        for k, f in enumerate(estimate.free):
             value = rounded(estimate.value(f.name, f.recording), estimate.std(f.name, f.recording))
-            interval = between(low, high)
-            row(made, *first, f.label, value, interval, f.unit, *ends, style=style)
-            first, ends = first and [""], ends and ["", ""]
+            if several:
+                name, *ends = ((estimate.strategy, verdict(estimate), f"{estimate.seconds:.3g} s")
+                               if k == 0 else ("", "", ""))
+                row(made, name, f.label, value, f.unit, *ends, style=style)
+            else:
+                interval = between(*estimate.interval(f.name, recording=f.recording))
+                row(made, f.label, value, interval, f.unit, style=style)
     return made
 
 
