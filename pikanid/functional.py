@@ -21,9 +21,10 @@ from pikanid.adequacy import difference_noise
 from pikanid.approximators import Array, LinearApproximator
 from pikanid.approximators.tables import Table, anchor
 from pikanid.chains import Chains
+from pikanid.evaluated import delays
 from pikanid.expressions import symbol
 from pikanid.functional_rows import AnyApproximator, Part, Rows, Sites, by_coefficients
-from pikanid.problem import Problem, Samples, delays
+from pikanid.problem import Problem, Samples
 from pikanid.simulation.vectorfield import VectorField
 
 __all__ = ["Functional", "Part", "Penalty", "Rows", "Sites", "bind"]

@@ -24,10 +24,11 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
     """Sandwich and naive covariance of θ, (b, b) each.
 
     `noise` is the standard deviation of the rows of each data family, recording after recording.
-    Parameters at a bound count as known: their rows and columns are zero.
-    The naive one, the θ block of M⁻¹ times the mean noise variance, counts the physics as data.
+    Parameters at a bound count as known: their rows and columns are zero.  One without influence
+    has an infinite variance.  The naive covariance, the θ block of M⁻¹ times the mean noise variance, counts physics as data.
     """
-    bread = invert(step.schur, inside_bounds(system, at))
+    inside = inside_bounds(system, at)
+    bread = invert(step.schur, inside)
     meat = np.zeros_like(bread)
     variance, count = 0.0, 0
     for jacobian, deviation in zip(data_response(system, at, step), noise, strict=True):
@@ -35,7 +36,10 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
         meat += scaled.T @ scaled
         variance += float(np.sum(np.broadcast_to(deviation, jacobian.shape[:1]) ** 2))
         count += jacobian.shape[0]
-    return bread @ meat @ bread, bread * (variance / count)
+    sandwich, naive = bread @ meat @ bread, bread * (variance / count)
+    unseen = np.flatnonzero(inside & (np.diag(step.schur) <= 0.0))
+    sandwich[unseen, unseen] = naive[unseen, unseen] = np.inf
+    return sandwich, naive
 
 
 def inside_bounds(system: BandedSystem, at: Linearisation) -> NDArray[np.bool_]:
@@ -46,14 +50,12 @@ def inside_bounds(system: BandedSystem, at: Linearisation) -> NDArray[np.bool_]:
 
 
 def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
-    """Inverse over the parameters `inside`, zero elsewhere; infinite where nothing is known."""
+    """Inverse over the parameters `inside` that have any influence, zero elsewhere."""
     out = np.zeros_like(matrix)
     which = np.flatnonzero(inside & (np.diag(matrix) > 0.0))
     scale = np.sqrt(np.diag(matrix)[which])
     normal = matrix[np.ix_(which, which)] / np.outer(scale, scale)
     out[np.ix_(which, which)] = np.linalg.pinv(normal, 1e-13, True) / np.outer(scale, scale)
-    unseen = np.flatnonzero(inside & (np.diag(matrix) <= 0.0))
-    out[unseen, unseen] = np.inf
     return out
 
 

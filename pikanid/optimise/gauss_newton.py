@@ -196,7 +196,8 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
         if free.size == slope.size:
             return change
         pull = (matrix @ change + slope) / root
-        wrong = np.where(bound & (lower < upper) & (diagonal > 0.0), np.where(change <= lower, -pull, pull), 0.0)
+        outward = np.where(change <= lower, -pull, pull)
+        wrong = np.where(bound & (lower < upper) & (diagonal > 0.0), outward, 0.0)
         if wrong.max() <= 1e-12 * max(1.0, float(np.abs(slope / root).max())):
             break
         bound[int(np.argmax(wrong))] = False

@@ -111,8 +111,8 @@ class Continuation:
 def moved(before: Array, after: Array, std: Array, relative: float) -> float:
     """Largest change of a parameter in standard errors, a change below `relative` counting as none.
 
-    >>> moved(np.array([1.0, 5.0]), np.array([1.0, 5.2]), np.array([0.1, 0.1]), 1e-6)
-    2.0...
+    >>> round(moved(np.array([1.0, 5.0]), np.array([1.0, 5.2]), np.array([0.1, 0.1]), 1e-6), 2)
+    2.0
     """
     if after.size == 0:
         return 0.0

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from pikanid.approximators.bspline import (
     split_breakpoints,
 )
 from pikanid.approximators.tables import gauss_nodes
-from pikanid.chains import Chains
+from pikanid.chains import Chains, Form
 from pikanid.problem import Experiment, Problem
 from pikanid.simulation.vectorfield import VectorField
 
@@ -156,6 +156,24 @@ def default_grid(problem: Problem, field: VectorField, chains: Chains, *, degree
     points = 2 if 2 * crowded > len(problem.experiments) else 4
     chosen = points + max(chains.lengths) - 1 if degree is None else degree
     return Grid("collocation", tuple(breakpoints), chosen)
+
+
+def check_options(settings: Any, **least: float) -> None:
+    """Refuse options outside their choices, or below `least`.
+
+    Raises:
+        BadSetting: Naming the option and what it may be.
+    """
+    choices = {"protocol": ("default", "paper"), "form": get_args(Form), "knots": get_args(Knots),
+               "physics": get_args(Quadrature)}
+    for name, known in choices.items():
+        value = getattr(settings, name)
+        if value is not None and value not in known:
+            raise errors.BadSetting(errors.bad_value(name, value, "one of " + ", ".join(known)))
+    for name, bound in least.items():
+        value = getattr(settings, name)
+        if value is not None and not value >= bound:
+            raise errors.BadSetting(errors.bad_value(name, value, f"at least {bound:g}"))
 
 
 def chosen_grid(problem: Problem, knots: Knots, *, degree: int, intervals: int,

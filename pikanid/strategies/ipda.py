@@ -20,6 +20,7 @@ from pikanid.strategies.grids import (
     Grid,
     Knots,
     Quadrature,
+    check_options,
     chosen_grid,
     default_grid,
     paper_intervals,
@@ -92,7 +93,9 @@ def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
     ------
     pikanid.errors.BadSetting : options that cannot work together, or a delay to be estimated
     """
-    _check(settings)
+    check_options(settings, degree=1, intervals=1, warmup=0)
+    if settings.lam is not None and not settings.lam > 0.0:
+        raise errors.BadSetting(errors.bad_value("lam", settings.lam, "positive"))
     paper = settings.protocol == "paper"
     field = VectorField(problem.model)
     chains = find_chains(problem.model, settings.form)
@@ -131,12 +134,3 @@ def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
 def _paper_lambda(problem: Problem) -> float:
     samples = min(s.t.size for e in problem.experiments for s in e.samples)
     return PAPER_LAMBDA * (2.0 if samples < 2 * PAPER_INTERVALS else 1.0)
-
-
-def _check(settings: IPDA) -> None:
-    for name, least in (("degree", 1), ("intervals", 1), ("warmup", 0)):
-        value = getattr(settings, name)
-        if value is not None and value < least:
-            raise errors.BadSetting(errors.bad_value(name, value, f"at least {least}"))
-    if settings.lam is not None and not settings.lam > 0.0:
-        raise errors.BadSetting(errors.bad_value("lam", settings.lam, "positive"))

@@ -27,7 +27,13 @@ from pikanid.optimise.smoothing import Smoothed, smooth
 from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
-from pikanid.strategies.grids import Knots, Quadrature, chosen_grid, paper_intervals
+from pikanid.strategies.grids import (
+    Knots,
+    Quadrature,
+    check_options,
+    chosen_grid,
+    paper_intervals,
+)
 from pikanid.strategies.relaxation import RelaxedFit, Setup, row_noise, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
 
@@ -87,6 +93,7 @@ def fit_decoupled(problem: Problem, settings: PDA) -> RelaxedFit:
     ------
     pikanid.errors.BadSetting : see `PDA.fit`
     """
+    check_options(settings, degree=1, intervals=1, smoothing=0)
     paper = settings.protocol == "paper"
     chains = find_chains(problem.model, settings.form)
     degree = settings.degree or (PAPER_DEGREE if paper else max(chains.lengths) + 3)
