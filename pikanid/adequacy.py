@@ -1,4 +1,4 @@
-"""Does the fitted model explain the recording?  A verdict, so that a bad optimum is never a success.
+"""Does the fitted model explain the recording?  A bad optimum must never look like a success.
 
 With known σ the sum of squared standardised residuals follows χ² with N - n_free degrees of
 freedom when the model is right (Seber & Wild, Nonlinear Regression, 1989, sec. 2.1).  Without σ the

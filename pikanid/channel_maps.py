@@ -12,16 +12,17 @@ from typing import Any
 
 import sympy as sp
 
-from pikanid import errors, expressions
+from pikanid import errors, expression_functions
 from pikanid.expressions import TIME, symbol
 from pikanid.model import Formula, Model, Parameter, State
+from pikanid.model_parts import Hold
 
 INPUT_MAPS = ("gain", "offset", "saturation", "dead_zone", "function", "lag", "delay")
 OUTPUT_MAPS = ("lag", "gain", "offset", "drift", "function", "clip", "delay")
 
 
 def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
-              hold: str | None = None, gain: Formula | None = None, offset: Formula | None = None,
+              hold: Hold | None = None, gain: Formula | None = None, offset: Formula | None = None,
               saturation: Formula | None = None, dead_zone: Formula | None = None,
               function: Formula | None = None, lag: Formula | None = None,
               delay: Formula | None = None) -> Model:
@@ -56,10 +57,10 @@ def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
         value = value + read(offset, "offset")
     if saturation is not None:
         level = read(saturation, "saturation")
-        value = expressions.clip(value, -level, level)
+        value = expression_functions.clip(value, -level, level)
     if dead_zone is not None:
         width = read(dead_zone, "dead zone")
-        value = value - expressions.clip(value, -width, width)
+        value = value - expression_functions.clip(value, -width, width)
     if function is not None:
         value = read(function, "function").xreplace({u: value})
     swap: dict[sp.Expr, sp.Expr] = {u: value}
@@ -120,7 +121,7 @@ def map_output(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
     if clip is not None:
         if isinstance(clip, str) or len(clip) != 2:
             raise errors.BadModel(errors.bad_value(f"The clip of {where}", clip, "[lo, hi]"))
-        value = expressions.clip(value, read(clip[0], "clip"), read(clip[1], "clip"))
+        value = expression_functions.clip(value, read(clip[0], "clip"), read(clip[1], "clip"))
     changed = dataclasses.replace(
         item, expression=value,
         delay=item.delay if delay is None else item.delay + read(delay, "delay"))

@@ -553,7 +553,7 @@ def too_many_events(time: float) -> str:
 
 def tolerance_not_reached(tolerance: float, reached: float) -> str:
     return (
-        f"The simulation reaches an error of {reached:.2g} at best, not the wanted {tolerance:.2g}: "
+        f"The simulation reaches an error of {reached:.2g} at best, not {tolerance:.2g}: "
         "raise the tolerance or choose method='implicit'."
     )
 
@@ -757,6 +757,6 @@ def out_of_memory() -> str:
 
 def lbfgs_stopped(steps: int, gradient: float) -> str:
     return (
-        f"L-BFGS stopped after {steps} steps with a gradient of norm {gradient:.2g}: it is not at a "
-        "minimum, and the estimate depends on where it stopped."
+        f"L-BFGS stopped after {steps} steps with a gradient of norm {gradient:.2g}: it is not at "
+        "a minimum, and the estimate depends on where it stopped."
     )

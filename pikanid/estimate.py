@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Measured against fitted, for one output of one recording; arrays (N,), in the model's unit."""
+    """Measured against fitted, for an output of a recording; arrays (N,) in the model's unit."""
 
     recording: str
     output: str

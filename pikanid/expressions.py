@@ -19,9 +19,11 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from pikanid import errors
+from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
 
 MAX_LENGTH = 20_000
 MAX_DEPTH = 120
+MAX_POWER = 1000  # larger whole exponents would be multiplied out into numbers without end
 TIME = sp.Symbol("t", real=True)
 
 
@@ -32,82 +34,6 @@ def symbol(name: str) -> sp.Symbol:
     True
     """
     return sp.Symbol(name, real=True)
-
-
-class clip(sp.Function):
-    """``clip(x, lo, hi)``: x limited to [lo, hi]; exact at both kinks."""
-
-    nargs = 3
-
-    def _eval_derivative(self, s: sp.Symbol) -> sp.Expr:
-        x, lo, hi = self.args
-        inside = sp.Heaviside(x - lo) - sp.Heaviside(x - hi)
-        return (
-            inside * x.diff(s)
-            + (1 - sp.Heaviside(x - lo)) * lo.diff(s)
-            + sp.Heaviside(x - hi) * hi.diff(s)
-        )
-
-    def _latex(self, printer: object) -> str:
-        x, lo, hi = (sp.latex(a) for a in self.args)
-        return rf"\operatorname{{clip}}_{{[{lo},\,{hi}]}}\left({x}\right)"
-
-
-class abs_power(sp.Function):
-    """``abs_power(x, n)`` = \\|x\\|ⁿ, zero at x = 0; differentiable in the exponent as well."""
-
-    nargs = 2
-
-    @classmethod
-    def eval(cls, x: sp.Expr, n: sp.Expr) -> sp.Expr | None:
-        if n.is_Integer and n.is_positive:
-            return sp.Abs(x) ** n
-        return None
-
-    def fdiff(self, argindex: int = 1) -> sp.Expr:
-        x, n = self.args
-        if argindex == 1:
-            return n * signed_power(x, n - 1)
-        return self * log_abs(x)
-
-    def _latex(self, printer: object) -> str:
-        x, n = (sp.latex(a) for a in self.args)
-        return rf"\left|{x}\right|^{{{n}}}"
-
-
-class signed_power(sp.Function):
-    """``signed_power(x, n)`` = sgn(x)·\\|x\\|ⁿ: the family of Coulomb (n=0) and drag (n=2) laws."""
-
-    nargs = 2
-
-    @classmethod
-    def eval(cls, x: sp.Expr, n: sp.Expr) -> sp.Expr | None:
-        if n.is_zero:
-            return sp.sign(x)
-        if n == 1:
-            return x
-        if n.is_Integer and n.is_positive:
-            return sp.sign(x) * sp.Abs(x) ** n
-        return None
-
-    def fdiff(self, argindex: int = 1) -> sp.Expr:
-        x, n = self.args
-        if argindex == 1:
-            return n * abs_power(x, n - 1)
-        return self * log_abs(x)
-
-    def _latex(self, printer: object) -> str:
-        x, n = (sp.latex(a) for a in self.args)
-        return rf"\operatorname{{sgn}}\left({x}\right)\left|{x}\right|^{{{n}}}"
-
-
-class log_abs(sp.Function):
-    """ln|x|, taken as 0 at x = 0, where it only ever multiplies |x|ⁿ = 0."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> sp.Expr:
-        return 1 / self.args[0]
 
 
 def _step(x: sp.Expr) -> sp.Expr:
@@ -143,7 +69,8 @@ def check_name(name: str, what: str) -> str:
     return name
 
 
-def parse(text: str, names: Collection[str], where: str, functions: Collection[str] = ()) -> sp.Expr:
+def parse(text: str, names: Collection[str], where: str,
+          functions: Collection[str] = ()) -> sp.Expr:
     """Parse one formula.
 
     Parameters
@@ -198,6 +125,38 @@ class _Reader:
     def read(self, node: ast.AST, depth: int) -> sp.Expr:
         if depth > MAX_DEPTH:
             raise errors.BadModel(errors.formula_syntax(self.text, self.where, "nested too deeply"))
+        if isinstance(node, ast.BinOp):
+            return self.chain(node, depth)
+        return self.real(node, self.part(node, depth))
+
+    def chain(self, node: ast.BinOp, depth: int) -> sp.Expr:
+        """a + b + c ... leans to the left, however long it is: that is no nesting."""
+        rest = [node]
+        while isinstance(rest[-1].left, ast.BinOp):
+            rest.append(rest[-1].left)
+        result = self.read(rest[-1].left, depth + 1)
+        for step in reversed(rest):
+            try:
+                result = self.binary(step, step.op, result, self.read(step.right, depth + 1))
+            except RecursionError:
+                raise self.fail(step) from None
+            result = self.real(step, result)
+        return result
+
+    def real(self, node: ast.AST, result: sp.Expr) -> sp.Expr:
+        """The expression, if it is real; a number must also be finite as a float."""
+        if result.has(sp.zoo, sp.nan, sp.oo, sp.I):
+            raise self.fail(node)
+        if result.is_number:
+            try:
+                finite = math.isfinite(float(result))
+            except (TypeError, OverflowError):
+                finite = False
+            if not finite:
+                raise self.fail(node)
+        return result
+
+    def part(self, node: ast.AST, depth: int) -> sp.Expr:
         match node:
             case ast.Constant(value=bool() | complex()):
                 raise self.fail(node)
@@ -209,8 +168,6 @@ class _Reader:
                 return -self.read(operand, depth + 1)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return self.read(operand, depth + 1)
-            case ast.BinOp(left=left, op=op, right=right):
-                return self.binary(node, op, self.read(left, depth + 1), self.read(right, depth + 1))
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
                 return self.call(node, name, [self.read(a, depth + 1) for a in args])
         raise self.fail(node)
@@ -253,33 +210,37 @@ class _Reader:
         raise self.fail(node)
 
     def power(self, node: ast.AST, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
-        if base.is_number and exponent.is_number and not (
-            exponent.is_Integer and abs(int(exponent)) <= 8 and abs(float(base)) < 1e6
-        ):
+        if base.is_zero and exponent.is_negative:
+            raise errors.BadModel(errors.division_by_zero(self.text, self.where))
+        if exponent.is_number and abs(float(exponent)) > MAX_POWER:
+            raise self.fail(node)
+        small = exponent.is_Rational and abs(exponent.p) <= 8 and exponent.q <= 8
+        if base.is_number and exponent.is_number and not (small and abs(float(base)) < 1e6):
             # exact big-integer powers can fill the memory: these become floating point
             try:
                 return self.number(float(base) ** float(exponent), node)
             except (OverflowError, ZeroDivisionError, TypeError):
                 raise self.fail(node) from None
-        if base.is_zero and exponent.is_negative:
-            raise errors.BadModel(errors.division_by_zero(self.text, self.where))
         return base**exponent
 
     def call(self, node: ast.AST, name: str, args: list[sp.Expr]) -> sp.Expr:
         if name in self.functions:
             count, build = 1, sp.Function(name, real=True)
         elif name in FUNCTIONS:
-            count, build = FUNCTIONS[name]  # type: ignore[assignment]
+            count, build = FUNCTIONS[name]
         else:
             known = sorted([*FUNCTIONS, *self.functions])
             close = difflib.get_close_matches(name, known, 1)
             raise errors.BadModel(errors.unknown_function(name, self.where, known, close))
         if len(args) != count:
             raise errors.BadModel(errors.wrong_argument_count(name, count, len(args), self.where))
-        result = build(*args)  # type: ignore[operator]
-        if result.has(sp.zoo, sp.nan, sp.oo, sp.I):
+        if name in ("abs_power", "signed_power") and args[1].is_number and (
+                abs(float(args[1])) > MAX_POWER):
             raise self.fail(node)
-        return result
+        try:
+            return build(*args)
+        except (ValueError, TypeError, RecursionError):  # SymPy: complex or not comparable
+            raise self.fail(node) from None
 
 
 class _Printer(StrPrinter):

@@ -1,8 +1,8 @@
 """A half-derivative D^½ z as ordinary states: memory with a fading tail.
 
-The wall's boundary layer damps sloshing with -b D^½ θ' (Henderson & Miles, J. Fluid Mech. 275, 1994).
-In the frequency domain D^½ is (iω)^½; over a band it is close to a sum of first-order filters
-(the diffusive representation, Montseny 1998),
+The wall's boundary layer damps sloshing with -b D^½ θ' (Henderson & Miles, J. Fluid Mech. 275,
+1994).  In the frequency domain D^½ is (iω)^½; over a band it is close to a sum of first-order
+filters (the diffusive representation, Montseny 1998),
 
     (iω)^½ ≈ w_0 + Σ_k w_k iω/(iω + ω_k),      ω_k evenly spaced in log ω,
 
@@ -24,7 +24,7 @@ from pikanid.model import Formula, Model, State
 
 @dataclass(frozen=True)
 class HalfDerivative:
-    """Rates ω_k (K,) [rad/s], weights w_k (K,) and w_0, and the largest relative error in the band."""
+    """Rates ω_k (K,) [rad/s], weights w_k (K,) and w_0, and the largest relative error."""
 
     rates: np.ndarray
     weights: np.ndarray

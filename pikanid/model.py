@@ -15,22 +15,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import sympy as sp
 
 from pikanid import errors
 from pikanid.expressions import parse, symbol, to_real
-from pikanid.model_checks import find, validate
+from pikanid.model_checks import validate
+from pikanid.model_lookup import Lookup
 from pikanid.model_parts import Input, Output, Parameter, Spline, State
 
 __all__ = ["Formula", "Input", "Model", "Output", "Parameter", "Spline", "State"]
 
-Formula = str | float | sp.Expr
+Formula: TypeAlias = "str | float | sp.Expr"
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(Lookup):
     """An immutable symbolic ODE model.
 
     Most users write a model file (`Model.load`) or a dictionary of the same form:
@@ -82,56 +83,7 @@ class Model:
         return Model.from_dict, (self.to_dict(),)
 
     def __hash__(self) -> int:
-        return hash((self.name, self.states, self.inputs, self.parameters,
-                     tuple(self.equations.items()), self.outputs, self.splines))
-
-    # --- looking things up -----------------------------------------------------------------------
-
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        """Names of the states, in order."""
-        return tuple(s.name for s in self.states)
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Names of the inputs, in order."""
-        return tuple(i.name for i in self.inputs)
-
-    @property
-    def output_names(self) -> tuple[str, ...]:
-        """Names of the outputs, in order."""
-        return tuple(o.name for o in self.outputs)
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names of all parameters, in order; the order of every parameter vector p (P,)."""
-        return tuple(p.name for p in self.parameters)
-
-    @property
-    def free_names(self) -> tuple[str, ...]:
-        """Names of the parameters that are estimated."""
-        return tuple(p.name for p in self.parameters if p.free)
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Guess or fixed value of every parameter."""
-        return {p.name: p.value for p in self.parameters}
-
-    def parameter(self, name: str) -> Parameter:
-        """The parameter of that name (raises `BadModel`, naming the close ones)."""
-        return find(self.parameters, name, "parameter")
-
-    def state(self, name: str) -> State:
-        """The state of that name."""
-        return find(self.states, name, "state")
-
-    def input(self, name: str) -> Input:
-        """The input of that name."""
-        return find(self.inputs, name, "input")
-
-    def output(self, name: str) -> Output:
-        """The output of that name."""
-        return find(self.outputs, name, "output")
+        return hash((self.name, self.parameters, tuple(self.equations.items())))
 
     # --- formulas --------------------------------------------------------------------------------
 
@@ -158,7 +110,8 @@ class Model:
         old = {p.name: p for p in self.parameters}
         return self.replace(parameters=tuple({**old, **{p.name: p for p in new}}.values()))
 
-    def with_term(self, equation: str, term: Formula, parameters: Sequence[Parameter] = ()) -> Model:
+    def with_term(self, equation: str, term: Formula,
+                  parameters: Sequence[Parameter] = ()) -> Model:
         """Add `term` to the right-hand side of a state's equation.
 
         Raises
@@ -305,11 +258,9 @@ class Model:
 
     def latex(self) -> str:
         """The equations as LaTeX."""
-        rows = [rf"\dot{{{sp.latex(symbol(n))}}} &= {sp.latex(e)}"
-                for n, e in self.equations.items()]
-        rows += [rf"y_{{\mathrm{{{o.name.replace('_', ' ')}}}}} &= {sp.latex(o.expression)}"
-                 for o in self.outputs]
-        return r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"
+        from pikanid.model_file import latex
+
+        return latex(self)
 
     def _repr_latex_(self) -> str:
         return f"$${self.latex()}$$"

@@ -139,6 +139,14 @@ def to_dict(model: Model) -> dict[str, Any]:
     return content
 
 
+def latex(model: Model) -> str:
+    """The equations and outputs as LaTeX."""
+    rows = [rf"\dot{{{sp.latex(symbol(n))}}} &= {sp.latex(e)}" for n, e in model.equations.items()]
+    rows += [rf"y_{{\mathrm{{{o.name.replace('_', ' ')}}}}} &= {sp.latex(o.expression)}"
+             for o in model.outputs]
+    return r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"
+
+
 def _plain(expr: sp.Expr) -> float | str:
     return float(expr) if expr.is_Float or expr.is_Integer else to_text(expr)
 
@@ -219,7 +227,8 @@ def _output(name: str, entry: Mapping[str, Any], formula: Any, source: str) -> O
     if sigma is not None and _number(sigma, f"sigma of output '{name}'") <= 0:
         raise errors.BadModel(errors.bad_value(
             f"The sigma of output '{name}'", sigma, "positive (or left out)"))
-    return Output(name, formula(entry["expression"], f"output '{name}'"), _text(entry, "unit", name),
+    expression = formula(entry["expression"], f"output '{name}'")
+    return Output(name, expression, _text(entry, "unit", name),
                   None if sigma is None else float(sigma))
 
 

@@ -20,7 +20,7 @@ class State:
 
     name: str
     unit: str = ""
-    initial: sp.Expr = sp.Integer(0)
+    initial: sp.Expr = sp.S.Zero
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Input:
     unit: str = ""
     hold: Hold = "zero"
     default: float | None = None
-    delay: sp.Expr = sp.Integer(0)
+    delay: sp.Expr = sp.S.Zero
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Output:
     expression: sp.Expr
     unit: str = ""
     sigma: float | None = None
-    delay: sp.Expr = sp.Integer(0)
+    delay: sp.Expr = sp.S.Zero
 
 
 @dataclass(frozen=True)

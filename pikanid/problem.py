@@ -7,15 +7,14 @@ once a recording); `Experiment` is one recording as the model sees it.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import sympy as sp
 
 from pikanid import errors
-from pikanid.expressions import symbol
+from pikanid.evaluated import InitialState, delays, initial_state
 from pikanid.model import Input, Model, Output
 from pikanid.recording import Recording
 
@@ -266,47 +265,3 @@ def _samples(recording: Recording, output: Output, index: int) -> Samples:
 def _unit(recording: Recording, item: Input | Output) -> str | None:
     """The model's unit, or None where either side leaves the unit open: then it is taken as is."""
     return item.unit if item.unit and recording[item.name].unit else None
-
-
-def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
-    """The delays [s] of inputs or outputs at parameters p (P,)."""
-    table = dict(zip(model.parameter_names, p, strict=True))
-    return np.array([_number(item.delay, table) for item in items])
-
-
-def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
-    """∂delay/∂p (channels, P)."""
-    table = dict(zip(model.parameter_names, p, strict=True))
-    return np.array([[_number(item.delay.diff(symbol(n)), table) for n in model.parameter_names]
-                     for item in items]).reshape(len(items), len(p))
-
-
-def _number(expr: sp.Expr, table: dict[str, float]) -> float:
-    if expr.is_number:
-        return float(expr)
-    return float(expr.xreplace({symbol(n): sp.Float(v) for n, v in table.items()}))
-
-
-@dataclass(frozen=True)
-class InitialState:
-    """The symbolic initial state as functions of p (P,) and the first inputs u0 (m,)."""
-
-    value: Callable[[np.ndarray, np.ndarray], np.ndarray]
-    jacobian: Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-@functools.lru_cache(maxsize=64)
-def initial_state(model: Model) -> InitialState:
-    """x0 (n,) and ∂x0/∂p (n, P) as functions."""
-    n, p_symbols = len(model.states), [symbol(q) for q in model.parameter_names]
-    start = [s.initial for s in model.states]
-    if all(e.is_number for e in start):
-        x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
-        return InitialState(lambda p, u: x0, lambda p, u: zero)
-    arguments = [p_symbols, [symbol(q) for q in model.input_names]]
-    value = sp.lambdify(arguments, start, "numpy", cse=True)
-    table = [[e.diff(q) for q in p_symbols] for e in start]
-    jacobian = sp.lambdify(arguments, table, "numpy", cse=True)
-    return InitialState(
-        lambda p, u: np.array(value(p, u), float),
-        lambda p, u: np.array(jacobian(p, u), float).reshape(n, len(p_symbols)))

@@ -1,4 +1,4 @@
-"""Shooting: standardised residuals of all recordings, and their exact Jacobian, as functions of θ."""
+"""Shooting: standardised residuals of all recordings and their exact Jacobian by θ."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 from pikanid.adequacy import Adequacy, difference_noise, judge
 from pikanid.problem import Problem, Samples
 from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
+
+Accuracy = Literal["coarse", "fine"]
 
 
 class Shooting:
@@ -35,7 +37,7 @@ class Shooting:
         self._at: np.ndarray | None = None
         self._kept: tuple[np.ndarray, np.ndarray] | None = None
 
-    def choose_steps(self, theta: np.ndarray, accuracy: Literal["coarse", "fine"]) -> bool:
+    def choose_steps(self, theta: np.ndarray, accuracy: Accuracy) -> bool:
         """Choose integration steps at θ; returns whether they changed.
 
         "fine": the integration error moves no estimate by more than about a hundredth of its
@@ -50,8 +52,8 @@ class Shooting:
             tolerance = min(limits, default=None)
             if tolerance is not None and accuracy == "coarse":
                 signal = min(float(np.ptp(s.y)) for s in samples if len(s.t))
-                known = all(s.sigma is not None for s in samples)
-                tolerance = min(tolerance * (10 if known else 1e5), 1e-3 * signal)
+                stated = all(s.sigma is not None for s in samples)
+                tolerance = min(tolerance * (10 if stated else 1e5), 1e-3 * signal)
             known = old[r] if old and accuracy == "fine" else None
             self.steps.append(simulator.choose_steps(p, tolerance, self.method, known))
         self._at = None

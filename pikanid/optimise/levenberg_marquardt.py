@@ -1,8 +1,8 @@
 """Bounded nonlinear least squares on exact Jacobians: MINPACK inside the bounds, TRF at them.
 
-MINPACK costs a tenth of SciPy's bounded "trf" a step but knows no bounds; a step outside them is answered
-with huge residuals, which Levenberg-Marquardt takes as a reason to turn back.  Only a start that
-ends beside a bound is finished by "trf".
+MINPACK costs a tenth of SciPy's bounded "trf" a step but knows no bounds; a step outside them is
+answered with huge residuals, which Levenberg-Marquardt takes as a reason to turn back.  Only a
+start that ends beside a bound is finished by "trf".
 """
 
 from __future__ import annotations
@@ -59,6 +59,9 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     def slopes(z: np.ndarray) -> np.ndarray:
         return jacobian(z * scale) * scale
 
+    def boxed(z: np.ndarray) -> np.ndarray:
+        return residual(np.clip(z * scale, lower, upper))
+
     theta, best, evaluations, status = inside, np.inf, 0, 0
     if rows >= len(start):
         # MINPACK directly: least_squares(method="lm") wraps the same code and doubles its cost
@@ -70,7 +73,7 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     room = np.minimum(theta - lower, upper - theta)
     if status == 0 or np.any(room < 1e-3 * np.maximum(np.abs(theta), 1e-12)):
         found = least_squares(
-            lambda z: residual(np.clip(z * scale, lower, upper)),
+            boxed,
             _strictly_inside(theta, lower, upper) / scale, slopes,
             bounds=(lower / scale, upper / scale), x_scale="jac", ftol=tolerance, xtol=tolerance,
             gtol=1e-12, max_nfev=limit)

@@ -1,6 +1,6 @@
 """Simulation: SymPy models compiled by numba, integrated with exact forward sensitivities."""
 
-from pikanid.simulation.simulate import simulate
+from pikanid.simulation.synthetic import simulate
 from pikanid.simulation.simulator import Response, Simulator, Steps
 from pikanid.simulation.vectorfield import VectorField
 

@@ -11,8 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.model import Model
-from pikanid.problem import Experiment, delay_jacobian, delays
+from pikanid.evaluated import delay_jacobian, delays
+from pikanid.model import Input, Model, Output
+from pikanid.problem import Experiment
 from pikanid.simulation.compiled import Method, compiled
 from pikanid.simulation.grid import Grid, build_grid
 
@@ -23,7 +24,7 @@ FINEST = 4096  # sub-steps of the median interval beyond which the explicit rout
 
 @dataclass(frozen=True)
 class Steps:
-    """How finely to integrate: the method, the longest sub-step [s], the error it was found to have."""
+    """How finely to integrate: the method, the longest sub-step [s], and its error as found."""
 
     method: Method
     longest: float
@@ -74,12 +75,14 @@ class Simulator:
     def _delayed_by(self) -> np.ndarray:
         """Parameters (P,) that any delay depends on."""
         p = np.array(list(self.model.values.values()))
-        both = [*self.model.inputs, *self.model.outputs]
+        both: list[Input | Output] = [*self.model.inputs, *self.model.outputs]
         return np.any(delay_jacobian(both, self.model, p) != 0, axis=0)
 
     @functools.cached_property
     def _undelayed(self) -> bool:
-        return all(c.delay == 0 for c in (*self.model.inputs, *self.model.outputs))
+        delayed = [c.delay != 0 for c in self.model.inputs] + [
+            c.delay != 0 for c in self.model.outputs]
+        return not any(delayed)
 
     def grid(self, p: np.ndarray) -> Grid:
         """The stops at parameters p; kept, since only delays change them."""
@@ -198,7 +201,8 @@ class Simulator:
         gap = float(np.abs(fine.y - rough.y).max(initial=0.0))
         error = gap * ratio**4 / (1 - ratio**4)
         asymptotic = gap < 1e-3 * float(np.abs(fine.y).max(initial=0.0))
-        return Steps(known.method, finer.longest, error) if asymptotic and error <= tolerance else None
+        good = asymptotic and error <= tolerance
+        return Steps(known.method, finer.longest, error) if good else None
 
     def _where(self, p: np.ndarray) -> str:
         return ", ".join(f"{n} = {v:.4g}" for n, v in zip(

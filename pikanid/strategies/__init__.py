@@ -1,7 +1,7 @@
 """The identification strategies: one method a file, one result type.
 
-NLS shoots (Eq. 1); PDA, iPDA and PIKAN relax the ODE (Eq. 2, Table I).  Classes are imported when they
-are first used.
+NLS shoots (Eq. 1); PDA, iPDA and PIKAN relax the ODE (Eq. 2, Table I).  Classes are imported when
+they are first used.
 """
 
 from __future__ import annotations

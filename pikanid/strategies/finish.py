@@ -10,9 +10,9 @@ import numpy as np
 
 import pikanid
 from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
+from pikanid.information import covariance, identifiability_warnings
 from pikanid.problem import Problem
 from pikanid.shooting import Shooting
-from pikanid.uncertainty import covariance, identifiability_warnings
 
 
 def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarray, *,
@@ -56,7 +56,8 @@ def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray
              ) -> tuple[tuple[Fit, ...], tuple[Trajectory, ...]]:
     """Simulated outputs beside the measured ones, and the states."""
     fits, trajectories = [], []
-    for e, response in zip(problem.experiments, shooting.responses(theta, states=True), strict=True):
+    responses = shooting.responses(theta, states=True)
+    for e, response in zip(problem.experiments, responses, strict=True):
         trajectories.append(Trajectory(response.t, response.states))
         row = 0
         for s in e.samples:

@@ -1,9 +1,9 @@
 """Multiple shooting for long or chaotic recordings (Bock 1981): an optimum to start shooting from.
 
 The recording is cut into segments whose initial states s_j are unknowns of their own; the gaps
-x(t_{j+1}; s_j, θ) - s_{j+1} join the residual with a weight that rises from step to step.  While the
-gaps are open errors cannot grow over the whole record, which is what traps single shooting.  The θ
-found is only a start: the strategy closes the last gaps exactly by single shooting from it.
+x(t_{j+1}; s_j, θ) - s_{j+1} join the residual with a weight that rises from step to step.  While
+the gaps are open errors cannot grow over the whole record, which is what traps single shooting.
+The θ found is only a start: the strategy closes the last gaps by single shooting from it.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from pikanid.model import Model
 from pikanid.optimise.levenberg_marquardt import Optimum, minimise
 from pikanid.problem import Problem
 from pikanid.recording import Recording
-from pikanid.shooting import Shooting
+from pikanid.shooting import Accuracy, Shooting
 from pikanid.strategies.finish import finish
 from pikanid.strategies.multiple_shooting import multiple_shooting
 from pikanid.strategies.starts import starting_points
@@ -84,7 +84,8 @@ class NLS:
         if best is None:
             raise errors.SimulationFailed(errors.bad_start())
         settings = {"starts": self.starts, "protocol": self.protocol, "tolerance": self.tolerance,
-                    "method": shooting.steps[0].method, "segments": self.segments, "tried": len(history)}
+                    "method": shooting.steps[0].method, "segments": self.segments,
+                    "tried": len(history)}
         return finish(
             "nls", problem, shooting, best.theta, converged=best.converged, history=history,
             settings=settings, seed=self.seed, begun=begun)
@@ -99,8 +100,9 @@ class NLS:
         if self.segments > 1:
             led = multiple_shooting(shooting, start, self.segments)
             theta = start if led is None else led
-        for accuracy, tolerance in (
-                ("coarse", max(1e-4, self.tolerance)), ("fine", self.tolerance)):
+        passes: list[tuple[Accuracy, float]] = [
+            ("coarse", max(1e-4, self.tolerance)), ("fine", self.tolerance)]
+        for accuracy, tolerance in passes:
             try:
                 shooting.choose_steps(theta, accuracy)
             except errors.SimulationFailed:

@@ -33,7 +33,8 @@ def duffing_oscillator() -> Model:
         "parameters": {
             "k": {"unit": "1/s^2", "guess": 36.0, "bounds": [0.0, 1e9],
                   "description": "linear stiffness over mass"},
-            "k3": {"unit": "1/(m^2*s^2)", "guess": 10.0, "description": "cubic stiffness over mass"},
+            "k3": {"unit": "1/(m^2*s^2)", "guess": 10.0,
+                   "description": "cubic stiffness over mass"},
             "c": {"unit": "1/s", "guess": 0.6, "bounds": [0.0, 1e4],
                   "description": "damping over mass"},
             "b": {"unit": "1/kg", "guess": 1.0, "description": "input gain"}},

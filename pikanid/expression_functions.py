@@ -1,0 +1,101 @@
+"""Functions of the formula language that SymPy lacks, as nodes that can be differentiated."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+
+class clip(sp.Function):
+    """``clip(x, lo, hi)``: x limited to [lo, hi]; exact at both kinks."""
+
+    nargs = 3
+    is_real = True
+
+    @classmethod
+    def eval(cls, x: sp.Expr, lo: sp.Expr, hi: sp.Expr) -> sp.Expr | None:
+        if x.is_number and lo.is_number and hi.is_number:
+            return sp.Min(sp.Max(x, lo), hi)
+        return None
+
+    def _eval_derivative(self, s: sp.Symbol) -> sp.Expr:
+        x, lo, hi = self.args
+        inside = sp.Heaviside(x - lo) - sp.Heaviside(x - hi)
+        return (
+            inside * x.diff(s)
+            + (1 - sp.Heaviside(x - lo)) * lo.diff(s)
+            + sp.Heaviside(x - hi) * hi.diff(s)
+        )
+
+    def _latex(self, printer: object) -> str:
+        x, lo, hi = (sp.latex(a) for a in self.args)
+        return rf"\operatorname{{clip}}_{{[{lo},\,{hi}]}}\left({x}\right)"
+
+
+class abs_power(sp.Function):
+    """``abs_power(x, n)`` = \\|x\\|ⁿ, zero at x = 0; differentiable in the exponent as well."""
+
+    nargs = 2
+    is_real = True
+
+    @classmethod
+    def eval(cls, x: sp.Expr, n: sp.Expr) -> sp.Expr | None:
+        if n.is_Integer and n.is_positive:
+            return sp.Abs(x) ** n
+        if x.is_number and n.is_number:
+            return sp.Integer(0) if x.is_zero else sp.Abs(x) ** n
+        return None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        x, n = self.args
+        if argindex == 1:
+            return n * signed_power(x, n - 1)
+        return self * log_abs(x)
+
+    def _latex(self, printer: object) -> str:
+        x, n = (sp.latex(a) for a in self.args)
+        return rf"\left|{x}\right|^{{{n}}}"
+
+
+class signed_power(sp.Function):
+    """``signed_power(x, n)`` = sgn(x)·\\|x\\|ⁿ: the family of Coulomb (n=0) and drag (n=2) laws."""
+
+    nargs = 2
+    is_real = True
+
+    @classmethod
+    def eval(cls, x: sp.Expr, n: sp.Expr) -> sp.Expr | None:
+        if n.is_zero:
+            return sp.sign(x)
+        if n == 1:
+            return x
+        if n.is_Integer and n.is_positive:
+            return sp.sign(x) * sp.Abs(x) ** n
+        if x.is_number and n.is_number:
+            return sp.Integer(0) if x.is_zero else sp.sign(x) * sp.Abs(x) ** n
+        return None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        x, n = self.args
+        if argindex == 1:
+            return n * abs_power(x, n - 1)
+        return self * log_abs(x)
+
+    def _latex(self, printer: object) -> str:
+        x, n = (sp.latex(a) for a in self.args)
+        return rf"\operatorname{{sgn}}\left({x}\right)\left|{x}\right|^{{{n}}}"
+
+
+class log_abs(sp.Function):
+    """ln|x|, taken as 0 at x = 0, where it only ever multiplies |x|ⁿ = 0."""
+
+    nargs = 1
+    is_real = True
+
+    @classmethod
+    def eval(cls, x: sp.Expr) -> sp.Expr | None:
+        if x.is_zero:
+            return sp.Integer(0)
+        return sp.log(sp.Abs(x)) if x.is_number else None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        return 1 / self.args[0]
