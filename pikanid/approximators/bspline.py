@@ -82,6 +82,8 @@ class BSpline:
         rows, width = values.shape
         columns = first[:, None] + np.arange(width)
         pointers = width * np.arange(rows + 1)
+        if max(rows * width, self.n_basis) < 2**31:
+            columns, pointers = columns.astype(np.int32), pointers.astype(np.int32)
         return sparse.csr_array(
             (values.ravel(), columns.ravel(), pointers), shape=(rows, self.n_basis)
         )

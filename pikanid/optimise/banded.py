@@ -8,6 +8,7 @@ two knots share their columns; they are multiplied out together, one small dense
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,21 @@ from pikanid.functional import Part, Rows, Sites
 Ints = NDArray[np.int64]
 
 
+# Rows multiplied out at once: bounds the memory of the products without slowing them down.
+ROWS_AT_ONCE = 32_768
+
+
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """Rows of one family grouped by the coefficients they touch."""
+    """Some consecutive rows of one family, grouped by the coefficients they touch."""
 
-    by_length: tuple[tuple[Ints | None, Ints], ...]  # (time indices (g, L) or None = all, groups)
-    columns: Ints  # (G, w): coefficients in band order
-    width: int
+    rows: slice  # which times of the family
+    by_length: tuple[tuple[Ints | None, Ints], ...]  # (times (g, L) or None = all, groups (g,))
+    columns: Ints  # (G, w): coefficients in band order, less `base`
+    base: int
+    span: int  # coefficients touched: base ... base + span - 1
     lower: tuple[Ints, Ints]  # pairs a >= b of the w local columns
-    band: Ints  # (G, w(w+1)/2): where their products go in the flattened band
+    band: Ints  # (G, w(w+1)/2): where their products go in the flattened band (span, kd + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,64 +65,86 @@ class BandedAssembler:
             int((columns.max(axis=1) - columns.min(axis=1)).max()) for _, columns in groups)
         self.stretches = [self._stretches(starts, columns) for starts, columns in groups]
 
-    def _stretches(self, starts: Ints, columns: Ints) -> Stretches:
-        width = columns.shape[1]
-        a, b = np.tril_indices(width)
-        one, other = columns[:, a], columns[:, b]
-        band = np.abs(one - other) * self.n + np.minimum(one, other)
-        lengths = np.diff(starts)
-        by_length: list[tuple[Ints | None, Ints]] = []
-        distinct = np.unique(lengths)
-        for length in distinct:
-            which = np.flatnonzero(lengths == length)
-            times = None if distinct.size == 1 else starts[which][:, None] + np.arange(length)
-            by_length.append((times, which))
-        return Stretches(tuple(by_length), columns, width, (a, b), band)
+    def _stretches(self, starts: Ints, columns: Ints) -> list[Stretches]:
+        """Cut a family into pieces of some `ROWS_AT_ONCE` rows, at changes of the coefficients."""
+        cuts = np.searchsorted(starts, np.arange(0, starts[-1], ROWS_AT_ONCE))
+        cuts = np.unique(np.append(cuts, starts.size - 1))
+        a, b = np.tril_indices(columns.shape[1])
+        out = []
+        for first, last in pairwise(cuts):
+            own = columns[first:last]
+            base = int(own.min())
+            own = own - base
+            one, other = own[:, a], own[:, b]
+            band = np.minimum(one, other) * (self.bandwidth + 1) + np.abs(one - other)
+            begins = starts[first:last + 1] - starts[first]
+            lengths = np.diff(begins)
+            distinct = np.unique(lengths)
+            by_length: list[tuple[Ints | None, Ints]] = []
+            for length in distinct:
+                which = np.flatnonzero(lengths == length)
+                times = None if distinct.size == 1 else begins[which][:, None] + np.arange(length)
+                by_length.append((times, which))
+            out.append(Stretches(slice(int(starts[first]), int(starts[last])), tuple(by_length),
+                                 own, base, int(own.max()) + 1, (a, b), band))
+        return out
 
     def normal(self, families: list[Sites], rows: list[Rows], b: int) -> BandedNormal:
         """Assemble JᵀJ and Jᵀr from the residual families (b columns of θ)."""
         n, kd = self.n, self.bandwidth
-        band = np.zeros((kd + 1) * n)
-        border, corner = np.zeros((n, b)), np.zeros((b, b))
+        band, border, corner = np.zeros((n, kd + 1)), np.zeros((n, b)), np.zeros((b, b))
         slope, slope_theta = np.zeros(n), np.zeros(b)
         costs = []
-        for stretches, sites, row in zip(self.stretches, families, rows, strict=True):
-            local = local_jacobian(sites, row)
-            w = stretches.width
-            stacked = np.zeros((*row.residual.shape, w + b + 1))
-            stacked[..., :w] = local
-            if row.by_theta is not None:
-                stacked[..., w:w + b] = row.by_theta
-            stacked[..., -1] = row.residual
-            gram = _gram(stretches, stacked)
-            products = gram[:, stretches.lower[0], stretches.lower[1]]
-            band += np.bincount(stretches.band.ravel(), products.ravel(), band.size)
-            into = stretches.columns.ravel()
-            slope += np.bincount(into, gram[:, :w, -1].ravel(), n)
-            if row.by_theta is not None:
-                for j in range(b):
-                    border[:, j] += np.bincount(into, gram[:, :w, w + j].ravel(), n)
-            total = gram[:, w:, w:].sum(axis=0)
+        for pieces, sites, row in zip(self.stretches, families, rows, strict=True):
+            total = np.zeros((b + 1, b + 1))
+            for piece in pieces:
+                gram = _gram(piece, _stack(sites, row, piece.rows, b))
+                w = piece.columns.shape[1]
+                part = slice(piece.base, piece.base + piece.span)
+                products = gram[:, piece.lower[0], piece.lower[1]].ravel()
+                band[part] += np.bincount(
+                    piece.band.ravel(), products, piece.span * (kd + 1)).reshape(-1, kd + 1)
+                into = piece.columns.ravel()
+                slope[part] += np.bincount(into, gram[:, :w, -1].ravel(), piece.span)
+                if row.by_theta is not None:
+                    for j in range(b):
+                        column = gram[:, :w, w + j].ravel()
+                        border[part, j] += np.bincount(into, column, piece.span)
+                total += gram[:, w:, w:].sum(axis=0)
             corner += total[:b, :b]
             slope_theta += total[:b, b]
             costs.append(float(total[b, b]))
-        return BandedNormal(band.reshape(kd + 1, n), border, corner, slope, slope_theta,
+        return BandedNormal(np.ascontiguousarray(band.T), border, corner, slope, slope_theta,
                             tuple(costs))
 
 
-def local_jacobian(sites: Sites, rows: Rows) -> Array:
-    """Jacobian by the coefficients that a row touches, (M, E, w): chain after chain."""
+def _stack(sites: Sites, rows: Rows, part: slice, b: int) -> Array:
+    """[∂r/∂local coefficients, ∂r/∂θ, r] (M, E, w + b + 1) of some rows of a family."""
+    local = local_jacobian(sites, rows, part)
+    residual = rows.residual[part]
+    w = local.shape[2]
+    stacked = np.zeros((*residual.shape, w + b + 1))
+    stacked[..., :w] = local
+    if rows.by_theta is not None:
+        stacked[..., w:w + b] = rows.by_theta[part]
+    stacked[..., -1] = residual
+    return stacked
+
+
+def local_jacobian(sites: Sites, rows: Rows, part: slice) -> Array:
+    """Jacobian by the coefficients that a row touches, (M, E, w), of some rows of a family."""
     blocks = _blocks(sites)
-    count, width = rows.residual.shape
+    count, width = rows.residual[part].shape
     out = np.zeros((count, width, sum(size for _, size, _ in blocks.values())))
-    for s, table in enumerate(sites.states):
-        if rows.by_state is not None:
+    if rows.by_state is not None:
+        for s, table in enumerate(sites.states):
             at, size, _ = blocks[table.part.start]
-            out[:, :, at:at + size] += rows.by_state[:, :, s, None] * table.window[1][:, None, :]
-    for e, table in enumerate(sites.tops):
-        if rows.by_top is not None:
+            by_state = rows.by_state[part, :, s, None]
+            out[:, :, at:at + size] += by_state * table.window[1][part, None, :]
+    if rows.by_top is not None:
+        for e, table in enumerate(sites.tops):
             at, size, _ = blocks[table.part.start]
-            out[:, e, at:at + size] += rows.by_top[:, e, None] * table.window[1]
+            out[:, e, at:at + size] += rows.by_top[part, e, None] * table.window[1][part]
     return out
 
 

@@ -17,6 +17,7 @@ from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
 
 EXACT_UP_TO = 300  # data rows; beyond, the trace is estimated
 PROBES = 32
+PROBE_ROWS = 100_000  # fewer probes for longer records, where the trace hardly matters
 
 
 def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
@@ -25,7 +26,8 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
 
     `noise` is the standard deviation of the rows of each data family, recording after recording.
     Parameters at a bound count as known: their rows and columns are zero.  One without influence
-    has an infinite variance.  The naive covariance, the θ block of M⁻¹ times the mean noise variance, counts physics as data.
+    has an infinite variance.  The naive covariance, the θ block of M⁻¹ times the mean noise
+    variance, counts physics as data.
     """
     inside = inside_bounds(system, at)
     bread = invert(step.schur, inside)
@@ -84,14 +86,15 @@ def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[A
 def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) -> float:
     """tr(J_d M⁻¹ J_dᵀ): how many parameters' worth of the data the fit has used up.
 
-    Exact for up to 300 samples, else from 32 fixed random probes (Hutchinson, 1990): ±√(edf/16).
+    Exact for up to 300 samples, else from at most 32 fixed random probes (Hutchinson, 1990).
     """
     functional = system.functional
     rows = functional.n_data
     if rows <= EXACT_UP_TO:
         probes = np.eye(rows)
     else:
-        probes = np.random.default_rng(0).choice([-1.0, 1.0], size=(rows, PROBES))
+        number = int(np.clip(PROBE_ROWS // rows, 2, PROBES))
+        probes = np.random.default_rng(0).choice([-1.0, 1.0], size=(rows, number))
     theta = np.zeros((at.point.theta.size, probes.shape[1]))
     total, first = 0.0, 0
     for r, part in enumerate(functional.parts):
@@ -118,4 +121,4 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
         theta[columns] += pulled_theta - block.border.T @ solved
     if theta.size:
         total += float(np.sum(theta * (invert(step.schur, inside_bounds(system, at)) @ theta)))
-    return total if rows <= EXACT_UP_TO else total / PROBES
+    return total if rows <= EXACT_UP_TO else total / probes.shape[1]
