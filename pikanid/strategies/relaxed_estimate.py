@@ -10,11 +10,11 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from typing import Any, Protocol
 
 import numpy as np
 
-import pikanid
 from pikanid import errors
 from pikanid.adequacy import judge
 from pikanid.approximators import Array
@@ -114,5 +114,5 @@ def _unsimulated(strategy: str, fit: RelaxedFit, curves: Curves,
         model=problem.model, strategy=strategy, free=problem.free, theta=fit.theta,
         covariance=fit.covariance, fits=tuple(fits), trajectories=tuple(paths),
         cost=total_cost(fits), adequacy=replace(adequacy, verdict="misfit"), converged=True,
-        settings=settings, history=tuple(history), version=pikanid.__version__,
+        settings=settings, history=tuple(history), version=version("pikanid"),
         warnings=(*fit.warnings, errors.estimate_not_simulated()), approximator=curves)
