@@ -64,7 +64,9 @@ def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
     if function is not None:
         value = read(function, "function").xreplace({u: value})
     swap: dict[sp.Expr, sp.Expr] = {u: value}
-    states, added = model.states, {}
+    states = tuple(dataclasses.replace(s, initial=s.initial.xreplace({u: value}))
+                   for s in model.states)
+    added = {}
     if lag is not None:
         held = symbol(_fresh(model, f"{name}_lag"))
         states = (*states, State(held.name, item.unit, value))

@@ -39,7 +39,7 @@ class abs_power(sp.Function):
 
     @classmethod
     def eval(cls, x: sp.Expr, n: sp.Expr) -> sp.Expr | None:
-        if n.is_Integer and n.is_positive:
+        if n.is_Integer and n.is_nonnegative:
             return sp.Abs(x) ** n
         if x.is_number and n.is_number:
             return sp.Integer(0) if x.is_zero else sp.Abs(x) ** n

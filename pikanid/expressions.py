@@ -134,19 +134,28 @@ class _Reader:
         rest = [node]
         while isinstance(rest[-1].left, ast.BinOp):
             rest.append(rest[-1].left)
-        result = self.read(rest[-1].left, depth + 1)
+        terms = [self.read(rest[-1].left, depth + 1)]
         for step in reversed(rest):
-            try:
-                result = self.binary(step, step.op, result, self.read(step.right, depth + 1))
-            except RecursionError:
-                raise self.fail(step) from None
-            result = self.real(step, result)
-        return result
+            right = self.read(step.right, depth + 1)
+            match step.op:
+                case ast.Add():
+                    terms.append(right)
+                case ast.Sub():
+                    terms.append(-right)
+                case _:
+                    terms = [self.binary(step, step.op, sp.Add(*terms), right)]
+                    self.finite(step, terms[0])
+        return self.real(node, sp.Add(*terms))
 
     def real(self, node: ast.AST, result: sp.Expr) -> sp.Expr:
-        """The expression, if it is real; a number must also be finite as a float."""
+        """The expression, if every part of it is real; a number must also be finite."""
+        self.finite(node, result)
         if result.has(sp.zoo, sp.nan, sp.oo, sp.I):
             raise self.fail(node)
+        return result
+
+    def finite(self, node: ast.AST, result: sp.Expr) -> None:
+        """Refuse a number that no float can hold, before anything grows from it."""
         if result.is_number:
             try:
                 finite = math.isfinite(float(result))
@@ -154,7 +163,6 @@ class _Reader:
                 finite = False
             if not finite:
                 raise self.fail(node)
-        return result
 
     def part(self, node: ast.AST, depth: int) -> sp.Expr:
         match node:
@@ -193,10 +201,6 @@ class _Reader:
 
     def binary(self, node: ast.AST, op: ast.operator, left: sp.Expr, right: sp.Expr) -> sp.Expr:
         match op:
-            case ast.Add():
-                return left + right
-            case ast.Sub():
-                return left - right
             case ast.Mult():
                 return left * right
             case ast.Div():

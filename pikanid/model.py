@@ -61,12 +61,12 @@ class Model(Lookup):
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "states", tuple(
-            dataclasses.replace(s, initial=to_real(s.initial)) for s in self.states))
+            dataclasses.replace(s, initial=_constant(s.initial)) for s in self.states))
         put(self, "inputs", tuple(
-            dataclasses.replace(i, delay=to_real(i.delay)) for i in self.inputs))
+            dataclasses.replace(i, delay=_constant(i.delay)) for i in self.inputs))
         put(self, "parameters", tuple(self.parameters))
         put(self, "outputs", tuple(
-            dataclasses.replace(o, expression=to_real(o.expression), delay=to_real(o.delay))
+            dataclasses.replace(o, expression=to_real(o.expression), delay=_constant(o.delay))
             for o in self.outputs))
         put(self, "splines", tuple(self.splines))
         order = [s.name for s in self.states]
@@ -264,3 +264,11 @@ class Model(Lookup):
 
     def _repr_latex_(self) -> str:
         return f"$${self.latex()}$$"
+
+
+def _constant(formula: Formula) -> sp.Expr:
+    """The formula, a plain number in one form: SymPy holds 1 and 1.0 for different."""
+    expr = to_real(formula)
+    if not (expr.is_Integer or expr.is_Float):
+        return expr
+    return sp.Float(float(expr)) if expr != 0 else sp.Integer(0)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from pikanid import errors
+from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
 from pikanid.expressions import TIME, check_name
 
 if TYPE_CHECKING:
@@ -84,9 +85,18 @@ def _check_names(model: Model) -> None:
                 "of degree >= 1 with at least degree + 2 non-decreasing knots"))
 
 
+_NODES = (sp.Add, sp.Mul, sp.Pow, sp.Symbol, sp.Rational, sp.Float, sp.exp, type(sp.pi), type(sp.E),
+          sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.atan2, sp.sinh, sp.cosh, sp.tanh,
+          sp.log, sp.Abs, sp.sign, sp.Heaviside, sp.Min, sp.Max, clip, abs_power, signed_power,
+          log_abs, sp.core.function.AppliedUndef)
+
+
 def _check_symbols(expr: sp.Expr, known: Iterable[str], where: str, model: Model) -> None:
     unknown = sorted({s.name for s in expr.free_symbols} - set(known))
     functions = {f.func.__name__ for f in expr.atoms(sp.core.function.AppliedUndef)}
     unknown += sorted(functions - {s.name for s in model.splines})
     if unknown:
         raise errors.BadModel(errors.foreign_symbols(unknown, where))
+    for node in sp.preorder_traversal(expr):
+        if not isinstance(node, _NODES):
+            raise errors.BadModel(errors.formula_forbidden(str(node), where[0].lower() + where[1:]))

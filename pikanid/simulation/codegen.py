@@ -14,12 +14,11 @@ from collections.abc import Sequence
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
-from pikanid.expressions import TIME, log_abs, symbol
+from pikanid.expressions import TIME, symbol
 from pikanid.model import Model
 from pikanid.simulation.lowering import (
     LoweredModel,
     lower_model,
-    positive_power,
     spline_value,
     switch_symbol,
 )
@@ -31,7 +30,7 @@ import numpy as np
 from numba import njit
 
 from pikanid.simulation.support import (
-    Seen, log_abs, make_work, positive_power, sgn, solve_small, spline_basis)
+    Seen, log_abs, make_work, positive_power, power_slope, sgn, solve_small, spline_basis)
 
 
 def called(function):
@@ -44,7 +43,7 @@ def inlined(function):
 
 '''
 
-# called once per stage or stop: pasted into the caller, which saves most of the time of small models
+# called once per stage or stop: pasted into the caller, most of the time of small models
 HOT = ("variational", "observe", "observe_sensitivity")
 
 
@@ -56,6 +55,9 @@ class _Printer(PythonCodePrinter):
 
     def _print_positive_power(self, expr: sp.Expr) -> str:
         return f"positive_power({self._print(expr.args[0])}, {self._print(expr.args[1])})"
+
+    def _print_power_slope(self, expr: sp.Expr) -> str:
+        return f"power_slope({self._print(expr.args[0])}, {self._print(expr.args[1])})"
 
     def _print_log_abs(self, expr: sp.Expr) -> str:
         return f"log_abs({self._print(expr.args[0])})"
@@ -117,7 +119,7 @@ class Writer:
     def sensitivities(self, name: str, arguments: str, exprs: Sequence[sp.Expr], out: str,
                       values: str | None, more: Sequence[tuple[str, sp.Expr]] = (),
                       inline_switches: bool = False) -> str:
-        """A function that fills ``out[r, a]`` with ∂e_r/∂x S[:, a] + ∂e_r/∂u ud[:, a] + ∂e_r/∂p_act[a].
+        """A function that fills ``out`` with ∂e/∂x S + ∂e/∂u ud + ∂e/∂p of the active parameters.
 
         `fp` (rows, P + 1) is scratch whose last column stays zero: the "parameter" of an initial
         state.  `values` names an array for the expressions themselves.
@@ -135,9 +137,11 @@ class Writer:
         own = self._own_switches(inline_switches)
         used = [*(e for _, e in targets), *own]
         splines = Splines(self, used)
-        edge_targets, edge_lines = splines.coefficient_columns(exprs)
+        edge_targets, clear, edge_lines = splines.coefficient_columns(exprs)
+        # a coefficient inside the argument of another spline needs that one's derivative as well
+        splines = Splines(self, [*used, *(e for _, e in edge_targets)])
         body = self.unpack([*used, *splines.arguments, *(e for _, e in edge_targets)])
-        body += self.prelude(splines, own)
+        body += self.prelude(splines, own) + clear
         body += self.block([*targets, *edge_targets], splines) + edge_lines
         body += ["for a in range(len(act)):", "    k = act[a]"]
         for r in range(len(exprs)):
@@ -221,15 +225,16 @@ class Splines:
 
     def coefficient_columns(
         self, exprs: Sequence[sp.Expr]
-    ) -> tuple[list[tuple[str, sp.Expr]], list[str]]:
-        """∂e/∂c_k for the coefficients: needed derivatives, and the lines that spread them."""
+    ) -> tuple[list[tuple[str, sp.Expr]], list[str], list[str]]:
+        """∂e/∂c_k for the coefficients: needed derivatives, lines that clear and that add."""
         targets: list[tuple[str, sp.Expr]] = []
+        clear: list[str] = []
         lines: list[str] = []
         for r, e in enumerate(exprs):
             for i in {i for i, _ in self.keys}:
                 first, size = self._offset(i), self.writer.model.splines[i].size
                 if e.atoms(spline_value):
-                    lines.append(f"fp[{r}, {first}:{first + size}] = 0.0")
+                    clear.append(f"fp[{r}, {first}:{first + size}] = 0.0")
             for n, (i, z) in enumerate(self.keys):
                 for o in self.orders[(i, z)]:
                     handle = sp.Dummy(real=True)
@@ -241,7 +246,7 @@ class Splines:
                     d = self.writer.model.splines[i].degree
                     lines += [f"for r in range({d + 1}):",
                               f"    fp[{r}, _k{n} + r] += _w{r}_{n}_{o} * _b{n}_{o}[r]"]
-        return targets, lines
+        return targets, clear, lines
 
     def _offset(self, i: int) -> int:
         first = self.writer.model.splines[i].coefficient_names[0]
@@ -267,7 +272,7 @@ def generate(model: Model) -> tuple[str, LoweredModel]:
     h_rate = [_rate(w, e) for e in h]
     source = HEADER + knots + f"hot = {'called' if lowered.n_dynamic else 'inlined'}\n" + (
         f"N, M, P, Q, K = {len(w.x)}, {len(w.u)}, {len(w.p)}, {len(h)}, {lowered.n_dynamic}\n"
-        f"BUFFERS = ({3 * edges}, {width})  # basis values: one row per argument and derivative\n\n\n")
+        f"BUFFERS = ({3 * edges}, {width})  # basis: (argument, derivative) rows\n\n\n")
     source += w.values("rhs", "b, t, x, u, p, s, f", "f", f)
     source += w.sensitivities(
         "variational", "b, t, x, S, u, ud, p, s, act, f, fp, dS", f, "dS", "f")
@@ -280,6 +285,8 @@ def generate(model: Model) -> tuple[str, LoweredModel]:
         g = lowered.switches[: lowered.n_dynamic]
         rate = [_rate(w, e) for e in g]
         dynamic = w.s[: lowered.n_dynamic]
+        moving = {TIME, *w.x, *dynamic}
+        source += f"INPUT_ONLY = np.array({[not e.free_symbols & moving for e in g]})\n\n\n"
         push = [(f"Fs[{r}, {k}]", e.diff(q))
                 for r, e in enumerate(f) for k, q in enumerate(dynamic) if e.diff(q) != 0]
         slope = [(f"Gs[{r}, {k}]", e.diff(q))

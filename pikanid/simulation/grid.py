@@ -16,10 +16,10 @@ from pikanid.simulation.support import Seen
 
 @dataclass(frozen=True)
 class Grid:
-    """Stops T (L,), inputs at the start of each interval U (L-1, m) and their slopes V (L-1, m).
+    """Stops T (L,), inputs right of each stop U (L, m) and their slopes V (L, m).
 
-    `jumps` (L-1,) marks intervals that begin with a jump of an input; `seen` lists the
-    observations of each stop; `rows` is their number.
+    `jumps` (L,) marks stops at which an input jumps or kinks; `seen` lists the observations of
+    each stop; `rows` is their number.
     """
 
     T: np.ndarray
@@ -52,11 +52,19 @@ def build_grid(experiment: Experiment, delay_in: np.ndarray, delay_out: np.ndarr
     middle = 0.5 * (T[1:] + T[:-1])
     V = _columns([h.slope(middle, d) for h, d in pairs], len(middle))
     U = _columns([h.at(middle, d) for h, d in pairs], len(middle)) - V * (middle - T[:-1])[:, None]
-    ends = U + V * np.diff(T)[:, None]
-    jumps = np.ones(len(middle), bool)
-    scale = np.maximum(np.abs(U).max(axis=0, initial=0.0), 1e-300)
-    jumps[1:] = np.any(np.abs(U[1:] - ends[:-1]) > 1e-9 * scale, axis=1)
+    # nothing is integrated beyond the last stop, but an output may show the inputs there
+    U = np.vstack([U, _columns([h.at(T[-1:], d) for h, d in pairs], 1)])
+    V = np.vstack([V, V[-1:]])
+    ends = U[:-1] + V[:-1] * np.diff(T)[:, None]
+    jumps = np.ones(len(T), bool)
+    jumps[1:] = _differ(U[1:], ends, U) | _differ(V[1:], V[:-1], V)
     return Grid(T, U, V, jumps, _seen(T, experiment, wanted), sum(map(len, wanted)))
+
+
+def _differ(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Rows (L,) in which a and b (L, m) differ by more than rounding."""
+    largest = np.abs(scale).max(axis=0, initial=0.0)
+    return np.any(np.abs(a - b) > 1e-9 * largest, axis=1)
 
 
 def _columns(columns: list[np.ndarray], count: int) -> np.ndarray:

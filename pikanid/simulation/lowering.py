@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-from pikanid.expressions import abs_power, clip, log_abs, signed_power
+from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
 from pikanid.model import Model, Spline
 
 
@@ -26,7 +26,23 @@ class positive_power(sp.Function):
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         base, n = self.args
-        return n * positive_power(base, n - 1) if argindex == 1 else self * log_abs(base)
+        return power_slope(base, n) if argindex == 1 else self * log_abs(base)
+
+
+class power_slope(sp.Function):
+    """n·bⁿ⁻¹, the derivative of `positive_power`; zero very near b = 0 where n < 1.
+
+    There the slope grows without bound, though its effect on a passing trajectory does not: taken
+    at a zero crossing it would make sensitivities explode.
+    """
+
+    nargs = 2
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        base, n = self.args
+        if argindex == 1:
+            return n * power_slope(base, n - 1)
+        return positive_power(base, n - 1) + self * log_abs(base)
 
 
 class spline_value(sp.Function):
@@ -64,7 +80,7 @@ class Lowering:
             names = [s.name for s in self.splines]
             return spline_value(names.index(expr.func.__name__), 0, args[0])
         if isinstance(expr, sp.sign):
-            return args[0] if args[0].is_number else self.switch(args[0])
+            return sp.sign(args[0]) if args[0].is_number else self.switch(args[0])
         if isinstance(expr, sp.Abs):
             return self.switch(args[0]) * args[0]
         if isinstance(expr, sp.Heaviside):

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+STEEP = 1e-6  # where n < 1, the slope of bⁿ below this b counts as zero
+
 
 class Seen(NamedTuple):
     """Which observations belong to which stop: those at stop i are first[i] ... first[i+1]-1."""
@@ -32,6 +34,7 @@ class Work(NamedTuple):
     u: np.ndarray
     uc: np.ndarray
     held: np.ndarray
+    slope: np.ndarray
     ud: np.ndarray
     f: np.ndarray
     before: np.ndarray
@@ -45,6 +48,8 @@ class Work(NamedTuple):
     rp: np.ndarray
     s: np.ndarray
     g: np.ndarray
+    ge: np.ndarray
+    Ge: np.ndarray
     phi: np.ndarray
     G: np.ndarray
     Gs: np.ndarray
@@ -71,15 +76,18 @@ def make_work(n: int, m: int, P: int, q: int, k: int, A: int, stages: int,
               rows: int, width: int) -> Work:
     """Scratch for n states, m inputs, P parameters, q outputs, k switches, A sensitivities."""
     big = max(n, k)
+    wide = max(A, n)  # the implicit step differentiates by all states
     return Work(
         np.empty((stages, n)), np.empty((stages, A, n)), np.empty(n), np.empty((A, n)),
         np.empty(n), np.empty((A, n)), np.empty(n), np.empty((A, n)),
-        np.empty(m), np.empty(m), np.empty(m), np.zeros((m, A)),
+        np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.zeros((m, A)),
         np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(q), np.empty((q, A)),
         np.zeros((n, P + 1)), np.zeros((q, P + 1)), np.zeros((k, P + 1)), np.zeros((k, P + 1)),
-        np.empty(k), np.empty(k), np.empty(k), np.empty(k), np.zeros((k, k)), np.zeros((n, k)),
-        np.empty((k, A)), np.empty((k, A)), np.empty((k, A)), np.empty(k, np.int64),
-        np.eye(n), np.empty((n, n)), np.empty((big, big)), np.empty((big, 1)), np.empty((n, A)), np.zeros((m, n)),
+        np.empty(k), np.empty(k), np.empty(k), np.empty(k), np.empty(k), np.empty(k),
+        np.zeros((k, k)), np.zeros((n, k)),
+        np.empty((k, A)), np.empty((k, wide)), np.empty((k, wide)), np.empty(k, np.int64),
+        np.eye(n), np.empty((n, n)), np.empty((big, big)), np.empty((big, 1)), np.empty((n, A)),
+        np.zeros((m, n)),
         np.full(n, P, np.int64), np.empty((0, n)), np.empty((m, 0)), np.empty(0, np.int64),
         np.empty((rows, width)))
 
@@ -117,6 +125,14 @@ def positive_power(base: float, n: float) -> float:
     if base <= 0.0:
         return 1.0 if n == 0.0 else 0.0
     return base**n
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def power_slope(base: float, n: float) -> float:
+    """n·baseⁿ⁻¹ for base > 0, else zero; zero as well below 1e-6 where n < 1 (see `lowering`)."""
+    if base <= 0.0 or (n < 1.0 and base < STEEP):
+        return 1.0 if n == 1.0 else 0.0
+    return n * base ** (n - 1.0)
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -17,6 +17,7 @@ from pikanid.expressions import TIME, symbol
 from pikanid.model import Model
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
 from pikanid.simulation.structure import Structure
+from pikanid.simulation.support import STEEP
 
 
 class VectorField:
@@ -82,7 +83,8 @@ class _Functions:
                 for k, g in enumerate(self.lowered.switches)]
 
     def _lambdify(self, arguments: Sequence[sp.Symbol], exprs: Sequence[sp.Expr]) -> Any:
-        tools = {"positive_power": _positive_power, "log_abs": _log_abs,
+        tools = {"positive_power": _positive_power, "power_slope": _power_slope,
+                 "log_abs": _log_abs,
                  "spline_value": _Splines(self.model, list(arguments))}
         atoms = sorted(set().union(*(e.atoms(spline_value) for e in exprs)),
                        key=sp.default_sort_key)
@@ -179,6 +181,12 @@ def _positive_power(base: np.ndarray, n: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         return np.where(np.asarray(base) > 0, np.power(np.maximum(base, 0.0), n),
                         np.where(np.asarray(n) == 0, 1.0, 0.0))
+
+
+def _power_slope(base: np.ndarray, n: np.ndarray) -> np.ndarray:
+    with np.errstate(all="ignore"):
+        steep = (np.asarray(n) < 1) & (np.asarray(base) < STEEP)
+        return np.where(steep, 0.0, n * _positive_power(base, np.asarray(n) - 1))
 
 
 def _log_abs(x: np.ndarray) -> np.ndarray:

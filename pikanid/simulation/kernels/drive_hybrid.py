@@ -21,31 +21,63 @@ def rates_beside(k, t, x, u, v, p, mode, w):
 
 
 @called
-def begin(t, x, S, u, v, ud, p, mode, act, w):
-    """Choose the modes where an interval starts; a jump of an input may have changed them.
+def mode_at_zero(k, t, x, u, v, p, mode, w):
+    """The mode of a switching function that is at zero: the flow beside its surface decides."""
+    below, above = rates_beside(k, t, x, u, v, p, mode, w)
+    if above < 0.0 < below:
+        return 0.0
+    if above == 0.0 and below == 0.0:
+        # a function of held inputs stays at zero, sgn 0 = 0; one of the state may yet move off
+        return 0.0 if INPUT_ONLY[k] else (1.0 if mode[k] == 0.0 else mode[k])
+    if above >= 0.0 and below >= 0.0:
+        return 1.0
+    if above <= 0.0 and below <= 0.0:
+        return -1.0
+    return 1.0 if abs(above) >= abs(below) else -1.0
 
-    Where a jump frees or catches a sliding surface nothing else jumps: its instant is given, so
-    the sensitivities go on unchanged.
+
+@called
+def leap(k, new, t, x, S, u, v, ud, p, mode, act, w):
+    """Set mode k to `new` where its switching function passes zero; sensitivities jump.
+
+    S+ = S- + (f- - f+) dt_e/dtheta with dt_e/dtheta = -(g_x S + g_u ∂u + g_p)/(dg/dt)-
+    (saltation; Di Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, sec. 2.5).
+    """
+    A = len(act)
+    field_value(t, x, u, v, p, mode, w, w.before)
+    switching_rate(w.bs, t, x, u, v, p, w.s, w.G)
+    rate = w.G[k]
+    if A > 0:
+        switching_sensitivity(w.bs, t, x, S, u, ud, p, w.s, act, w.gp, w.gS)
+    mode[k] = new
+    if A > 0 and rate != 0.0:
+        field_value(t, x, u, v, p, mode, w, w.after)
+        for a in range(A):
+            when = -w.gS[k, a] / rate
+            for i in range(N):
+                S[a, i] += (w.before[i] - w.after[i]) * when
+
+
+@called
+def begin(t, first, x, S, u, v, ud, p, mode, act, w):
+    """Choose the modes where inputs go from w.uc to u; the jump may have changed them.
+
+    Where the jump itself frees or catches a surface, or carries a switching function past zero,
+    sensitivities go on unchanged: the instant is given.  Only a function that passes zero by the
+    flow just there (a switching time guessed on an input's) makes them jump.
     """
     for k in range(K):
-        w.s[k] = mode[k]
-    for k in range(K):
+        resolve(t, x, u, v, p, mode, w)
+        switching(w.bs, t, x, w.uc, p, w.s, w.g)
+        drift = w.g[k] if mode[k] == 0.0 else 0.0
         switching(w.bs, t, x, u, p, w.s, w.g)
-        g = w.g[k]
-        if mode[k] != 0.0 and abs(g) > 1e-12:
-            mode[k] = 1.0 if g > 0.0 else -1.0
-        else:
-            below, above = rates_beside(k, t, x, u, v, p, mode, w)
-            if above < 0.0 < below:
-                mode[k] = 0.0
-            elif above >= 0.0 and below >= 0.0:
-                mode[k] = 1.0
-            elif above <= 0.0 and below <= 0.0:
-                mode[k] = -1.0
-            else:
-                mode[k] = 1.0 if abs(above) >= abs(below) else -1.0
-        w.s[k] = mode[k]
-    return True
+        if abs(w.g[k] - drift) > 1e-12:
+            mode[k] = 1.0 if w.g[k] > 0.0 else -1.0
+            continue
+        new = mode_at_zero(k, t, x, u, v, p, mode, w)
+        if not first and mode[k] * new < 0.0:
+            leap(k, new, t, x, S, u, v, ud, p, mode, act, w)
+        mode[k] = new
 
 
 @called
@@ -60,6 +92,45 @@ def margins(t, x, ta, ua, v, p, mode, w, phi):
         if phi[k] < least:
             least, which = phi[k], k
     return least, which
+
+
+@called
+def look_at(t, x, ta, ua, v, p, mode, w):
+    """Fill w.g and w.G: the switching functions and their rates."""
+    input_at(t, ta, ua, v, w)
+    resolve(t, x, w.u, v, p, mode, w)
+    switching(w.bs, t, x, w.u, p, w.s, w.g)
+    switching_rate(w.bs, t, x, w.u, v, p, w.s, w.G)
+
+
+@called
+def dip(t, h, x, xn, ta, ua, v, p, mode, w):
+    """The share of a step from x to xn at which a switching function may be beyond zero, or 0.
+
+    A function that is on its side at both ends can have passed zero twice in between: the cubic
+    through both ends' values and rates tells.
+    """
+    look_at(t + h, xn, ta, ua, v, p, mode, w)
+    returning = False
+    for k in range(K):
+        w.ge[k], w.Ge[k] = w.g[k], w.G[k]
+        returning = returning or mode[k] * w.G[k] > 0.0
+    if not returning:
+        return 0.0
+    look_at(t, x, ta, ua, v, p, mode, w)
+    share = 0.0
+    for k in range(K):
+        first, last = mode[k] * w.g[k], mode[k] * w.ge[k]
+        fall, rise = mode[k] * w.G[k] * h, mode[k] * w.Ge[k] * h
+        if fall < 0.0 < rise:
+            square = 3.0 * (last - first) - 2.0 * fall - rise
+            cube = 2.0 * (first - last) + fall + rise
+            root = math.sqrt(square * square - 3.0 * cube * fall)
+            where = -fall / (square + root) if square > 0.0 else (root - square) / (3.0 * cube)
+            lowest = first + where * (fall + where * (square + where * cube))
+            if lowest < 0.0 and 0.0 < where < 1.0 and (share == 0.0 or where < share):
+                share = where
+    return share
 
 
 @called
@@ -90,34 +161,18 @@ def locate(t, h, x, ta, ua, v, p, mode, w, end):
 
 @called
 def cross(k, t, x, S, ta, ua, v, ud, p, mode, act, w):
-    """End mode k at the point reached: pass, stick, or come loose; sensitivities jump.
-
-    S+ = S- + (f- - f+) dt_e/dtheta with dt_e/dtheta = -(g_x S + g_u ∂u + g_p)/(dg/dt)-
-    (saltation; Di Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, sec. 2.5).
-    """
-    A = len(act)
+    """End mode k at the point reached: pass, stick, or come loose."""
     input_at(t, ta, ua, v, w)
-    u, before, after = w.uc, w.before, w.after
     for j in range(M):
-        u[j] = w.u[j]
+        w.uc[j] = w.u[j]
     if mode[k] == 0.0:
-        resolve(t, x, u, v, p, mode, w)
+        resolve(t, x, w.uc, v, p, mode, w)
         mode[k] = 1.0 if w.s[k] > 0.0 else -1.0
         return
-    field_value(t, x, u, v, p, mode, w, before)
-    switching_rate(w.bs, t, x, u, v, p, w.s, w.G)
-    rate, side = w.G[k], mode[k]
-    if A > 0:
-        switching_sensitivity(w.bs, t, x, S, u, ud, p, w.s, act, w.gp, w.gS)
-    below, above = rates_beside(k, t, x, u, v, p, mode, w)
-    beyond = below if side > 0.0 else above
-    mode[k] = 0.0 if side * beyond > 0.0 else -side
-    if A > 0 and rate != 0.0:
-        field_value(t, x, u, v, p, mode, w, after)
-        for a in range(A):
-            when = -w.gS[k, a] / rate
-            for i in range(N):
-                S[a, i] += (before[i] - after[i]) * when
+    below, above = rates_beside(k, t, x, w.uc, v, p, mode, w)
+    beyond = below if mode[k] > 0.0 else above
+    new = 0.0 if mode[k] * beyond > 0.0 else -mode[k]
+    leap(k, new, t, x, S, w.uc, v, ud, p, mode, act, w)
 
 
 @called
@@ -131,14 +186,21 @@ def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
         for i in range(N):
             if not math.isfinite(w.xn[i]):
                 return 1
-        end, which = margins(t + h, w.xn, ta, ua, v, p, mode, w, w.phi)
+        part, which, redo = rest, -1, len(act) > 0
+        end, _ = margins(t + h, w.xn, ta, ua, v, p, mode, w, w.phi)
+        if end >= -1e-14:
+            share = dip(t + done, rest, x, w.xn, ta, ua, v, p, mode, w)
+            if share > 0.0:
+                redo, part = True, share * rest
+                step(t + done, part, x, w.none, ta, ua, v, w.nud, p, mode, w.nact, w, w.xn, w.none)
+                end, _ = margins(t + done + part, w.xn, ta, ua, v, p, mode, w, w.phi)
         if end < -1e-14:
-            part, which = locate(t + done, rest, x, ta, ua, v, p, mode, w, end)
+            part, which = locate(t + done, part, x, ta, ua, v, p, mode, w, end)
+            redo = True
         else:
-            part, which = rest, -1
-        if len(act) > 0 or which >= 0:
-            if not step(t + done, part, x, S, ta, ua, v, ud, p, mode, act, w, w.xn, w.Sn):
-                return 1
+            part = rest
+        if redo and not step(t + done, part, x, S, ta, ua, v, ud, p, mode, act, w, w.xn, w.Sn):
+            return 1
         for i in range(N):
             x[i] = w.xn[i]
             for a in range(len(act)):

@@ -1,7 +1,6 @@
 @inlined
-def begin(t, x, S, u, v, ud, p, mode, act, w):
+def begin(t, first, x, S, u, v, ud, p, mode, act, w):
     """Nothing to prepare: a smooth model has no modes."""
-    return True
 
 
 @inlined

@@ -23,56 +23,69 @@ def record(i, t, x, S, u, v, p, mode, act, w, seen, moves, dtau_in, dtau_out, Y,
 
 
 @called
+def switch_inputs(t, i, x, S, U, V, gap, dtau_in, delayed, p, mode, act, w):
+    """Bring the inputs to their values right of stop i, where one jumps or kinks.
+
+    An input that comes `delay` late switches later by that delay: its switch moves S by
+    (f- - f+) ddelay/dtheta.  Inputs switch one after the other, each with the modes it finds.
+    """
+    A = len(act)
+    for j in range(M):
+        w.uc[j] = U[i, j] if i == 0 else U[i - 1, j] + V[i - 1, j] * gap
+        w.held[j], w.slope[j] = U[i, j], V[i, j]
+        if delayed:
+            for a in range(A):
+                w.ud[j, a] = -V[i, j] * dtau_in[j, a]
+    if not delayed or i == 0 or A == 0:
+        begin(t, i == 0, x, S, w.held, w.slope, w.ud, p, mode, act, w)
+        return
+    for j in range(M):
+        w.held[j], w.slope[j] = w.uc[j], V[i - 1, j]
+    for j in range(M):
+        field_value(t, x, w.held, w.slope, p, mode, w, w.start)
+        w.held[j], w.slope[j] = U[i, j], V[i, j]
+        begin(t, False, x, S, w.held, w.slope, w.ud, p, mode, act, w)
+        w.uc[j] = U[i, j]
+        field_value(t, x, w.held, w.slope, p, mode, w, w.f)
+        for a in range(A):
+            for r in range(N):
+                S[a, r] += (w.start[r] - w.f[r]) * dtau_in[j, a]
+
+
+@called
 def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode, w, seen,
         X, Y, J):
     """Integrate over the stops T, recording observations; returns (status, stop reached).
 
-    T (L,) stops; pieces (L-1,) sub-steps of each interval; U, V (L-1, M) inputs at the start of
-    each interval and their slopes; jumps (L-1,) whether an input jumps where the interval starts;
+    T (L,) stops; pieces (L-1,) sub-steps of each interval; U, V (L, M) inputs right of each stop
+    and their slopes; jumps (L,) whether an input jumps or kinks there;
     dtau_* (channels, A) how each delay depends on the estimated parameters.
     Status 0: done; 1: not finite; 2: endless switching.
     """
     n, A = N, len(act)
-    x, S, ud, before, after, held = w.x, w.S, w.ud, w.before, w.after, w.held
+    x, S = w.x, w.S
     for r in range(n):
         x[r] = x0[r]
         for a in range(A):
             S[a, r] = S0[a, r]
     L = len(T)
     for i in range(L):
-        last = i == L - 1
-        k = i - 1 if last else i
-        v = V[k]
-        ta = T[k]
-        for j in range(M):
-            held[j] = U[k, j] + v[j] * (T[i] - ta)
-        if not last:
-            if jumps[i] and i > 0 and A > 0 and delayed:
-                gap = T[i] - T[i - 1]
-                for j in range(M):
-                    held[j] = U[i - 1, j] + V[i - 1, j] * gap
-                for j in range(M):
-                    field_value(T[i], x, held, v, p, mode, w, before)
-                    held[j] = U[i, j]
-                    field_value(T[i], x, held, v, p, mode, w, after)
-                    for a in range(A):
-                        for r in range(n):
-                            S[a, r] += (before[r] - after[r]) * dtau_in[j, a]
-            if delayed:
-                for j in range(M):
-                    for a in range(A):
-                        ud[j, a] = -v[j] * dtau_in[j, a]
-            if jumps[i]:
-                begin(T[i], x, S, held, v, ud, p, mode, act, w)
-        record(i, T[i], x, S, held, v, p, mode, act, w, seen, delayed, dtau_in, dtau_out, Y, J)
+        v, ta = V[i], T[i]
+        if jumps[i]:
+            gap = T[i] - T[i - 1] if i > 0 else 0.0
+            switch_inputs(ta, i, x, S, U, V, gap, dtau_in, delayed, p, mode, act, w)
+        else:
+            for j in range(M):
+                w.held[j] = U[i, j]
+        record(i, ta, x, S, w.held, v, p, mode, act, w, seen, delayed, dtau_in, dtau_out, Y, J)
         if X.shape[0] > 0:
             for r in range(n):
                 X[i, r] = x[r]
-        if last:
+        if i == L - 1:
             break
-        h = (T[i + 1] - T[i]) / pieces[i]
+        h = (T[i + 1] - ta) / pieces[i]
         for piece in range(pieces[i]):
-            status = advance(T[i] + piece * h, h, x, S, ta, U[i], v, ud, p, mode, act, w)
+            status = advance(ta + piece * h, h, x, S, ta, U[i], v, w.ud, p, mode, act, w)
             if status != 0:
                 return status, i
         for r in range(n):

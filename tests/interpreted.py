@@ -1,0 +1,53 @@
+"""Generated models run by Python instead of numba: no compiling, and every index is checked.
+
+The kernels are the same source text; only ``njit`` is replaced by a decorator that does nothing.
+Good for many small models; compiled code is tested with a few shared ones.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pikanid.model import Model
+from pikanid.problem import bind
+from pikanid.recording import Recording
+from pikanid.simulation import compiled as compiler
+from pikanid.simulation import support
+from pikanid.simulation.simulator import Simulator
+from pikanid.simulation.synthetic import with_outputs
+
+
+def _plain(*_: Any, **__: Any) -> Callable[[Any], Any]:
+    return lambda function: function
+
+
+def module(model: Model, method: str = "explicit") -> types.ModuleType:
+    """The model's generated module with plain Python functions."""
+    source = compiler._source(model, method)
+    source = source.replace("from numba import njit\n", "")
+    made = types.ModuleType("interpreted")
+    made.__dict__["njit"] = _plain
+    exec(compile(source, f"<{model.name}>", "exec"), made.__dict__)
+    for name in ("make_work", "solve_small", "positive_power", "power_slope", "log_abs", "sgn",
+                 "spline_basis"):
+        setattr(made, name, getattr(support, name).py_func)
+    integrate = made.integrate
+
+    def quiet(*arguments: Any) -> Any:
+        with np.errstate(all="ignore"):  # numba's error model: division by zero gives infinity
+            return integrate(*arguments)
+
+    made.integrate = quiet
+    return made
+
+
+def simulator(model: Model, recording: Recording, t: np.ndarray | None = None) -> Simulator:
+    """A simulator of `model` under `recording`, outputs at t (N,), run by Python."""
+    made = Simulator(model, bind(model, with_outputs(model, recording, t)))
+    for method in ("explicit", "implicit"):
+        made._kept[method] = module(model, method)
+    return made
