@@ -1,7 +1,7 @@
 """The command line: which commands there are, and what becomes of failures.
 
 Exit codes: 0 done; 2 bad input, with one sentence on standard error; 3 fitted, but the model does
-not explain the recording; 130 interrupted.
+not explain the recording; 130 interrupted; 141 the reader of the output has left.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from pikanid.commands.study import EXAMPLES as STUDY
 from pikanid.commands.study import study
 
 EXIT_INTERRUPTED = 130
+EXIT_PIPE = 141  # 128 + SIGPIPE: what other programs end with when nobody reads on
 EXAMPLES = """Examples:
 
   pikanid simulate --model sloshing --sigma 0.1deg --out run.csv
@@ -80,10 +81,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command = " ".join(["pikanid", *(w for w in words[:1] if w in _commands())])
         # Unlike str(), it names the option.
         return _complain(errors.usage(problem.format_message(), command), 2)
-    except BrokenPipeError:
-        # The reader has left: nothing is wrong, and Python must not flush once more at its end.
+    except (BrokenPipeError, SystemExit):
+        # The reader has left (typer and rich make SystemExit of it); Python must not flush again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return EXIT_PIPE
     except OSError as problem:
         place = str(problem.filename or "the output")
         return _complain(errors.cannot_write(place, problem.strerror or ""), 2)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pikanid.recording import Recording
 
 BUILT_IN = ("two_pulse", "free_decay", "move", "planar_moves")
+DISTANCE = 0.1  # [m] of "move"
 EXAMPLES = """Examples:
 
   pikanid simulate --model sloshing --sigma 0.1deg --out run.csv
@@ -96,12 +97,15 @@ def _excitation(model: Model, name: str, duration: float, rate: float,
     required = [i for i in model.inputs if i.default is None] or list(model.inputs)
     driven = required[:1]
     channel = driven[0].name if driven else "u"
-    settings = {"duration": duration, "dt": 1 / rate}
-    if name in ("two_pulse", "move"):
-        rec = getattr(excitation, name)(channel=channel, **settings)
+    channels, dt = [i.name for i in required] or [channel], 1 / rate
+    if name == "two_pulse":
+        rec = excitation.two_pulse(duration, dt, channel=channel)
+    elif name == "move":
+        rec = excitation.move(DISTANCE, duration, dt, channel=channel)
+    elif name == "free_decay":
+        rec = excitation.free_decay(duration, dt, channels)
     else:
-        channels = [i.name for i in required] or [channel]
-        rec = getattr(excitation, name)(channels=channels, **settings)
+        rec = excitation.planar_moves(duration=duration, dt=dt, channels=channels)
     for item in required:
         if item.name in rec and item.unit:
             rec = rec.with_unit(item.name, item.unit)

@@ -126,9 +126,9 @@ def _pendulum_text(study: Study) -> str:
     return (f"K. Kaheman et al., arXiv 2205.06231; 1 kHz, every {pendulum.STRIDE}th sample used. "
             f"Length, damping and the state at t = 0 are estimated on {train.start:.1f} s to "
             f"{train.stop:.1f} s. RMSE [rad], held-out: the fitted model runs on from t = 0 "
-            f"through {held.start:.1f} s to {held.stop:.1f} s, data that it has not seen and whose start "
-            f"it is not told. Restarted: the state at {held.start:.1f} s is estimated from "
-            f"the {pendulum.FIRST:g} s that follow, with the parameters held, and the model runs "
+            f"through {held.start:.1f} s to {held.stop:.1f} s, data that it has not seen and "
+            f"whose start it is not told. Restarted: the state at {held.start:.1f} s is estimated "
+            f"from the {pendulum.FIRST:g} s that follow, with the parameters held, and the model runs "
             "from there. That both are far above the encoder's step of 0.00016 rad is the point: a "
             "viscous pendulum does not explain this arm.")
 
