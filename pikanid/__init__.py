@@ -11,8 +11,9 @@ True
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING
+
+from pikanid.version import __version__
 
 if TYPE_CHECKING:
     from pikanid import datasets, excitation, systems, uncertainty
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from pikanid.simulation import simulate
     from pikanid.strategies import IPDA, NLS, PDA, PIKAN
 
-__version__ = version("pikanid")
 
 # Name -> the module that defines it; None where the name is itself a module of the package.
 _HOMES: dict[str, str | None] = {

@@ -40,7 +40,7 @@ def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
     >>> import sympy as sp
     >>> u, x, k = sp.symbols("u x k", real=True)
     >>> m = Model("m", (State("x"),), (Input("u"),), (), {"x": u - x}, (Output("x", x),))
-    >>> m.map_input("u", [Parameter("k", 1.0)], gain="k").equations["x"]
+    >>> m.map_input("u", parameters=[Parameter("k", 1.0)], gain="k").equations["x"]
     k*u - x
     """
     model = model.with_parameters(*parameters)

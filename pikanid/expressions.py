@@ -101,9 +101,9 @@ def to_text(expression: sp.Expr) -> str:
     """The formula as text that `parse` reads back to an equal expression.
 
     >>> to_text(parse("abs(x)*max(x, 0.1)", {"x"}, "test"))
-    'max(0.1, x)*abs(x)'
+    'abs(x)*max(0.1, x)'
     """
-    return str(_Printer({"order": "none"}).doprint(expression))
+    return str(_Printer().doprint(expression))
 
 
 def to_real(expression: sp.Expr | float | str) -> sp.Expr:
@@ -260,8 +260,10 @@ class _Printer(StrPrinter):
         return f"step({self._print(expr.args[0])})"
 
     def _nested(self, name: str, args: tuple[sp.Expr, ...]) -> str:
-        text = self._print(args[0])
-        for arg in args[1:]:
+        # SymPy keeps these in a set: sorted, the text is the same in every process
+        first, *others = sorted(args, key=sp.default_sort_key)
+        text = self._print(first)
+        for arg in others:
             text = f"{name}({text}, {self._print(arg)})"
         return str(text)
 

@@ -209,17 +209,17 @@ class Model(Lookup):
         return self.replace(parameters=tuple(
             dataclasses.replace(p, **changes.get(p.name, {})) for p in self.parameters))
 
-    def map_input(self, name: str, **maps: Any) -> Model:
+    def map_input(self, name: str, parameters: Sequence[Parameter] = (), **maps: Any) -> Model:
         """Pass an input through gain, saturation, lag, delay ...: see `pikanid.channel_maps`."""
         from pikanid.channel_maps import map_input
 
-        return map_input(self, name, **maps)
+        return map_input(self, name, parameters, **maps)
 
-    def map_output(self, name: str, **maps: Any) -> Model:
+    def map_output(self, name: str, parameters: Sequence[Parameter] = (), **maps: Any) -> Model:
         """Pass an output through gain, drift, clipping, lag ...: see `pikanid.channel_maps`."""
         from pikanid.channel_maps import map_output
 
-        return map_output(self, name, **maps)
+        return map_output(self, name, parameters, **maps)
 
     def with_half_derivative(self, of: Formula, name: str, band: tuple[float, float],
                              order: int = 10) -> tuple[Model, sp.Expr]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 def find(items: Iterable[Any], name: str, what: str) -> Any:
+    """The item of that name; a `BadModel` that lists the names if there is none."""
     names = []
     for item in items:
         if item.name == name:
@@ -28,6 +29,7 @@ def find(items: Iterable[Any], name: str, what: str) -> Any:
 
 
 def validate(model: Model) -> None:
+    """Raise `BadModel` unless names, symbols, values and bounds of the model are consistent."""
     if not model.states:
         raise errors.BadModel(errors.no_states())
     if not model.outputs:

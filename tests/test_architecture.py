@@ -19,10 +19,11 @@ PACKAGE = ROOT / "pikanid"
 # Rows from the ground up: a module may import from its own row and from the rows before it.
 # A name also covers what continues it with an underscore: "model" covers model_parts.
 ROWS = (
-    ("errors",),
+    ("errors", "version"),
     ("units", "expressions", "expression_functions"),
     ("approximators",),
-    ("model", "half_derivative", "recording", "channel", "excitation"),
+    ("model", "channel", "resampling", "kinematics", "reading", "writing", "recording",
+     "half_derivative", "excitation"),
     ("noise",),
     ("systems", "datasets", "tracking"),
     ("evaluated",),
@@ -31,12 +32,13 @@ ROWS = (
     ("adequacy", "plots"),
     ("estimate",),
     ("symbolic",),
-    ("functional", "shooting", "chains", "initial_state"),
+    ("functional", "functional_rows", "shooting", "chains", "initial_state"),
     ("optimise", "information"),
     ("profile_likelihood",),
     ("uncertainty",),
     ("equivalence",),
     ("strategies",),
+    ("discrepancy",),
     ("study",),
     ("mismatch",),
     ("concealed",),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid.problem import Experiment
-from pikanid.simulation.support import Seen
+from pikanid.simulation.layout import Seen
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ import sympy as sp
 
 from pikanid.expressions import TIME, symbol
 from pikanid.model import Model
+from pikanid.simulation.layout import STEEP
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
 from pikanid.simulation.structure import Structure
-from pikanid.simulation.support import STEEP
 
 
 class VectorField:

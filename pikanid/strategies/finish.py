@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-import pikanid
 from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
 from pikanid.information import covariance, identifiability_warnings
 from pikanid.problem import Problem
 from pikanid.shooting import Shooting
+from pikanid.version import __version__
 
 
 def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarray, *,
@@ -49,7 +49,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         covariance=cov, fits=fits, trajectories=trajectories, cost=total_cost(fits),
         adequacy=adequacy, converged=converged, settings=settings, history=tuple(history),
         warnings=tuple(notes), seconds=time.perf_counter() - begun, seed=seed,
-        version=pikanid.__version__, approximator=approximator)
+        version=__version__, approximator=approximator)
 
 
 def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray

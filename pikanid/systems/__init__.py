@@ -38,7 +38,7 @@ def find(name: str) -> Model:
     pikanid.errors.BadModel : neither a known name nor a readable model file
 
     >>> find("pendulum").free_names
-    ('l', 'd')
+    ('l', 'd', 'theta_0', 'theta_dot_0')
     """
     if name in SYSTEMS:
         return SYSTEMS[name]()
