@@ -12,16 +12,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import sympy as sp
-from sympy.printing.pycode import PythonCodePrinter
 
 from pikanid.expressions import TIME, symbol
 from pikanid.model import Model
-from pikanid.simulation.lowering import (
-    LoweredModel,
-    lower_model,
-    spline_value,
-    switch_symbol,
-)
+from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
+from pikanid.simulation.printing import printed
 
 HEADER = '''"""Generated from a model; not meant to be edited."""
 import math
@@ -47,34 +42,6 @@ def inlined(function):
 HOT = ("variational", "observe", "observe_sensitivity")
 
 
-class _Printer(PythonCodePrinter):
-    """Prints local names; a model's own symbols get a prefix, so that none hides an array."""
-
-    def _print_Symbol(self, expr: sp.Symbol) -> str:
-        return expr.name if expr == TIME or expr.name.startswith("_") else f"q_{expr.name}"
-
-    def _print_positive_power(self, expr: sp.Expr) -> str:
-        return f"positive_power({self._print(expr.args[0])}, {self._print(expr.args[1])})"
-
-    def _print_power_slope(self, expr: sp.Expr) -> str:
-        return f"power_slope({self._print(expr.args[0])}, {self._print(expr.args[1])})"
-
-    def _print_log_abs(self, expr: sp.Expr) -> str:
-        return f"log_abs({self._print(expr.args[0])})"
-
-    def _print_Float(self, expr: sp.Float) -> str:
-        return repr(float(expr))
-
-    def _print_Rational(self, expr: sp.Rational) -> str:
-        return repr(float(expr))
-
-    def _print_Integer(self, expr: sp.Integer) -> str:
-        return f"{int(expr)}.0" if abs(int(expr)) > 2**31 else str(int(expr))
-
-
-_print = _Printer({"fully_qualified_modules": True}).doprint
-
-
 class Writer:
     """Writes the bodies of a model's functions; knows its symbols and splines."""
 
@@ -93,9 +60,9 @@ class Writer:
         used = set().union(*(e.free_symbols for e in exprs)) if exprs else set()
         lines = []
         for array, symbols in (("x", self.x), ("u", self.u), ("p", self.p), ("v", self.v)):
-            lines += [f"{_print(q)} = {array}[{i}]" for i, q in enumerate(symbols) if q in used]
+            lines += [f"{printed(q)} = {array}[{i}]" for i, q in enumerate(symbols) if q in used]
         dynamic = self.s[: self.lowered.n_dynamic]
-        return lines + [f"{_print(q)} = s[{i}]" for i, q in enumerate(dynamic) if q in used]
+        return lines + [f"{printed(q)} = s[{i}]" for i, q in enumerate(dynamic) if q in used]
 
     def block(self, targets: Sequence[tuple[str, sp.Expr]], splines: Splines) -> list[str]:
         """Assignments `target = expression`, common subexpressions taken out first."""
@@ -103,8 +70,8 @@ class Writer:
             return []
         exprs = [splines.swap(e) for _, e in targets]
         shared, reduced = sp.cse(exprs, symbols=sp.numbered_symbols("_c"), order="none")
-        lines = [f"{_print(name)} = {_print(value)}" for name, value in shared]
-        return lines + [f"{t} = {_print(e)}"
+        lines = [f"{printed(name)} = {printed(value)}" for name, value in shared]
+        return lines + [f"{t} = {printed(e)}"
                         for (t, _), e in zip(targets, reduced, strict=True)]
 
     def values(self, name: str, arguments: str, out: str, exprs: Sequence[sp.Expr],
@@ -184,7 +151,7 @@ class Writer:
             if q in pending:
                 g = pending.pop(q)
                 lines += self._switches_for([g], pending, splines)
-                lines.append(f"{_print(q)} = sgn({_print(splines.swap(g))})")
+                lines.append(f"{printed(q)} = sgn({printed(splines.swap(g))})")
         return lines
 
 
@@ -214,7 +181,7 @@ class Splines:
         i, z = self.keys[n]
         spline = self.writer.model.splines[i]
         d, first = spline.degree, self._offset(i)
-        out = [f"_z{n} = {_print(self.swap(z))}"]
+        out = [f"_z{n} = {printed(self.swap(z))}"]
         for o in self.orders[(i, z)]:
             out += [f"_b{n}_{o} = b[{n * 3 + o}, :{d + 1}]",
                     f"_k{n} = {first} + spline_basis(KNOTS_{i}, {d}, _z{n}, {o}, _b{n}_{o})",

@@ -90,7 +90,7 @@ def _generator_version() -> str:
     import numba
 
     files = [*sorted((_HERE / "kernels").glob("*.py")),
-             *(_HERE / f"{n}.py" for n in ("codegen", "lowering", "support"))]
+             *(_HERE / f"{n}.py" for n in ("codegen", "printing", "lowering", "support", "layout"))]
     digest = hashlib.sha256("".join(f.read_text() for f in files).encode()).hexdigest()
     return f"{digest} {numba.__version__} {platform.python_version()} {platform.machine()}"
 
