@@ -40,6 +40,6 @@ def printed(expr: sp.Expr) -> str:
     """The source of a formula.
 
     >>> printed(sp.sin(sp.Symbol("x")) / 3)
-    '0.3333333333333333*math.sin(q_x)'
+    '(0.3333333333333333)*math.sin(q_x)'
     """
     return str(_PRINTER.doprint(expr))
