@@ -14,6 +14,8 @@ from typing import Annotated, Any, TextIO
 import typer
 
 from pikanid import errors
+from pikanid.commands.equivalence import EXAMPLES as EQUIVALENCE
+from pikanid.commands.equivalence import equivalence
 from pikanid.commands.identify import EXAMPLES as IDENTIFY
 from pikanid.commands.identify import identify
 from pikanid.commands.models import EXAMPLES as MODELS
@@ -45,6 +47,7 @@ app.command(epilog=IDENTIFY)(identify)
 app.command(epilog=SIMULATE)(simulate)
 app.command(epilog=MODELS)(models)
 app.command(epilog=STUDY)(study)
+app.command(epilog=EQUIVALENCE)(equivalence)
 
 
 @app.callback(invoke_without_command=True, epilog=EXAMPLES)
