@@ -28,9 +28,9 @@ def main(folder: str) -> None:
         "Written by `benchmarks/report_equivalence.py`. Two derivations that share no formula: the "
         "loss of a pykan KAN with w_b = 0 by its own forward pass and torch's autograd, and "
         "Eq. (5) from SciPy's design matrices with derivatives by hand, both in float64. T is the "
-        "horizon [s], N data, M collocation points (both ends included; \"random\" grids are uniformly "
-        f"drawn), k the degree, G the grid. Every setting has random coefficients, parameters "
-        f"and noise of its own, from seed {SEED}. {provenance()}. The checks took "
+        "horizon [s], N data, M collocation points (both ends included; \"random\" grids are "
+        "uniformly drawn), k the degree, G the grid. Every setting has random coefficients, "
+        f"parameters and noise of its own, from seed {SEED}. {provenance()}. The checks took "
         f"{time.perf_counter() - begun:.0f} s.\n")
     atomically(page, (page.read_text() + settings).encode())
 
