@@ -129,8 +129,8 @@ def _pendulum_text(study: Study) -> str:
             f"through {held.start:.1f} s to {held.stop:.1f} s, data that it has not seen and "
             f"whose start it is not told. Restarted: the state at {held.start:.1f} s is estimated "
             f"from the {pendulum.FIRST:g} s that follow, with the parameters held, and the model "
-            "runs from there. That both are far above the encoder's step of 0.00016 rad is the point: a "
-            "viscous pendulum does not explain this arm.")
+            "runs from there. That both are far above the encoder's step of 0.00016 rad is the "
+            "point: a viscous pendulum does not explain this arm.")
 
 
 def _settings(study: Study) -> str:
