@@ -16,9 +16,10 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from pikanid import errors
-from pikanid.approximators import Array
+from pikanid.approximators import Array, LinearApproximator
 from pikanid.chains import Form, find_chains
 from pikanid.estimate import Estimate
+from pikanid.expressions import symbol
 from pikanid.functional import Functional
 from pikanid.model import Model
 from pikanid.optimise.covariance import invert
@@ -146,14 +147,18 @@ def regress(functional: Functional, point: Point) -> tuple[Point, bool]:
     """
     problem = functional.problem
     theta, damping = np.clip(point.theta, problem.lower, problem.upper), 0.0
+    lower, upper = problem.lower.copy(), problem.upper.copy()
+    for k, value in _first_states(functional, point).items():
+        theta[k] = lower[k] = upper[k] = value
     cost, gram, slope = _physics_normal(functional, replace(point, theta=theta))
-    idle = [f.label for f, g in zip(problem.free, np.diag(gram), strict=True) if g <= 0.0]
+    idle = [f.label for f, g, fixed in zip(
+        problem.free, np.diag(gram), lower >= upper, strict=True) if g <= 0.0 and not fixed]
     if idle:
         raise errors.BadSetting(errors.relaxation_cannot_see(
             idle, "it does not act on the derivatives of the states"))
     for _ in range(REGRESSION_STEPS):
         damped = gram + (damping + 1e-14) * np.diag(np.diag(gram))
-        step = box_minimum(damped, slope, problem.lower - theta, problem.upper - theta)
+        step = box_minimum(damped, slope, lower - theta, upper - theta)
         trial = _physics_normal(functional, replace(point, theta=theta + step))
         if not trial[0] <= cost:
             damping = max(1e-3, 10.0 * damping)
@@ -165,6 +170,21 @@ def regress(functional: Functional, point: Point) -> tuple[Point, bool]:
         if gain <= 1e-12 * cost:
             return replace(point, theta=theta), True
     return replace(point, theta=theta), damping > 1e9
+
+
+def _first_states(functional: Functional, point: Point) -> dict[int, float]:
+    """Initial states that are parameters of their own, read off the smooth curve at t0."""
+    problem, found = functional.problem, {}
+    chains = functional.chains
+    for r, (e, part) in enumerate(zip(problem.experiments, functional.parts, strict=True)):
+        for state, i, q in zip(problem.model.states, chains.root, chains.order, strict=True):
+            for k, f in enumerate(problem.free):
+                if state.initial == symbol(f.name) and f.recording in (None, r):
+                    own = point.coefficients[r][part.physics.tops[i].part]
+                    spline = part.approximators[i]
+                    assert isinstance(spline, LinearApproximator)
+                    found[k] = float((spline.basis(np.array([e.t0]), q) @ own)[0])
+    return found
 
 
 def _physics_normal(functional: Functional, point: Point) -> tuple[float, Array, Array]:
@@ -189,6 +209,7 @@ def _covariance(functional: Functional, system: BandedSystem, point: Point, rho:
     _, gram, _ = _physics_normal(functional, point)
     stuck = np.isclose(point.theta, problem.lower, rtol=1e-6, atol=0.0) | np.isclose(
         point.theta, problem.upper, rtol=1e-6, atol=0.0)
+    stuck[list(_first_states(functional, point))] = True  # these are not regressed
     bread = invert(gram, ~stuck)
     coupled = BandedSystem(functional).linearise(point, 1.0)
     alone = BandedSystem(functional).linearise(point, 0.0)
