@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -12,7 +14,21 @@ from pikanid.simulation.layout import STEEP, Seen, Work
 __all__ = ["STEEP", "Seen", "Work"]  # generated models find everything they need in this module
 
 
-@njit(cache=True)
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def kernel(function: _Function) -> _Function:
+    """Compile a function that allocates nothing, without numba's reference counting."""
+    options: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+    return cast(_Function, njit(**options)(function))
+
+
+def allocating(function: _Function) -> _Function:
+    """Compile a function that makes arrays."""
+    return cast(_Function, njit(cache=True)(function))
+
+
+@allocating
 def make_work(n: int, m: int, P: int, q: int, k: int, A: int, stages: int,
               rows: int, width: int) -> Work:
     """Scratch for n states, m inputs, P parameters, q outputs, k switches, A sensitivities."""
@@ -33,7 +49,7 @@ def make_work(n: int, m: int, P: int, q: int, k: int, A: int, stages: int,
         np.empty((rows, width)))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def solve_small(matrix: np.ndarray, right: np.ndarray) -> None:
     """Solve in place by Gauss-Jordan elimination; a row without a pivot gives zero."""
     n, columns = right.shape
@@ -60,7 +76,7 @@ def solve_small(matrix: np.ndarray, right: np.ndarray) -> None:
             right[i, j] = right[i, j] / matrix[i, i] if matrix[i, i] != 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def positive_power(base: float, n: float) -> float:
     """baseⁿ for base > 0; at base <= 0 zero (one for n = 0), so that no infinity arises there."""
     if base <= 0.0:
@@ -68,7 +84,7 @@ def positive_power(base: float, n: float) -> float:
     return base**n
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def power_slope(base: float, n: float) -> float:
     """n·baseⁿ⁻¹ for base > 0, else zero; zero as well below 1e-6 where n < 1 (see `lowering`)."""
     if base <= 0.0 or (n < 1.0 and base < STEEP):
@@ -76,19 +92,19 @@ def power_slope(base: float, n: float) -> float:
     return n * base ** (n - 1.0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def log_abs(x: float) -> float:
     """ln|x|, and 0 at x = 0, where it only multiplies |x|ⁿ = 0."""
     return 0.0 if x == 0.0 else math.log(abs(x))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def sgn(x: float) -> float:
     """The sign of x as a float."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@kernel
 def spline_basis(knots: np.ndarray, degree: int, z: float, order: int, out: np.ndarray) -> int:
     """Values at z of the `order`-th derivatives of the degree+1 B-splines that live there.
 
