@@ -11,6 +11,7 @@ from pikanid.problem import Problem, Samples
 from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
 
 Accuracy = Literal["coarse", "fine"]
+HURRY = 16.0  # how many times shorter steps another start may take
 
 
 class Shooting:
@@ -27,6 +28,7 @@ class Shooting:
         self.simulators = [Simulator(problem.model, e) for e in problem.experiments]
         self.columns = [problem.columns(r) for r in range(len(self.simulators))]
         self.steps: list[Steps] = []
+        self.limits: list[Steps] = []
         self.data = [s.y for e in problem.experiments for s in e.samples]
         self.known = [s.sigma for e in problem.experiments for s in e.samples]
         several = len(problem.model.outputs) > 1
@@ -55,10 +57,20 @@ class Shooting:
                 stated = all(s.sigma is not None for s in samples)
                 tolerance = min(tolerance * (10 if stated else 1e5), 1e-3 * signal)
             known = old[r] if old and accuracy == "fine" else None
-            self.steps.append(simulator.choose_steps(p, tolerance, self.method, known))
+            method, finest = self.method, 0.0
+            if self.limits:
+                method, finest = self.limits[r].method, self.limits[r].longest / HURRY
+            self.steps.append(simulator.choose_steps(p, tolerance, method, known, finest))
         self._at = None
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
+
+    def hurry(self) -> None:
+        """From now on refuse steps much shorter than the present ones, and other methods.
+
+        A far-off starting point can ask for steps a thousand times shorter than the optimum does.
+        """
+        self.limits = list(self.steps)
 
     def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
         """Simulate every recording at θ with sensitivities of its own parameters."""
@@ -103,9 +115,8 @@ class Shooting:
         return judge(np.split(r, ends), self.known, self.data, len(theta))
 
     def explains(self, theta: np.ndarray) -> bool:
-        """Whether σ is known and the fit at θ is within it, so that no other start is needed."""
-        verdict = self.adequacy(theta)
-        return verdict.source == "given" and verdict.verdict == "fits"
+        """Whether the fit at θ is within the noise, so that no other start is needed."""
+        return self.adequacy(theta).verdict == "fits"
 
 
 def _spread(samples: Samples, several: bool) -> np.ndarray:

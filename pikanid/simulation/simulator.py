@@ -141,7 +141,8 @@ class Simulator:
         return self._kept["pieces"]
 
     def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
-                     method: MethodChoice = "auto", known: Steps | None = None) -> Steps:
+                     method: MethodChoice = "auto", known: Steps | None = None,
+                     finest: float = 0.0) -> Steps:
         """The longest sub-step whose error, by step doubling, is below `tolerance`.
 
         Runs with steps h and h/2 and takes |y_h - y_{h/2}|·16/15 as the error of h (order 4:
@@ -152,6 +153,7 @@ class Simulator:
         ----------
         tolerance : of the outputs, in their own units; default 1e-8 of the largest output
         known : coarser steps in use: shorter ones follow from the method's order, checked at p
+        finest : give up below this step [s]; at least 1/4096 of the median interval is tried
 
         Raises
         ------
@@ -169,7 +171,7 @@ class Simulator:
         for candidate in candidates:
             longest = float(np.max(np.diff(grid.T)))
             rough = self._outputs(p, Steps(candidate, longest))
-            while longest > spacing / FINEST:
+            while longest > max(spacing / FINEST, finest):
                 fine = self._outputs(p, Steps(candidate, longest / 2))
                 if rough.finished and fine.finished:
                     scale = tolerance or 1e-8 * max(float(np.abs(fine.y).max(initial=0.0)), 1e-12)

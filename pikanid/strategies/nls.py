@@ -33,7 +33,7 @@ class NLS:
     Parameters
     ----------
     starts : number of starting points; "auto" begins at the guess and adds a space-filling design
-        of eight only if that fit does not explain the recording or σ is unknown
+        of eight only if that fit does not explain the recording
     protocol : "default", or "paper": best of five starts drawn within ±20 % of the guess (Table II)
     tolerance : relative change of parameters and cost at which the optimiser stops
     max_evaluations : simulations allowed a start
@@ -79,10 +79,14 @@ class NLS:
                 continue
             history.append({"start": float(k), "cost": found.cost,
                             "evaluations": float(found.evaluations)})
+            if best is None:
+                shooting.hurry()
             if best is None or found.cost < best.cost * (1 - 1e-9):
                 best = found
         if best is None:
             raise errors.SimulationFailed(errors.bad_start())
+        if len(history) > 1:
+            shooting.choose_steps(best.theta, "fine")
         settings = {"starts": self.starts, "protocol": self.protocol, "tolerance": self.tolerance,
                     "method": shooting.steps[0].method, "segments": self.segments,
                     "tried": len(history)}
