@@ -504,6 +504,24 @@ def kan_not_shallow(width: object) -> str:
     return f"A KAN of width {width} is not shallow: this needs one input and one layer of edges."
 
 
+def kan_not_a_curve(width: object) -> str:
+    return (
+        f"A KAN of width {width} is no curve over time: it needs one input and one output, and at "
+        "least one node in every hidden layer, as in (1, 5, 1)."
+    )
+
+
+def kan_order(order: int, highest: int) -> str:
+    return (
+        f"A deep KAN carries time derivatives up to order {highest}, not {order}: give every state "
+        'its own network with form="state", or use a shallow one, width=(1, 1).'
+    )
+
+
+def kan_device(device: str, detail: str) -> str:
+    return f"device = '{device}' cannot hold a KAN ({detail}): use device='cpu'."
+
+
 def kan_symbolic(layer: int) -> str:
     return (
         f"Layer {layer} of the KAN has symbolic edges: only spline edges have coefficients to "
@@ -635,6 +653,56 @@ def not_converged(lam: float) -> str:
     )
 
 
+# --- gradient descent (PINN) ---------------------------------------------------------------------
+
+
+def torch_not_installed(module: str) -> str:
+    return f"A PINN needs '{module}', which is not installed: pip install 'pikanid[kan]'."
+
+
+def no_such_device(device: str) -> str:
+    return f"There is no device '{device}' here: choose device='cpu'."
+
+
+def descent_diverged(steps: int) -> str:
+    return (
+        f"The loss left the finite numbers after {steps} steps: the best iterate until then is "
+        "kept. Lower the learning rate, or tighten the bounds."
+    )
+
+
+def newton_stopped(iterations: int, move: float) -> str:
+    return (
+        f"The fit still moved a parameter by {move:.2g} standard errors when its {iterations} "
+        "iterations were used up: allow more, or another seed."
+    )
+
+
+def network_smears_switches(count: int, most: int) -> str:
+    return (
+        f"The inputs switch {count} times, more than the {most} kinks that a network is given: it "
+        "smears them, which biases the parameters. Compare with the strategy NLS."
+    )
+
+
+def covariance_unknown() -> str:
+    return (
+        "The network can follow the data whatever the parameters are, so that standard errors are "
+        "not known: use fewer units, or more data."
+    )
+
+
+def curve_misleads(name: str, value: float, reference: float, std: float, residual: float,
+                   unit: str) -> str:
+    apart = abs(value - reference) / std if std > 0 else float("inf")
+    return (
+        f"The loss is low (the curve is within {residual:.2g} of the data) but '{name}' is not "
+        f"where the data want it: {value:.5g} {unit}".rstrip()
+        + f" here, {reference:.5g} ± {std:.1g} by simulation from here (NLS), {apart:.2g} standard "
+        "errors apart. The curve has absorbed the difference: trust NLS."
+    )
+
+
 # --- binding a model to recordings ---------------------------------------------------------------
 
 
@@ -646,6 +714,23 @@ def too_few_samples(samples: int, parameters: int) -> str:
     return (
         f"There are {samples} usable samples for {parameters} free parameters: record more, or fix "
         "parameters."
+    )
+
+
+# --- discrepancy ---------------------------------------------------------------------------------
+
+
+def edge_argument_still(argument: str, value: float) -> str:
+    return (
+        f"The argument '{argument}' of the discrepancy stays at {value:.4g} in every recording: "
+        "leave it out, or add a recording that moves it."
+    )
+
+
+def discrepancy_not_simulated() -> str:
+    return (
+        "The model with its discrepancy cannot be simulated along the whole recording: use fewer "
+        "arguments, or a nominal model that follows the recording more closely."
     )
 
 
@@ -760,3 +845,52 @@ def lbfgs_stopped(steps: int, gradient: float) -> str:
         f"L-BFGS stopped after {steps} steps with a gradient of norm {gradient:.2g}: it is not at "
         "a minimum, and the estimate depends on where it stopped."
     )
+
+# --- concealed effects ---------------------------------------------------------------------------
+
+
+def conceal_diverged() -> str:
+    return "The reference rig leaves the finite numbers: the effect is too strong for this drive."
+
+
+def conceal_cases(given: int, limit: int) -> str:
+    return f"--cases is {given}; give 1 to {limit}."
+
+
+def conceal_excitation(given: str, known: Iterable[str]) -> str:
+    return f"'{_short(given)}' is no excitation of concealed recordings (known: {_listed(known)})."
+
+
+def conceal_mix(text: str, known: Iterable[str]) -> str:
+    return (
+        f"--mix '{_short(text, 200)}' cannot be read: write shares that are not all zero, such as "
+        f"'single=0.6,nothing=0.4' (classes: {_listed(known)})."
+    )
+
+
+def conceal_sigma(sigma: float) -> str:
+    return f"--sigma is {sigma:g} rad; noise on an angle must lie between 1e-6 and 0.2 rad."
+
+
+def conceal_truth_inside(truth: str, folder: str) -> str:
+    return (
+        f"The truth '{_short(truth, 200)}' would lie inside '{_short(folder, 200)}', which is to "
+        "be given away: choose a place outside."
+    )
+
+
+def conceal_taken(place: str) -> str:
+    return (
+        f"'{_short(place, 200)}' already holds something else: choose another name, or remove it."
+    )
+
+
+def conceal_other_settings(place: str) -> str:
+    return (
+        f"'{_short(place, 200)}' belongs to an unfinished set made with other settings: repeat "
+        "those to finish it, or remove it."
+    )
+
+
+def truth_unreadable(path: str, detail: str) -> str:
+    return f"The truth file '{_short(path, 200)}' cannot be read: {detail}."
