@@ -16,7 +16,7 @@ from pikanid.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.kan_paper import COLLOCATION, STAGES
-from pikanid.strategies.relaxation import Setup
+from pikanid.strategies.relaxation import Setup, first_point
 from pikanid.study import slosh
 
 LOOK = (0, 10, 20, 50, 100, 200, 500, 1000, 2000)  # steps of a stage after which to look
@@ -27,6 +27,7 @@ READINGS = {
     "λ = 1 at the end alone": tuple(
         (cells, lam if lam == STAGES[-1][1] else 0.0, steps) for cells, lam, steps in STAGES),
 }
+LENGTHS = (0.03, 0.04, 0.045, 0.05, 0.06, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 100.0, 1e3, 1e4)
 OPTIONS = {"ftol": 1e-15, "gtol": 1e-10, "maxcor": 20}  # those of `protocol="paper"`
 WIDE = {"l_theta": (1e-3, 1e4), "d_theta": (0.0, 1e4)}  # bounds that do not stop the minimiser
 
@@ -77,6 +78,23 @@ def descent(stages: Sequence[tuple[int, float, int]], seed: int) -> tuple[list[S
     at = found.at.point
     return stops, _stop(free, np.concatenate([*at.coefficients, at.theta]), cells, lam,
                         found.iterations)
+
+
+def profile(lengths: Sequence[float] = LENGTHS) -> list[Stop]:
+    """The least loss of the last stage for given l, over coefficients and d (Gauss-Newton)."""
+    setup, (cells, lam, _) = _setup(wide=True), STAGES[-1]
+    functional = setup.functional(KanGrid(
+        cells, 3, exact_switches=False, quadrature="sum", count=COLLOCATION))
+    system, (point, _) = BandedSystem(functional), first_point(functional)
+    found = []
+    for length in lengths:
+        low, high = (np.array([length, end]) for end in WIDE["d_theta"])
+        start = Point(point.coefficients, np.array([length, slosh.TRUE["d_theta"]]))
+        outcome = gauss_newton(system, start, lam, low, high, iterations=500)
+        at = outcome.at.point
+        found.append(_stop(functional, np.concatenate([*at.coefficients, at.theta]), cells, lam,
+                           outcome.iterations))
+    return found
 
 
 def _setup(*, wide: bool) -> Setup:

@@ -10,6 +10,7 @@ from bias_descent import Stop
 from bias_grid import GRIDS, SHOWN_GRID, Series, physics_residual, switches
 
 from pikanid.plots import COLOURS, MEASURED, new_figure, tidy
+from pikanid.strategies.ipda import PAPER_LAMBDA
 from pikanid.strategies.kan_paper import STAGES
 from pikanid.study import slosh
 from pikanid.uncertainty import cramer_rao
@@ -19,20 +20,22 @@ if TYPE_CHECKING:
 
 STYLES = {"ipda": (COLOURS[0], "s"), "uniform": (COLOURS[1], "o"), "exact": (COLOURS[2], "^"),
           "released": (COLOURS[3], "D")}
+GUIDES = {"l_theta": 12.0, "d_theta": 400.0}  # error [%] at G = 80 of the line ∝ h
 SYMBOLS = {"l_theta": "length l", "d_theta": "damping d"}
 
 
-def figures(found: list[Series], paths: Mapping[str, tuple[list[Stop], Stop]]
-            ) -> dict[str, Figure]:
+def figures(found: list[Series], paths: Mapping[str, tuple[list[Stop], Stop]],
+            along: list[Stop]) -> dict[str, Figure]:
     """Name of the file, without its beginning and ending -> figure."""
-    return {"grid": against_grid(found), "residual": residual(), "descent": descent(paths)}
+    return {"grid": against_grid(found), "residual": residual(), "descent": descent(paths, along)}
 
 
 def against_grid(found: list[Series]) -> Figure:
     """Relative error against G, clean data."""
     figure = new_figure(11.0, 4.8)
     bound = cramer_rao(slosh.model(), slosh.recording(slosh.SCENARIOS[1], 0))
-    shown = [s for s in found if "1e-" not in s.name or "0.0001" in s.name]
+    paper = f"λ = {PAPER_LAMBDA:g}"
+    shown = [s for s in found if s.kind != "ipda" or s.name.endswith((paper, "Gauss points"))]
     size = np.array(GRIDS)
     for k, (axes, (name, true)) in enumerate(
             zip(figure.subplots(1, 2), slosh.TRUE.items(), strict=True)):
@@ -40,20 +43,20 @@ def against_grid(found: list[Series]) -> Figure:
             colour, marker = STYLES[s.kind]
             second = any(other.kind == s.kind for other in shown[:n])
             good = ~s.locked & np.isfinite(s.error[:, k])
-            axes.plot(size[good], np.maximum(100 * np.abs(s.error[good, k]), 1e-6), color=colour,
+            axes.plot(size[good], 100 * np.abs(s.error[good, k]), color=colour,
                       marker=marker, markersize=4, linewidth=1.3, label=s.name,
                       linestyle="--" if second else "-",
                       markerfacecolor="white" if second else colour)
-        guide = np.array([80.0, 640.0])
-        axes.plot(guide, 12.0 * 80 / guide, color="black", linewidth=0.8)
-        axes.text(230, 12.0 * 80 / 200, "∝ h", fontsize="small")
+        guide, height = np.array([80.0, 640.0]), GUIDES[name]
+        axes.plot(guide, height * 80 / guide, color="black", linewidth=0.8)
+        axes.text(250, height * 80 / 160, "∝ h", fontsize="small")
         limit = 100 * bound.std(name) / true
         axes.axhline(limit, color=MEASURED, linewidth=0.8, linestyle=":")
-        axes.text(size[0], limit * 1.15, "Cramér-Rao bound at σ = 0.1°", fontsize="x-small",
+        axes.text(9.5, limit * 1.4, "Cramér-Rao, σ = 0.1°", fontsize="x-small",
                   color=MEASURED)
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_ylim(1e-6, 2e3)
+        axes.set_ylim(1e-9, 5e3)
         axes.set_xticks(size, [str(g) for g in size])
         axes.minorticks_off()
         axes.set_xlabel("grid cells G")
@@ -88,34 +91,48 @@ def residual() -> Figure:
     return figure
 
 
-def descent(paths: Mapping[str, tuple[list[Stop], Stop]]) -> Figure:
-    """l, d and the gradient along L-BFGS."""
-    figure = new_figure(11.0, 4.2)
-    panels = figure.subplots(1, 3)
+def descent(paths: Mapping[str, tuple[list[Stop], Stop]], along: list[Stop]) -> Figure:
+    """l, d and the gradient along L-BFGS, and the least loss for given l."""
+    figure = new_figure(11.0, 6.6)
+    panels = figure.subplots(2, 2).ravel()
     reads = (lambda s: s.theta[0], lambda s: s.theta[1], lambda s: s.gradient)
     labels = ("l [m]", "d [N s/m]", "gradient norm")
-    for axes, read, label in zip(panels, reads, labels, strict=True):
+    for axes, read, label in zip(panels, reads, labels, strict=False):
         for n, (name, (stops, _)) in enumerate(paths.items()):
-            steps, before = [], 0
-            for k, stop in enumerate(stops):
-                if k and stop.steps == 0:
-                    before = steps[-1]
-                steps.append(before + stop.steps)
+            steps = _counted(stops)
             axes.plot(steps, [read(s) for s in stops], "o-", color=COLOURS[n], markersize=3.5,
                       linewidth=1.2, label=name)
-            end = before + STAGES[-1][2]
-            here = [read(s) for s in stops if s.lam == STAGES[-1][1]
-                    and s.steps == STAGES[-1][2]]
-            axes.plot([end] * len(here), here, "s", color=COLOURS[n], markersize=9,
+            ends = [(k, read(s)) for k, s in zip(steps, stops, strict=True)
+                    if (s.lam, s.steps) == STAGES[-1][1:]]
+            axes.plot(*zip(*ends, strict=True), "s", color=COLOURS[n], markersize=9,
                       markerfacecolor="none",
-                      label=f"its stop after {STAGES[-1][2]} steps at λ = {STAGES[-1][1]:g}")
-        axes.set_yscale("log")
+                      label=f"stop of the protocol, {STAGES[-1][2]} steps at λ = 1" if n else None)
         axes.set_xlabel("L-BFGS steps with physics")
         axes.set_ylabel(label)
+        axes.margins(y=0.1)
+    panels[3].plot([s.theta[0] for s in along], [s.cost for s in along], "o-", color=COLOURS[2],
+                   markersize=3.5, linewidth=1.2, label="least loss for given l (λ = 1, G = 40)")
+    panels[3].set_xscale("log")
+    panels[3].set_xlabel("l [m]")
+    panels[3].set_ylabel("loss")
+    for axes in panels:
+        axes.set_yscale("log")
         tidy(axes)
     for axes, true in zip(panels, slosh.TRUE.values(), strict=False):
         axes.axhline(true, color="black", linewidth=0.8, linestyle="--", label="truth")
-    handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=3, fontsize="small",
-                  frameon=False)
+    panels[3].axvline(slosh.TRUE["l_theta"], color="black", linewidth=0.8, linestyle="--")
+    handles, texts = panels[0].get_legend_handles_labels()
+    more, names = panels[3].get_legend_handles_labels()
+    figure.legend([*handles, *more], [*texts, *names], loc="outside lower center", ncols=3,
+                  fontsize="small", frameon=False)
     return figure
+
+
+def _counted(stops: list[Stop]) -> list[int]:
+    """Steps since the first stage with physics."""
+    steps, before = [], 0
+    for k, stop in enumerate(stops):
+        if k and stop.steps == 0:
+            before = steps[-1]
+        steps.append(before + stop.steps)
+    return steps

@@ -40,6 +40,8 @@ class Choice:
                 self.base, str(self.warmup), f"{self.lam:g}")
 
 
+# Tables III and IV: clean and 0.1°, dense, then sparse.
+PUBLISHED = (0.0496, 0.173, 0.0496, 0.178, 0.0547, 0.377, 0.0550, 0.382)
 HEADERS = ("form", "physics", "knots", "start", "base", "warm-up", "λ")
 
 

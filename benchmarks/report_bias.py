@@ -14,7 +14,7 @@ from pathlib import Path
 
 import bias_figures
 import numpy as np
-from bias_descent import READINGS, Stop, descent
+from bias_descent import READINGS, Stop, descent, profile
 from bias_grid import (
     GRIDS,
     LAMBDAS,
@@ -25,7 +25,7 @@ from bias_grid import (
     near_switches,
     noisy,
 )
-from bias_table2 import COLUMNS, HEADERS, choices, estimate
+from bias_table2 import COLUMNS, HEADERS, PUBLISHED, choices, estimate
 from provenance import provenance
 
 from pikanid.plots import save_figure
@@ -64,16 +64,21 @@ def grid_text(found: list[Series], spread: list[Series], seeds: int) -> str:
     bound = cramer_rao(slosh.model(), slosh.recording(slosh.SCENARIOS[1], 0))
     limits = ", ".join(f"{100 * bound.std(p) / t:.2g} % ({NAMES[p]})"
                        for p, t in slosh.TRUE.items())
+    ends = [f"{100 * s.error[-1, 1]:+.2g} %" for text in ("between samples", "Gauss points")
+            for s in found if s.name.endswith(text)]
+    broken = any(np.isnan(s.error).any() for s in (*found, *spread))
     uniform, exact = (near_switches(SHOWN_GRID, e) for e in (False, True))
     return "\n\n".join([
         "## The bias against the grid",
         "Relative errors [%] of l and d on clean data. iPDA: uniform cubic splines, second-order "
-        "form, sums at the samples (Eq. 5) at fixed λ, as Table II; in one row the integral by "
-        "Gauss points instead. PIKAN: one shallow pykan KAN on a uniform grid, integral by Gauss "
-        "points, λ by its own rule; with exact switches the known kinks of θ̈ are added. The last "
-        f"rows have no input: release at {RELEASE:g} rad, the same uniform grids. \"order\" is the "
+        "form, sums at the samples (Eq. 5) at fixed λ, as Table II; in two rows the sum over the "
+        "midpoints between samples, and the integral by Gauss points, instead. PIKAN: one shallow "
+        "pykan KAN on a uniform grid, integral by Gauss points, λ by its own rule; with exact "
+        "switches the known kinks of θ̈ are added. The last rows have no input: release at "
+        f"{RELEASE:g} rad, the same uniform grids. \"order\" is the "
         "exponent q of |error| ~ hᑫ over G ≥ 80. locked: l is off by more than its own size, "
-        "because 1/l → 0 costs less than resolving the motion.",
+        "because 1/l → 0 costs less than resolving the motion."
+        + (" failed: the fit broke off without a result." if broken else ""),
         "### l", grid_table(found, 0, True), "### d", grid_table(found, 1, True),
         "![Bias against the grid](figures/bias-grid.png)",
         "θ̈ jumps where the input switches. A cubic spline on uniform simple knots has a continuous "
@@ -81,8 +86,9 @@ def grid_text(found: list[Series], spread: list[Series], seeds: int) -> str:
         "and the error of l falls about as h. Without switches the same grids show no such error, "
         "and kinks at the switches remove it: the bias is one of the discretisation, neither of "
         "the relaxation nor of KANs. With sums at the samples d keeps an error that no grid "
-        "removes: at a switch, the sum takes θ̈ and the input at one instant, where one has two "
-        "values. Gauss points never straddle a switch.",
+        "removes: a sample on a switch compares the one θ̈ of the spline with one of the two values "
+        "that the input has there. Sums over the midpoints and Gauss points do not: at "
+        f"G = {GRIDS[-1]} d is off by {' and '.join(ends)}.",
         f"At G = {SHOWN_GRID} the root mean square of θ̈ - f over the record is {uniform[0]:.2g} "
         f"rad/s² with uniform knots alone, and {100 * uniform[1]:.0f} % of its square lies within "
         f"one cell of a switch ({100 * uniform[2]:.0f} % of the time); with exact switches it is "
@@ -103,22 +109,24 @@ def table2_text() -> str:
     for choice in choices():
         values = np.concatenate([estimate(choice, rec) for rec in recordings])
         rows.append((*choice.cells(), *(f"{v:.4f}" for v in values)))
+    rows.append(("published", *[""] * (len(HEADERS) - 1), *(f"{v:.4f}" for v in PUBLISHED)))
     headers = (*HEADERS, *pairs)
     table = Sheet(headers, tuple(rows), (*HEADERS[-2:], *pairs)).to_markdown()
     return "\n\n".join([
         "## What Table II leaves open for iPDA",
-        "Cubic splines, 80 intervals (25 for N = 51), λ = 1e-4 and 15 warm-up iterations are given; "
-        "form, physics sum or integral, knots, start and base function are not. l [m] and "
-        f"d [N s/m] for each; truth {slosh.TRUE['l_theta']} and {slosh.TRUE['d_theta']}, start "
-        f"{slosh.START['l_theta']} and {slosh.START['d_theta']}, noise of seed 0. The first row is "
-        "`IPDA(protocol=\"paper\")` (which also doubles λ for N = 51). \"base on\" adds w_b · SiLU(t), "
-        "on pykan's knots. \"adaptive\" knots "
-        "(equally many samples between any two) are uniform on evenly sampled data. \"aligned\" "
-        "repeats knots at the switches, in the same cubic space otherwise.",
+        "Cubic splines, 80 intervals (25 for N = 51), λ = 1e-4 and 15 warm-up iterations are "
+        "given; form, sum or integral, knots, start and base function are not. l [m] and d [N s/m] "
+        f"for each; truth {slosh.TRUE['l_theta']} and {slosh.TRUE['d_theta']}, start "
+        f"{slosh.START['l_theta']} and {slosh.START['d_theta']}, noise of seed 0. The first row "
+        "is `IPDA(protocol=\"paper\")`, but for λ, which the protocol doubles for N = 51. "
+        "\"adaptive\" (equally many samples between any two knots) is uniform on evenly sampled "
+        "data; \"aligned\" repeats knots at the switches, so that θ̈ may jump there; base \"on\" "
+        "adds w_b · SiLU(t), on pykan's knots. The last row is what Tables III and IV print.",
         table])
 
 
-def descent_text(paths: dict[str, tuple[list[Stop], Stop]], seeds: int) -> str:
+def descent_text(paths: dict[str, tuple[list[Stop], Stop]], along: list[Stop],
+                 seeds: int) -> str:
     """The estimate against the number of L-BFGS steps."""
     headers = ("reading", "G", "λ", "step", "l [m]", "d [N s/m]", "loss", "gradient norm")
     rows = []
@@ -141,18 +149,28 @@ def descent_text(paths: dict[str, tuple[list[Stop], Stop]], seeds: int) -> str:
         f"Clean data, cubic KAN, w_b = 0, {COLLOCATION} collocation points, uniform knots, "
         f"initial state free. The protocol as read here is {order}. Table II does not say at which "
         "grid λ rises; the other reading keeps λ = 0 until the last stage. Below: what L-BFGS "
-        "would have returned, had it been stopped after so many steps of a stage (the last one is "
-        f"followed beyond its {STAGES[-1][2]} steps), and the norm of the gradient there. The model "
-        f"bounds l by {limit:g} m; Gauss-Newton continues from the end with the bound lifted to "
-        "10⁴ m.",
+        "would have returned, had it been stopped after so many steps of a stage, and the norm of "
+        f"the gradient there. The last stage is followed beyond its {STAGES[-1][2]} steps. The "
+        f"model bounds l by {limit:g} m; Gauss-Newton continues from the end with the bound lifted "
+        "to 10⁴ m.",
         Sheet(headers, tuple(rows), headers[1:]).to_markdown(),
         "![L-BFGS steps](figures/bias-descent.png)",
-        "The loss has no minimum near the truth: it falls all the way to 1/l → 0, slowly. Every "
-        "value of l between start and bound is passed on the way, with a gradient far from zero, so "
-        "a figure obtained after a given number of steps says where the optimiser stood and "
-        "nothing about the model. The same protocol with other initial coefficients of pykan "
-        f"(`PIKAN(protocol=\"paper\", seed=...)`, stopped after {STAGES[-1][2]} steps):",
+        f"The least loss for given l, at λ = {STAGES[-1][1]:g} and G = {STAGES[-1][0]}, over "
+        "coefficients and d:",
+        Sheet(("l [m]", "d [N s/m]", "loss"),
+              tuple(_stop(s)[3:6] for s in along), ("l [m]", "d [N s/m]", "loss")).to_markdown(),
+        f"{_slope(along)} A figure obtained after a given number of steps says where the optimiser "
+        "stood, and little about the model. The same protocol with other initial coefficients of "
+        f"pykan (`PIKAN(protocol=\"paper\", seed=...)`, stopped after {STAGES[-1][2]} steps):",
         seeded])
+
+
+def _slope(along: list[Stop]) -> str:
+    falls = bool(np.all(np.diff([s.cost for s in along]) < 0))
+    near = min(along, key=lambda s: abs(s.theta[0] - slosh.TRUE["l_theta"])).cost
+    ratio = f"At the true l it is {near / along[-1].cost:.0f} times that at the last."
+    return ("It falls all the way to 1/l → 0: there is no minimum near the truth. " if falls else
+            "It does not fall everywhere. ") + ratio
 
 
 def _stop(s: Stop) -> tuple[str, ...]:
@@ -165,15 +183,16 @@ def main(folder: str, seeds: str = str(SEEDS)) -> None:
     begun, count = time.perf_counter(), int(seeds)
     found, spread = clean(), noisy(count)
     paths = {name: descent(stages, seed=0) for name, stages in READINGS.items()}
+    along = profile()
     pictures = Path(folder) / "figures"
     pictures.mkdir(parents=True, exist_ok=True)
-    for name, figure in bias_figures.figures(found, paths).items():
+    for name, figure in bias_figures.figures(found, paths, along).items():
         save_figure(figure, pictures / f"bias-{name}.png")
     parts = ["# Where the systematic bias comes from",
              "Slosh pendulum (Eq. 6) under the two pulses of Table II, T = 5 s, N = 501; "
              + ", ".join(f"{NAMES[p]} = {v:g}" for p, v in slosh.TRUE.items())
              + f" is the truth. iPDA is fitted at λ = {', '.join(f'{v:g}' for v in LAMBDAS)}.",
-             grid_text(found, spread, count), table2_text(), descent_text(paths, 3)]
+             grid_text(found, spread, count), table2_text(), descent_text(paths, along, 3)]
     parts += ["## Settings",
               f"Written by `benchmarks/report_bias.py`. {provenance()}. Start of every fit: "
               + ", ".join(f"{NAMES[p]} = {v:g}" for p, v in slosh.START.items())
