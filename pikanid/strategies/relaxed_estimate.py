@@ -21,6 +21,8 @@ from pikanid.approximators import Array
 from pikanid.approximators.bspline import BSpline
 from pikanid.chains import Chains
 from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
+from pikanid.functional import Functional
+from pikanid.problem import Problem
 from pikanid.shooting import Shooting
 from pikanid.strategies.finish import finish
 from pikanid.strategies.relaxation import RelaxedFit
@@ -62,7 +64,45 @@ def relaxed_estimate(strategy: str, fit: RelaxedFit, settings: Mapping[str, Any]
          "iterations": float(s.iterations),
          **{f.label: float(v) for f, v in zip(fit.problem.free, s.theta, strict=True)}}
         for s in fit.stages]
-    curves = trajectories(fit) if curves is None else curves
+    return assemble(strategy, fit, used, history, begun,
+                    trajectories(fit) if curves is None else curves)
+
+
+class Relaxed(Protocol):
+    """What an `Estimate` needs of a fit with a free curve."""
+
+    @property
+    def problem(self) -> Problem:
+        """What was fitted."""
+
+    @property
+    def functional(self) -> Functional:
+        """Eq. (2) as fitted."""
+
+    @property
+    def theta(self) -> Array:
+        """Estimate (b,)."""
+
+    @property
+    def covariance(self) -> Array:
+        """Of θ (b, b)."""
+
+    @property
+    def coefficients(self) -> tuple[Array, ...]:
+        """Of the curves, one vector a recording."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the optimiser stopped at a minimum."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences to pass on."""
+
+
+def assemble(strategy: str, fit: Relaxed, settings: Mapping[str, Any],
+             history: list[dict[str, float]], begun: float, curves: Curves) -> Estimate:
+    """The `Estimate`: the model simulated at θ, judged, and the curves beside it."""
     shooting = Shooting(fit.problem)
     try:
         shooting.choose_steps(fit.theta, "fine")
@@ -71,10 +111,10 @@ def relaxed_estimate(strategy: str, fit: RelaxedFit, settings: Mapping[str, Any]
         finished = False
     if finished:
         estimate = finish(strategy, fit.problem, shooting, fit.theta, converged=True,
-                          history=history, settings=used, seed=None, begun=begun,
+                          history=history, settings=settings, seed=None, begun=begun,
                           warnings=fit.warnings, approximator=curves)
     else:
-        estimate = _unsimulated(strategy, fit, curves, history, used)
+        estimate = _unsimulated(strategy, fit, curves, history, settings)
     covariance = fit.covariance.copy()
     stuck = np.isnan(np.diag(estimate.covariance)) if finished else np.diag(covariance) == 0.0
     covariance[stuck] = covariance[:, stuck] = np.nan
@@ -92,7 +132,7 @@ def trajectories(fit: RelaxedFit) -> SplineTrajectories:
                               tuple(coefficients))
 
 
-def _unsimulated(strategy: str, fit: RelaxedFit, curves: Curves,
+def _unsimulated(strategy: str, fit: Relaxed, curves: Curves,
                  history: list[dict[str, float]], settings: Mapping[str, Any]) -> Estimate:
     """The model diverges at the estimate: all there is to show are the splines."""
     problem, functional = fit.problem, fit.functional
