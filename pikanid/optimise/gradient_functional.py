@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from pikanid.approximators import Array
-from pikanid.approximators.mlp import MLP, MLPAt
+from pikanid.approximators.mlp import MLP
 from pikanid.functional import Functional, Sites
 from pikanid.optimise.gauss_newton import Point
 from pikanid.simulation.torch_field import TorchField
@@ -63,7 +63,6 @@ class TorchFunctional:
             self.nets.append(tuple(_network(a).at(times) for a in part.approximators))
             self.data.append([self._family(times, sites) for sites in part.data])
             self.physics.append(self._family(times, part.physics))
-        self._heavy = [part.start for part in functional.parts]
         self._first = [self._tensor(e.inputs(np.array([e.t0]))[0]) for e in problem.experiments]
         self._fixed = [[float(v) for v in problem.parameters(problem.guess, r)]
                        for r in range(len(problem.experiments))]
@@ -200,6 +199,3 @@ def _network(approximator: object) -> MLP:
     if not isinstance(approximator, MLP):
         raise TypeError(f"gradient descent is for networks, not {type(approximator).__name__}")
     return approximator
-
-
-__all__ = ["MLPAt", "TorchFunctional"]
