@@ -43,7 +43,7 @@ def against_grid(found: list[Series]) -> Figure:
             colour, marker = STYLES[s.kind]
             second = any(other.kind == s.kind for other in shown[:n])
             good = ~s.locked & np.isfinite(s.error[:, k])
-            axes.plot(size[good], 100 * np.abs(s.error[good, k]), color=colour,
+            axes.plot(size, np.where(good, 100 * np.abs(s.error[:, k]), np.nan), color=colour,
                       marker=marker, markersize=4, linewidth=1.3, label=s.name,
                       linestyle="--" if second else "-",
                       markerfacecolor="white" if second else colour)
