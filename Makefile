@@ -43,7 +43,9 @@ test-all: lint ## lint, then all tests, the slow ones too
 bench: $(STAMP) ## time the code against its references; writes reports/performance.md
 	mkdir -p build reports
 	$(BIN)/python -m pytest benchmarks -m "" --benchmark-only --benchmark-json build/benchmarks.json
-	$(BIN)/python benchmarks/performance.py build/benchmarks.json reports/performance.md
+	$(BIN)/python benchmarks/ipda_scaling.py > build/ipda_scaling.md
+	$(BIN)/python benchmarks/performance.py build/benchmarks.json reports/performance.md \
+		build/ipda_scaling.md
 
 reports: bench ## bench, then every other report: benchmarks/report_*.py
 	set -e; for script in $(sort $(wildcard benchmarks/report_*.py)); do \

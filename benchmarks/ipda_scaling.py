@@ -21,6 +21,7 @@ KINDS = ("pulses", "every sample")
 
 def main(sizes: tuple[int, ...]) -> None:
     """Print one table row a size and kind of input."""
+    print("## iPDA, time and memory against the number of samples\n")
     print("| input | N | intervals | seconds | µs a sample | bytes a sample |")
     print("| --- | --- | --- | --- | --- | --- |")
     for kind in KINDS:

@@ -1,8 +1,8 @@
 """Turn pytest-benchmark's JSON into reports/performance.md.
 
-Usage: python benchmarks/performance.py BENCHMARKS.json PERFORMANCE.md
+Usage: python benchmarks/performance.py BENCHMARKS.json PERFORMANCE.md [TABLE.md ...]
 
-Ratios are against the entry that its group marks as the reference, measured in the same run.
+Further tables are appended as they are.  Ratios are against the entry that its group marks as the reference, measured in the same run.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import Any
 LIBRARIES = ("numpy", "scipy", "sympy", "numba", "casadi", "torch", "pykan")
 
 
-def main(source: str, target: str) -> None:
-    """Read one file, write the other (atomically)."""
+def main(source: str, target: str, *tables: str) -> None:
+    """Read the measurements, write the report (atomically)."""
     data = json.loads(Path(source).read_text())
     groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
     for entry in data["benchmarks"]:
@@ -29,6 +29,8 @@ def main(source: str, target: str) -> None:
     lines = ["# Performance", "", _setting(), ""]
     for name, entries in groups.items():
         lines += _table(name, entries)
+    for table in tables:
+        lines += [Path(table).read_text()]
     path = Path(target)
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
     with os.fdopen(handle, "w") as file:
@@ -76,4 +78,4 @@ def _time(seconds: float) -> str:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    main(*sys.argv[1:])
