@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from pikanid.approximators import Array
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
@@ -115,10 +115,24 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
         k = part.held.size
         if block.held_by_theta is not None:
             pulled_theta += block.held_by_theta.T @ pulled[:k]
-        factor = cholesky_banded(block.band, lower=True, check_finite=False)
+        factor = _factor(block.band)
         solved = cho_solve_banded((factor, True), pulled[k:], check_finite=False)
         total += float(np.sum(solved * pulled[k:]))
         theta[columns] += pulled_theta - block.border.T @ solved
     if theta.size:
         total += float(np.sum(theta * (invert(step.schur, inside_bounds(system, at)) @ theta)))
     return total if rows <= EXACT_UP_TO else total / probes.shape[1]
+
+
+def _factor(band: Array) -> Array:
+    """Cholesky factor of a band that rounding may have left just short of positive definite."""
+    lift = 0.0
+    while True:
+        lifted = band.copy()
+        lifted[0] *= 1.0 + lift
+        try:
+            return cholesky_banded(lifted, lower=True, overwrite_ab=True, check_finite=False)
+        except LinAlgError:
+            lift = max(1e-14, 10.0 * lift)
+            if lift > 1e-2:
+                raise
