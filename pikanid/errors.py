@@ -506,8 +506,8 @@ def kan_not_shallow(width: object) -> str:
 
 def kan_not_a_curve(width: object) -> str:
     return (
-        f"A KAN of width {width} is no curve over time: it needs one input and one output, and at "
-        "least one node in every hidden layer, as in (1, 5, 1)."
+        f"A KAN of width {width} is no curve over time: it needs one input, one output and no masked "
+        "edges, as in (1, 5, 1)."
     )
 
 
@@ -838,6 +838,13 @@ def nothing_to_simulate(name: str) -> str:
 
 def out_of_memory() -> str:
     return "There is not enough memory for this: shorten the recording, or thin it with --decimate."
+
+
+def fit_diverged(where: str) -> str:
+    return (
+        f"The fit broke down {where}, where the model's right-hand side or its cost was not finite: "
+        "the best iterate before that is kept. Try other guesses or bounds, or a larger first grid."
+    )
 
 
 def lbfgs_stopped(steps: int, gradient: float) -> str:

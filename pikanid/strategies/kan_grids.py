@@ -17,7 +17,7 @@ from pikanid.approximators import Array
 from pikanid.approximators.kan import ShallowKAN, build_kan
 from pikanid.approximators.tables import gauss_nodes
 from pikanid.chains import Chains
-from pikanid.problem import Problem
+from pikanid.problem import Experiment, Problem
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class KanGrid:
     ----------
     degree : spline degree k of the edges
     exact_switches : whether to add kinks where an input switches
-    nodes_at : "gauss" (integral, no node straddles a switch) or "samples" (sum over `count` evenly
+    quadrature : "gauss" (integral, no node straddles a switch) or "sum" (over `count` evenly
         spaced collocation points, Table II)
     base : "zero" (w_b = 0) or "silu"
     seed : of pykan's initial coefficients, which a fit overwrites
@@ -73,7 +73,7 @@ class KanGrid:
     def _switches(self, times: Array, start: float, stop: float) -> list[float]:
         if not self.exact_switches:
             return []
-        # more kinks than a few a cell would make the basis dependent: then the grid must resolve them
+        # more than a few kinks a cell would make the basis dependent: the grid must resolve them
         spacing = (stop - start) / self.intervals
         if len(times) > 1 and np.min(np.diff(times)) < 2 * spacing:
             times = times[np.concatenate([[True], np.diff(times) >= 2 * spacing])]
@@ -87,10 +87,13 @@ class KanGrid:
                 t = np.linspace(e.t0, e.t1, self.count)
                 found.append((t, np.ones(self.count)))
                 continue
-            cells = np.linspace(e.t0, e.t1, self.intervals + 1)
-            panels = np.union1d(cells, e.breakpoints()) if self.exact_switches else cells
-            found.append(gauss_nodes(panels, 3))
+            found.append(gauss_nodes(self.panels(e), 3))
         return found
+
+    def panels(self, experiment: Experiment) -> Array:
+        """Grid cells (E + 1,), split where an input switches: no Gauss node may straddle that."""
+        cells = np.linspace(experiment.t0, experiment.t1, self.intervals + 1)
+        return np.union1d(cells, experiment.breakpoints()) if self.exact_switches else cells
 
     def refined(self) -> KanGrid:
         """Every cell halved."""

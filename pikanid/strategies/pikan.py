@@ -1,8 +1,8 @@
 """PIKAN: a Kolmogorov-Arnold network as the trajectory, fitted together with the parameters.
 
-The approximator of Table I is a real pykan network.  A shallow one with w_b = 0 is a spline (Eq. 4),
-so that Gauss-Newton on all unknowns is banded, as in iPDA; its grid is refined 10 → 20 → 40 → ...
-until the parameters stay where they are, each grid starting from the last one's curve.
+The approximator of Table I is a real pykan network.  A shallow one with w_b = 0 is a spline
+(Eq. 4), so that Gauss-Newton on all unknowns is banded, as in iPDA (kan_shallow.py); a deeper one
+is banded in its first layer alone and needs Levenberg-Marquardt (kan_deep.py).
 """
 
 from __future__ import annotations
@@ -10,42 +10,31 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Literal, get_args
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
 from pikanid import errors
-from pikanid.approximators import Array
-from pikanid.approximators.kan import ShallowKAN
-from pikanid.chains import Chains, Form, find_chains
+from pikanid.approximators.kan.device import check_device
+from pikanid.approximators.kan.plan import Base
+from pikanid.chains import Form, find_chains
 from pikanid.estimate import Estimate
-from pikanid.functional import Functional
 from pikanid.model import Model
-from pikanid.optimise.gauss_newton import BandedSystem, Point
-from pikanid.optimise.schedules import Continuation, Fixed, Stage, moved
+from pikanid.optimise.schedules import Stage
 from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
-from pikanid.strategies.grids import fastest_rate
+from pikanid.strategies.kan_deep import Shape, deep_fit
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.kan_paper import paper_fit
-from pikanid.strategies.relaxation import (
-    GRID_SETTLED,
-    RelaxedFit,
-    Setup,
-    conclude,
-    first_point,
-    follow,
-    noise_level,
-    physics_scale,
-    start_is_estimated,
-)
+from pikanid.strategies.kan_shallow import shallow_fit
+from pikanid.strategies.kan_trajectories import KanTrajectories
+from pikanid.strategies.relaxation import RelaxedFit, Setup, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
 
 FIRST_GRID = 10
-RADIANS = 1.0  # of the fastest linearised motion, at most, in a cell of the first grid that counts
+SHALLOW = (1, 1)
+LAMBDA_RULE = "x10 from the weakest until no parameter moves by 0.05 standard errors"
 Progress = Callable[[dict[str, float]], None]
 
 
@@ -55,16 +44,25 @@ class PIKAN:
 
     Parameters
     ----------
-    protocol : "default": Gauss-Newton, refinement until the discretisation no longer shows,
-        switches exact; "paper": Table II (cubic, 10 → 20 → 40, λ 0 → 0.1, then 500 L-BFGS steps at
-        λ = 1 with 501 collocation points), where the gradient norm at the stop is reported
-    grid : cells of the only grid, in place of refinement
+    protocol : "default": refinement until the discretisation no longer shows, switches exact;
+        "paper": Table II (shallow, cubic, 10 → 20 → 40, λ 0 → 0.1, then 500 L-BFGS steps at λ = 1
+        with 501 collocation points), where the gradient norm at the stop is reported
+    width : nodes of every layer; (1, 1) is shallow, in (1, 5, 1) or (1, [3, 1], 1) hidden nodes add
+        or multiply.  Every chain of states has a network of its own.  A deeper network starts from
+        the shallow fit, which it contains, and is trained as a whole from there
+    base : "zero" (w_b = 0 in Eq. 3) or "silu"
+    grid : cells of the only grid over time, in place of refinement
+    hidden_grid : cells of the grids of hidden values
     degree : of the edges' splines
-    lam : a fixed λ (dimensionless, as in `IPDA`), in place of continuation
+    lam : a fixed λ (dimensionless, as in `IPDA`), in place of continuation: λ rises tenfold until
+        no parameter moves by more than 0.05 of its standard error, or until a grid that cannot
+        meet the physics would lock the fit
     exact_switches : add the known kinks of the trajectory at the input switches
     form : "second_order" or "state", as in `IPDA`
     max_grid : finest grid tried
-    seed : of pykan's initial coefficients
+    seed : of the starting coefficients of a deeper network
+    device : "cpu", or "cuda" for a pykan model that lives on a GPU.  The fit itself is NumPy and
+        runs on the CPU either way: at these sizes a GPU has nothing to gain
     progress : called with loss parts, λ and grid after every stage
 
     >>> import numpy as np, pikanid as pk
@@ -76,13 +74,17 @@ class PIKAN:
     """
 
     protocol: Literal["default", "paper"] = "default"
+    width: Sequence[int | Sequence[int]] = SHALLOW
+    base: Base = "zero"
     grid: int | None = None
+    hidden_grid: int = 6
     degree: int | None = None
     lam: float | None = None
     exact_switches: bool = True
     form: Form = "second_order"
     max_grid: int = 640
     seed: int = 0
+    device: str = "cpu"
     progress: Progress | None = None
 
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
@@ -97,128 +99,67 @@ class PIKAN:
         pikanid.errors.BadSetting : options that cannot work, or a delay to be estimated
         """
         begun = time.perf_counter()
+        self._check()
         problem = Problem(model, recordings)
         settings = {k: v for k, v in asdict(replace(self, progress=None)).items()
                     if k != "progress"}
-        if self.protocol == "paper":
-            fit, more = paper_fit(_setup(problem, self.form, paper=True), self.degree or 3,
-                                  self.seed, self.progress)
-            settings |= more
-        else:
-            fit = self._default(problem)
-        return relaxed_estimate("pikan", fit, settings, begun, KanTrajectories.of(fit))
+        settings["width"] = [entry if isinstance(entry, int) else list(entry)
+                             for entry in self.width]
+        # A right-hand side that overflows is a failed step, and said where it cannot be helped.
+        with np.errstate(all="ignore"):
+            if self.protocol == "paper":
+                fit, more = paper_fit(self._setup(problem), self.degree or 3, self.seed,
+                                      self.progress)
+                settings |= more
+            else:
+                fit = self._default(problem)
+                settings["lam_rule"] = "given" if self.lam else LAMBDA_RULE
+            return relaxed_estimate("pikan", fit, settings, begun,
+                                    KanTrajectories.of(fit, self.device))
 
     def _default(self, problem: Problem) -> RelaxedFit:
-        setup = _setup(problem, self.form, paper=False)
+        setup, deep = self._setup(problem), len(self.width) > 2
         longest = max(setup.chains.lengths)
         grid = KanGrid(self.grid or FIRST_GRID, self.degree or max(5, longest + 3),
-                       self.exact_switches, seed=self.seed)
-        if self.grid is None:
-            cells = _cells(setup)
-            while grid.intervals < cells and grid.intervals < self.max_grid:
-                grid = grid.refined()
-        functional = setup.functional(grid)
-        point, smoothed = first_point(functional)
-        noise = noise_level(functional, smoothed)
-        scale = physics_scale(functional, point, noise)
-        stages: list[Stage] = []
-        notes: list[str] = []
-        start = 1.0
-        while True:
-            functional = functional.with_scale(scale)
-            system = BandedSystem(functional)
-            plan = Fixed(self.lam, 15) if self.lam else Continuation(
-                noise**2 * problem.n_samples, True, start=start, factor=10.0, limit=1e8,
-                warmup=0 if stages else 3)
-            found, outcome, remarks = follow(system, point, plan)
-            self._tell(grid, found)
-            stages += found
-            before = stages[-len(found) - 1] if len(stages) > len(found) else None
-            gap = np.inf if before is None else moved(
-                before.theta, found[-1].theta, found[-1].std, 1e-6)
-            if gap <= GRID_SETTLED or self.grid is not None:
-                break
-            if 2 * grid.intervals > self.max_grid:
-                notes.append(errors.grid_not_settled(gap, grid.intervals))
-                break
-            grid = grid.refined()
-            finer = setup.functional(grid)
-            point = _carried(functional, finer, outcome.at.point)
-            start, functional = max(1.0, found[-1].lam / 10), finer
-        if self.grid is not None:
-            notes += remarks
-        if not outcome.converged:
-            notes.append(errors.not_converged(found[-1].lam))
-        return conclude(setup, grid, system, outcome, stages, notes)
+                       self.exact_switches, base="zero" if deep else self.base, seed=self.seed)
+        fit = shallow_fit(setup, grid, refine=self.grid is None, max_grid=self.max_grid,
+                          lam=self.lam, tell=self._tell)
+        if not deep or not fit.stages:
+            return fit
+        if self.grid is not None:  # what the shallow one lacks on this grid, this one may have
+            fit = replace(fit, warnings=())
+        shape = Shape(tuple(self.width), self.hidden_grid, self.base, self.seed)
+        return deep_fit(setup, fit, shape, self.lam, self._tell)
 
-    def _tell(self, grid: KanGrid, stages: Sequence[Stage]) -> None:
+    def _setup(self, problem: Problem) -> Setup:
+        paper = self.protocol == "paper"
+        return Setup(problem, VectorField(problem.model), find_chains(problem.model, self.form),
+                     given_start=not paper or start_is_estimated(problem), weighted=not paper,
+                     nondimensional=not paper)
+
+    def _check(self) -> None:
+        """Refuse options that cannot work."""
+        choices = {"protocol": ("default", "paper"), "form": get_args(Form),
+                   "base": get_args(Base)}
+        for name, known in choices.items():
+            if getattr(self, name) not in known:
+                raise errors.BadSetting(errors.bad_value(
+                    name, getattr(self, name), "one of " + ", ".join(known)))
+        for name, least in {"grid": 1, "hidden_grid": 1, "degree": 2, "max_grid": 1}.items():
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, int) and value >= least):
+                raise errors.BadSetting(errors.bad_value(name, value, f"a number >= {least}"))
+        if self.lam is not None and not self.lam > 0.0:
+            raise errors.BadSetting(errors.bad_value("lam", self.lam, "positive"))
+        if len(self.width) < 2 or self.width[0] != 1 or self.width[-1] != 1:
+            raise errors.BadSetting(errors.kan_not_a_curve(list(self.width)))
+        if self.protocol == "paper" and (tuple(self.width) != SHALLOW or self.base != "zero"):
+            raise errors.BadSetting(errors.bad_value(
+                "protocol", "paper", "used with width=(1, 1) and base='zero' (Table II)"))
+        check_device(self.device)
+
+    def _tell(self, intervals: int, stages: Sequence[Stage]) -> None:
         if self.progress is not None:
             for s in stages:
-                self.progress({"grid": float(grid.intervals), "lam": s.lam, "data": s.data_cost,
+                self.progress({"grid": float(intervals), "lam": s.lam, "data": s.data_cost,
                                "physics": s.physics_cost})
-
-
-@dataclass(frozen=True, eq=False)
-class KanTrajectories:
-    """The fitted networks: `networks[r][i]` is chain i of recording r."""
-
-    chains: Chains
-    networks: tuple[tuple[ShallowKAN, ...], ...]
-
-    @staticmethod
-    def of(fit: RelaxedFit) -> KanTrajectories:
-        """The networks of a fit, with its coefficients put into the pykan models."""
-        found = []
-        for part, c in zip(fit.functional.parts, fit.coefficients, strict=True):
-            own = []
-            for network, table in zip(part.approximators, part.physics.tops, strict=True):
-                assert isinstance(network, ShallowKAN)
-                network.set_coefficients(c[table.part])
-                own.append(network)
-            found.append(tuple(own))
-        return KanTrajectories(fit.chains, tuple(found))
-
-    @property
-    def kan(self) -> Any:
-        """The pykan model of the first recording's first chain; kinks stand beside it."""
-        return self.networks[0][0].kan
-
-    def states(self, t: Array, recording: int = 0) -> Array:
-        """Approximated states (M, n) of a recording at times t (M,) [s]."""
-        own = self.networks[recording]
-        return np.column_stack([
-            own[i].values(t, own[i].coefficients[:, 0], q)
-            for i, q in zip(self.chains.root, self.chains.order, strict=True)])
-
-
-def _setup(problem: Problem, form: Form, *, paper: bool) -> Setup:
-    return Setup(problem, VectorField(problem.model), find_chains(problem.model, form),
-                 given_start=not paper or start_is_estimated(problem), weighted=not paper,
-                 nondimensional=not paper)
-
-
-def _cells(setup: Setup) -> float:
-    """Cells that the fastest linearised motion asks for."""
-    rates = [fastest_rate(setup.problem, setup.field, r) * (e.t1 - e.t0)
-             for r, e in enumerate(setup.problem.experiments)]
-    return max(rates) / RADIANS
-
-
-def _carried(old: Functional, new: Functional, point: Point) -> Point:
-    """The same curves on a finer grid, by least squares at six points a basis function.
-
-    The finer space holds the coarser one up to kinks that a knot replaces.
-    """
-    coefficients = []
-    for r, (before, after) in enumerate(zip(old.parts, new.parts, strict=True)):
-        pieces = []
-        for i, fine in enumerate(after.approximators):
-            coarse = before.approximators[i]
-            assert isinstance(fine, ShallowKAN) and isinstance(coarse, ShallowKAN)
-            t = np.linspace(fine.start, fine.stop, 6 * fine.n_basis)
-            basis = fine.basis(t)
-            values = coarse.basis(t) @ point.coefficients[r][before.physics.tops[i].part]
-            normal = basis.T @ basis + 1e-12 * sparse.eye_array(fine.n_basis)
-            pieces.append(spsolve(normal.tocsc(), basis.T @ values))
-        coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
-    return Point(tuple(coefficients), point.theta)

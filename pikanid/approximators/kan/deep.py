@@ -6,7 +6,6 @@ forward (jets of the values) and one backward (jets of the adjoints) give all de
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,33 +18,7 @@ from pikanid.approximators.kan.cells import local_bases
 from pikanid.approximators.kan.jets import BINOMIAL, chain, matrix_product, product
 from pikanid.approximators.kan.layers import Layer, read_layer, through_nodes
 from pikanid.approximators.kan.plan import Array
-
-
-@dataclass(frozen=True, eq=False)
-class KanJet:
-    """Outputs along a path and how they change with the coefficients.
-
-    Attributes:
-        values: value, first and second derivative, each (M, outputs).
-        jacobians: their derivatives by the coefficients, each (M, outputs, n_coefficients); empty
-            where they were not asked for.
-        inputs: derivative of the values by the inputs (M, outputs, inputs), with the Jacobians.
-    """
-
-    values: tuple[Array, ...]
-    jacobians: tuple[Array, ...] = ()
-    inputs: Array | None = None
-
-
-@dataclass(eq=False)
-class _Sweep:
-    """What the backward sweep needs of the forward one, for one layer."""
-
-    first: NDArray[np.int64]
-    local: Array  # jets of the active basis functions (d, M, inputs, k + 1)
-    base: Array | None  # jets of the base function (d, M, inputs)
-    slope: Array  # jets of the edges' slopes (d, M, inputs, subnodes)
-    factor: Array  # jets of the subnodes (d, M, subnodes)
+from pikanid.approximators.kan.sweeps import KanJet, LocalJet, Sweep, edge_parts
 
 
 class DeepKAN:
@@ -128,26 +101,40 @@ class DeepKAN:
         for depth, rate in ((1, 1.0 if first is None else first), (2, second)):
             if depth <= order and rate is not None:
                 jet[depth] = np.reshape(rate, x.shape) if np.ndim(rate) else rate
-        parts = self._split(coefficients)
-        sweeps = []
-        for layer, (coef, base) in zip(self._layers, parts, strict=True):
-            sweep, jet = self._forward(layer, jet, coef, base, slopes=jacobian)
-            sweeps.append(sweep)
+        sweeps, jet = self._swept(jet, coefficients, slopes=jacobian)
         values = tuple(jet)
         if not jacobian:
             return KanJet(values)
-        adjoint = np.zeros((order + 1, x.shape[0], self.plan.nodes(-1), self.plan.nodes(-1)))
-        adjoint[0] = np.eye(self.plan.nodes(-1))
         table = np.zeros((order + 1, x.shape[0], self.plan.nodes(-1), self._active.size))
-        end = self._active.size
-        for layer, sweep in zip(self._layers[::-1], sweeps[::-1], strict=True):
-            end -= self._mask(layer).size
-            adjoint = through_nodes(layer, adjoint, sweep.factor)
-            self._fill(table, end, layer, adjoint, sweep)
-            adjoint = matrix_product(adjoint, sweep.slope.swapaxes(-1, -2))
+        adjoint = self._adjoints(table, sweeps)
+        adjoint = through_nodes(self._layers[0], adjoint, sweeps[0].factor)
+        self._fill(table, 0, self._layers[0], adjoint, sweeps[0])
+        slopes = matrix_product(adjoint, sweeps[0].slope.swapaxes(-1, -2))
         if not self._active.all():
             table = table[..., self._active]
-        return KanJet(values, tuple(table), adjoint[0])
+        return KanJet(values, tuple(table), slopes[0])
+
+    def locally(self, t: Array, coefficients: Array, order: int) -> LocalJet:
+        """The Jacobians at ``t`` (M,) of the derivatives 0 to ``order``, without their zeros.
+
+        For one input, one output and no masked edges.
+        """
+        jet = np.zeros((order + 1, t.size, 1))
+        jet[0, :, 0] = t
+        if order:
+            jet[1] = 1.0
+        sweeps, _ = self._swept(jet, coefficients, slopes=True)
+        table = np.zeros((order + 1, t.size, 1, self._active.size))
+        adjoint = self._adjoints(table, sweeps)
+        layer, sweep = self._layers[0], sweeps[0]
+        adjoint = through_nodes(layer, adjoint, sweep.factor)
+        near = tuple(
+            (part[:, 0, :, 0] * layer.scale[0]).reshape(t.size, -1)
+            for part in edge_parts(adjoint, sweep)
+        )
+        splines = layer.mask.size * (layer.intervals + self.plan.k)
+        self._fill_base(table[..., splines : self._mask(layer).size], layer, adjoint, sweep)
+        return LocalJet(sweep.first[:, 0], near, tuple(table[:, :, 0, splines:]))
 
     def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
         """The first output or its derivative at ``t`` (M,), shape (M,)."""
@@ -172,9 +159,32 @@ class DeepKAN:
             _, jet = self._forward(layer, jet, coef, base, slopes=False)
         return tuple(places)
 
+    def _swept(
+        self, jet: Array, coefficients: Array, *, slopes: bool
+    ) -> tuple[list[Sweep], Array]:
+        """The forward sweep through all layers."""
+        sweeps = []
+        for layer, (coef, base) in zip(self._layers, self._split(coefficients), strict=True):
+            sweep, jet = self._forward(layer, jet, coef, base, slopes=slopes)
+            sweeps.append(sweep)
+        return sweeps, jet
+
+    def _adjoints(self, table: Array, sweeps: list[Sweep]) -> Array:
+        """The backward sweep down to the first layer's nodes, filling the later layers' columns."""
+        outputs = self.plan.nodes(-1)
+        adjoint = np.zeros((*table.shape[:2], outputs, outputs))
+        adjoint[0] = np.eye(outputs)
+        end = self._active.size
+        for layer, sweep in zip(self._layers[:0:-1], sweeps[:0:-1], strict=True):
+            end -= self._mask(layer).size
+            adjoint = through_nodes(layer, adjoint, sweep.factor)
+            self._fill(table, end, layer, adjoint, sweep)
+            adjoint = matrix_product(adjoint, sweep.slope.swapaxes(-1, -2))
+        return adjoint
+
     def _forward(
         self, layer: Layer, jet: Array, coef: Array, base: Array | None, *, slopes: bool
-    ) -> tuple[_Sweep, Array]:
+    ) -> tuple[Sweep, Array]:
         order, k = jet.shape[0] - 1, self.plan.k
         first, bases = local_bases(jet[0], *layer.knots, layer.intervals, k, order + slopes)
         rows = np.arange(coef.shape[0])[:, None]
@@ -187,7 +197,7 @@ class DeepKAN:
             edges = edges + silus[..., None] * (layer.mask * base)[:, None]
         moved = np.moveaxis(edges, 2, 0)
         subnode = chain(moved[: order + 1], jet).sum(axis=2)
-        sweep = _Sweep(first, np.empty(0), None, np.empty(0), np.empty(0))
+        sweep = Sweep(first, np.empty(0), None, np.empty(0), np.empty(0))
         if slopes:
             sweep.local = chain(np.moveaxis(bases, 2, 0)[: order + 1], jet)
             sweep.slope = chain(moved[1:], jet)
@@ -203,7 +213,7 @@ class DeepKAN:
         node[0] += layer.node[1]
         return sweep, node
 
-    def _fill(self, table: Array, start: int, layer: Layer, adjoint: Array, sweep: _Sweep) -> None:
+    def _fill(self, table: Array, start: int, layer: Layer, adjoint: Array, sweep: Sweep) -> None:
         """The columns of one layer's coefficients."""
         inputs, outputs = layer.mask.shape
         size = layer.intervals + self.plan.k
@@ -212,20 +222,22 @@ class DeepKAN:
         window = sweep.first[..., None] + np.arange(self.plan.k + 1)
         points = np.arange(window.shape[0])[:, None, None]
         rows = np.arange(inputs)[None, :, None]
-        for d in range(table.shape[0]):
-            # (M, o, subnodes) and (M, inputs, k+1) -> (M, inputs, k+1, o, subnodes)
-            part = sum(
-                BINOMIAL[d][e] * adjoint[e][:, None, None] * sweep.local[d - e][..., None, None]
-                for e in range(d + 1)
-            )
+        for d, part in enumerate(edge_parts(adjoint, sweep)):
             block[d][points, :, rows, :, window] = part * layer.scale[:, None, None]
-        if sweep.base is not None:
-            rest = table[..., start + inputs * outputs * size :][..., : inputs * outputs]
-            rest = rest.reshape(*table.shape[:3], inputs, outputs)
-            for d in range(table.shape[0]):
-                for e in range(d + 1):
-                    base = sweep.base[d - e][:, None, :, None] * layer.mask
-                    rest[d] += BINOMIAL[d][e] * adjoint[e][:, :, None] * base
+        self._fill_base(
+            table[..., start + inputs * outputs * size :][..., : inputs * outputs],
+            layer, adjoint, sweep,
+        )
+
+    def _fill_base(self, rest: Array, layer: Layer, adjoint: Array, sweep: Sweep) -> None:
+        """The columns of one layer's scale_base, if there are any."""
+        if sweep.base is None:
+            return
+        rest = rest.reshape(*rest.shape[:3], *layer.mask.shape)
+        for d in range(len(rest)):
+            for e in range(d + 1):
+                base = sweep.base[d - e][:, None, :, None] * layer.mask
+                rest[d] += BINOMIAL[d][e] * adjoint[e][:, :, None] * base
 
     def _split(self, coefficients: Array) -> list[tuple[Array, Array | None]]:
         given = np.asarray(coefficients, float)

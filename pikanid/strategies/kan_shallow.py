@@ -1,0 +1,120 @@
+"""PIKAN with a shallow network: Gauss-Newton while the grid is refined 10 → 20 → 40 → ..."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import LinAlgError
+from scipy.sparse.linalg import spsolve
+
+from pikanid import errors
+from pikanid.approximators.kan import ShallowKAN
+from pikanid.functional import Functional
+from pikanid.optimise.gauss_newton import BandedSystem, Outcome, Point
+from pikanid.optimise.schedules import Continuation, Fixed, Stage, moved
+from pikanid.strategies.grids import fastest_rate
+from pikanid.strategies.kan_grids import KanGrid
+from pikanid.strategies.relaxation import (
+    GRID_SETTLED,
+    RELATIVE,
+    RelaxedFit,
+    Setup,
+    conclude,
+    first_point,
+    follow,
+    noise_level,
+    physics_scale,
+)
+
+RADIANS = 1.0  # of the fastest linearised motion, at most, in a cell of the first grid that counts
+FACTOR, LARGEST = 10.0, 1e8  # of the λ-continuation
+Tell = Callable[[int, Sequence[Stage]], None]
+
+
+def shallow_fit(setup: Setup, grid: KanGrid, *, refine: bool, max_grid: int, lam: float | None,
+                tell: Tell) -> RelaxedFit:
+    """The fit on one grid, or on finer and finer ones until the parameters stay where they are.
+
+    On every grid λ rises tenfold until no parameter moves by more than 0.05 of its standard error;
+    the next, finer grid starts from the last one's curve at a tenth of its λ.
+    """
+    if refine:
+        cells = _cells(setup)
+        while grid.intervals < cells and 2 * grid.intervals <= max_grid:
+            grid = grid.refined()
+    functional = setup.functional(grid)
+    point, smoothed = first_point(functional)
+    noise = noise_level(functional, smoothed)
+    scale = physics_scale(functional, point, noise)
+    stages: list[Stage] = []
+    best: tuple[KanGrid, BandedSystem, Outcome] | None = None
+    start = 1.0
+    while True:
+        functional = functional.with_scale(scale)
+        system = BandedSystem(functional)
+        plan = Fixed(lam, 15) if lam else Continuation(
+            noise**2 * setup.problem.n_samples, True, start=start, factor=FACTOR, limit=LARGEST,
+            warmup=0 if stages else 3)
+        try:
+            found, outcome, remarks = follow(system, point, plan)
+        except LinAlgError:
+            broken = errors.fit_diverged(f"on a grid of {grid.intervals} cells")
+            if best is None:
+                return _unfitted(setup, grid, functional, point, broken)
+            return conclude(setup, best[0], best[1], best[2], stages, [broken])
+        tell(grid.intervals, found)
+        gap = np.inf if not stages else moved(
+            stages[-1].theta, found[-1].theta, found[-1].std, RELATIVE)
+        stages += found
+        best = grid, system, outcome
+        if gap <= GRID_SETTLED or not refine or 2 * grid.intervals > max_grid:
+            break
+        grid = grid.refined()
+        finer = setup.functional(grid)
+        point = _carried(functional, finer, outcome.at.point)
+        start, functional = max(1.0, found[-1].lam / FACTOR), finer
+    notes = [] if refine else list(remarks)
+    if refine and gap > GRID_SETTLED:
+        notes.append(errors.grid_not_settled(gap, grid.intervals))
+    if not outcome.converged:
+        notes.append(errors.not_converged(found[-1].lam))
+    return conclude(setup, *best, stages, notes)
+
+
+def _cells(setup: Setup) -> float:
+    """Cells that the fastest linearised motion asks for."""
+    rates = [fastest_rate(setup.problem, setup.field, r) * (e.t1 - e.t0)
+             for r, e in enumerate(setup.problem.experiments)]
+    return max(rates) / RADIANS
+
+
+def _unfitted(setup: Setup, grid: KanGrid, functional: Functional, point: Point,
+              note: str) -> RelaxedFit:
+    """The curves that smooth the data, θ at its guess: all there is where no step was possible."""
+    unknown = np.full((point.theta.size, point.theta.size), np.nan)
+    cost = sum(float(np.sum(rows.residual**2)) for r, c in enumerate(point.coefficients)
+               for rows in functional.data_rows(r, c, point.theta))
+    return RelaxedFit(setup.problem, point.theta, unknown, unknown, point.coefficients, functional,
+                      grid, 0.0, (), cost, np.nan, np.nan, False, (note,))
+
+
+def _carried(old: Functional, new: Functional, point: Point) -> Point:
+    """The same curves on a finer grid, by least squares at six points a basis function.
+
+    The finer space holds the coarser one up to kinks that a knot replaces.
+    """
+    coefficients = []
+    for r, (before, after) in enumerate(zip(old.parts, new.parts, strict=True)):
+        pieces = []
+        for i, fine in enumerate(after.approximators):
+            coarse = before.approximators[i]
+            assert isinstance(fine, ShallowKAN) and isinstance(coarse, ShallowKAN)
+            t = np.linspace(fine.start, fine.stop, 6 * fine.n_basis)
+            basis = fine.basis(t)
+            values = coarse.basis(t) @ point.coefficients[r][before.physics.tops[i].part]
+            normal = basis.T @ basis + 1e-12 * sparse.eye_array(fine.n_basis)
+            pieces.append(spsolve(normal.tocsc(), basis.T @ values))
+        coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
+    return Point(tuple(coefficients), point.theta)
