@@ -140,7 +140,8 @@ def test_half_derivative_is_simulated_and_differentiated_like_any_state() -> Non
 @pytest.mark.parametrize("method", ["explicit", "implicit"])
 def test_sensitivities_belong_to_the_discrete_solution_itself(method: str) -> None:
     """With coarse steps the solution is inexact, but its derivative is exactly its derivative."""
-    model, recording = systems.duffing_oscillator(), waves(1.0, 0.05).rename({"u_x": "u"}).with_unit("u", "N")
+    model = systems.duffing_oscillator()
+    recording = waves(1.0, 0.05).rename({"u_x": "u"}).with_unit("u", "N")
     made = interpreted.simulator(model, recording)
     p, steps = np.array(list(model.values.values())), Steps(method, 0.05)
     found = made.run(p, np.arange(4), steps).sensitivity

@@ -1,4 +1,4 @@
-"""Simulation of smooth models: against the reference, in every arrangement of channels and times."""
+"""Simulation of smooth models against the reference, in every arrangement of channels."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class Writer:
     def values(self, name: str, arguments: str, out: str, exprs: Sequence[sp.Expr],
                inline_switches: bool = False) -> str:
         """A function that fills `out` with the values of `exprs`."""
-        own = self._own_switches(inline_switches)
+        own = self.own_switches(inline_switches)
         splines = Splines(self, [*exprs, *own])
         body = self.unpack([*exprs, *splines.arguments, *own]) + self.prelude(splines, own)
         body += self.block([(f"{out}[{i}]", e) for i, e in enumerate(exprs)], splines)
@@ -101,7 +101,7 @@ class Writer:
                 derivative = e.diff(q)
                 if derivative != 0:
                     targets.append((f"fp[{r}, {k}]", derivative))
-        own = self._own_switches(inline_switches)
+        own = self.own_switches(inline_switches)
         used = [*(e for _, e in targets), *own]
         splines = Splines(self, used)
         edge_targets, clear, edge_lines = splines.coefficient_columns(exprs)
@@ -130,7 +130,8 @@ class Writer:
                 found.append((j, f"{prefix}_{j}"))
         return found
 
-    def _own_switches(self, inline: bool) -> list[sp.Expr]:
+    def own_switches(self, inline: bool) -> list[sp.Expr]:
+        """The switching functions that only outputs have, where these are evaluated inline."""
         return list(self.lowered.switches[self.lowered.n_dynamic:]) if inline else []
 
     def prelude(self, splines: Splines, own: Sequence[sp.Expr]) -> list[str]:
@@ -266,6 +267,10 @@ def generate(model: Model) -> tuple[str, LoweredModel]:
             "switching_rate_sensitivity", "b, t, x, S, u, v, ud, p, s, act, fp, GS, Gs, Fs", rate,
             "GS", None, [*push, *slope])
         source += _slopes(w, "switching_gain", slope, "b, t, x, u, v, p, s, Gs")
+        shown = [(f"Hs[{r}, {k}]", e.diff(q))
+                 for r, e in enumerate(h) for k, q in enumerate(dynamic) if e.diff(q) != 0]
+        source += f"SHOWS_SIGNS = {bool(shown)}\n\n\n"
+        source += _slopes(w, "observe_gain", shown, "b, t, x, u, v, p, s, Hs", True)
     return source, lowered
 
 
@@ -279,7 +284,10 @@ def _rate(w: Writer, e: sp.Expr) -> sp.Expr:
     return total
 
 
-def _slopes(w: Writer, name: str, targets: Sequence[tuple[str, sp.Expr]], arguments: str) -> str:
-    splines = Splines(w, [e for _, e in targets])
-    body = w.unpack([*(e for _, e in targets), *splines.arguments]) + w.prelude(splines, [])
+def _slopes(w: Writer, name: str, targets: Sequence[tuple[str, sp.Expr]], arguments: str,
+            inline_switches: bool = False) -> str:
+    own = w.own_switches(inline_switches and bool(targets))
+    used = [*(e for _, e in targets), *own]
+    splines = Splines(w, used)
+    body = w.unpack([*used, *splines.arguments]) + w.prelude(splines, own)
     return _function(name, arguments, body + w.block(targets, splines))

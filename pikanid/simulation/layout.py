@@ -52,6 +52,7 @@ class Work(NamedTuple):
     G: np.ndarray
     Gs: np.ndarray
     Fs: np.ndarray
+    Hs: np.ndarray
     gS: np.ndarray
     GS: np.ndarray
     ds: np.ndarray

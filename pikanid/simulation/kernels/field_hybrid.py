@@ -51,6 +51,36 @@ def field_value(t, x, u, v, p, mode, w, f):
     rhs(w.bs, t, x, u, p, w.s, f)
 
 
+@called
+def sliding_signs(t, x, S, u, v, ud, p, act, sliding, w):
+    """Fill w.ds: how the signs of the sliding surfaces vary, from dG = 0; and w.Fs = ∂f/∂s."""
+    A = len(act)
+    w.Gs[:, :] = 0.0
+    w.Fs[:, :] = 0.0
+    switching_rate_sensitivity(w.bs, t, x, S, u, v, ud, p, w.s, act, w.rp, w.GS, w.Gs, w.Fs)
+    for i in range(sliding):
+        for j in range(sliding):
+            w.matrix[i, j] = w.Gs[w.index[i], w.index[j]]
+        for a in range(A):
+            w.ds[i, a] = -w.GS[w.index[i], a]
+    solve_small(w.matrix[:sliding, :sliding], w.ds[:sliding, :A])
+
+
+@called
+def show_signs(t, x, S, u, v, p, mode, act, w):
+    """Add to w.J what outputs see of the signs of sliding surfaces: a friction force, say."""
+    sliding = sliding_indices(mode, w.index)
+    if sliding == 0 or not SHOWS_SIGNS:
+        return
+    sliding_signs(t, x, S, u, v, w.ud, p, act, sliding, w)
+    w.Hs[:, :] = 0.0
+    observe_gain(w.bs, t, x, u, v, p, w.s, w.Hs)
+    for o in range(Q):
+        for i in range(sliding):
+            for a in range(len(act)):
+                w.J[o, a] += w.Hs[o, w.index[i]] * w.ds[i, a]
+
+
 @inlined
 def field(t, x, S, u, v, ud, p, mode, act, w, f, dS):
     """The right-hand side and its variation; on a sliding surface s varies too: dG = 0."""
@@ -63,15 +93,7 @@ def field(t, x, S, u, v, ud, p, mode, act, w, f, dS):
     sliding = sliding_indices(mode, w.index)
     if sliding == 0:
         return
-    w.Gs[:, :] = 0.0
-    w.Fs[:, :] = 0.0
-    switching_rate_sensitivity(w.bs, t, x, S, u, v, ud, p, w.s, act, w.rp, w.GS, w.Gs, w.Fs)
-    for i in range(sliding):
-        for j in range(sliding):
-            w.matrix[i, j] = w.Gs[w.index[i], w.index[j]]
-        for a in range(A):
-            w.ds[i, a] = -w.GS[w.index[i], a]
-    solve_small(w.matrix[:sliding, :sliding], w.ds[:sliding])
+    sliding_signs(t, x, S, u, v, ud, p, act, sliding, w)
     for r in range(N):
         for i in range(sliding):
             push = w.Fs[r, w.index[i]]

@@ -4,6 +4,11 @@ def signs(t, x, u, v, p, mode, w):
 
 
 @inlined
+def show_signs(t, x, S, u, v, p, mode, act, w):
+    """Outputs of a smooth model show no signs."""
+
+
+@inlined
 def field_value(t, x, u, v, p, mode, w, f):
     """The right-hand side."""
     rhs(w.bs, t, x, u, p, mode, f)

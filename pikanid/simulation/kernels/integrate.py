@@ -13,6 +13,7 @@ def record(i, t, x, S, u, v, p, mode, act, w, seen, moves, dtau_in, dtau_out, Y,
             Y[row] = w.y[o]
             continue
         observe_sensitivity(w.bs, t, x, S, u, w.ud, p, s, act, w.y, w.hp, w.J)
+        show_signs(t, x, S, u, v, p, mode, act, w)
         Y[row] = w.y[o]
         for a in range(A):
             J[row, a] = w.J[o, a]
