@@ -2,7 +2,8 @@
 
 Usage: python benchmarks/performance.py BENCHMARKS.json PERFORMANCE.md [TABLE.md ...]
 
-Further tables are appended as they are.  Ratios are against the entry that its group marks as the reference, measured in the same run.
+Ratios are against the entry that its group marks as the reference, measured in the same run.
+Further tables are appended as they are.
 """
 
 from __future__ import annotations
@@ -54,7 +55,8 @@ def _table(name: str, entries: list[dict[str, Any]]) -> list[str]:
     base = next((e["stats"]["median"] for e in entries if e["extra_info"].get("reference")), None)
     notes = sorted({k for e in entries for k in e["extra_info"] if k != "reference"})
     head = ["", "median", "spread (IQR)", "ratio", *notes]
-    lines = [f"## {name}", "", "| " + " | ".join(head) + " |", "| --- |" + " ---: |" * (len(head) - 1)]
+    rule = "| --- |" + " ---: |" * (len(head) - 1)
+    lines = [f"## {name}", "", "| " + " | ".join(head) + " |", rule]
     for e in sorted(entries, key=lambda e: e["stats"]["median"]):
         s = e["stats"]
         ratio = f"{s['median'] / base:.2f}" if base else ""

@@ -1,7 +1,8 @@
 """Hand-written references for the slosh fit, each the way an expert would write it for this model.
 
-They share the problem (Eq. 6, Table II, N = 501, σ = 0.1°), the start [0.06, 0.05] and the optimiser
-(MINPACK through `scipy.optimize.least_squares`), and differ in how they integrate and differentiate.
+They share the problem (Eq. 6, Table II, N = 501, σ = 0.1°), the start [0.06, 0.05] and the
+optimiser (MINPACK through `scipy.optimize.least_squares`), and differ in how they integrate and
+differentiate.
 """
 
 from __future__ import annotations
@@ -23,17 +24,17 @@ Simulation = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @njit(cache=True, error_model="numpy")
-def _numba_rk4(l, d, u, y, J):  # type: ignore[no-untyped-def]
+def _numba_rk4(length, d, u, y, J):  # type: ignore[no-untyped-def]
     th = om = a0 = a1 = b0 = b1 = 0.0
     for i in range(len(u)):
         xs, vs, p0, p1, q0, q1 = th, om, a0, a1, b0, b1
         s0 = s1 = s2 = s3 = s4 = s5 = 0.0
         for stage in range(4):
             s, c = math.sin(xs), math.cos(xs)
-            k1 = u[i] / l * c - GRAVITY / l * s - d / MASS * vs * c * c
-            f0 = -u[i] / l * s - GRAVITY / l * c + 2.0 * d / MASS * vs * c * s
+            k1 = u[i] / length * c - GRAVITY / length * s - d / MASS * vs * c * c
+            f0 = -u[i] / length * s - GRAVITY / length * c + 2.0 * d / MASS * vs * c * s
             f1 = -d / MASS * c * c
-            ka = f0 * p0 + f1 * p1 - (u[i] * c - GRAVITY * s) / (l * l)
+            ka = f0 * p0 + f1 * p1 - (u[i] * c - GRAVITY * s) / (length * length)
             kb = f0 * q0 + f1 * q1 - vs * c * c / MASS
             w = 1.0 if stage == 0 or stage == 3 else 2.0
             s0 += w * vs
@@ -74,15 +75,15 @@ def dop853() -> Simulation:
     times = np.arange(COUNT) * STEP
 
     def simulate(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        l, d = p
+        length, d = p
 
         def field(t: float, z: np.ndarray, u: float) -> list[float]:
             x, v, p0, p1, q0, q1 = z
             s, c = math.sin(x), math.cos(x)
-            f0 = -u / l * s - GRAVITY / l * c + 2 * d / MASS * v * c * s
+            f0 = -u / length * s - GRAVITY / length * c + 2 * d / MASS * v * c * s
             f1 = -d / MASS * c * c
-            return [v, u / l * c - GRAVITY / l * s - d / MASS * v * c * c,
-                    p1, f0 * p0 + f1 * p1 - (u * c - GRAVITY * s) / l**2,
+            return [v, u / length * c - GRAVITY / length * s - d / MASS * v * c * c,
+                    p1, f0 * p0 + f1 * p1 - (u * c - GRAVITY * s) / length**2,
                     q1, f0 * q0 + f1 * q1 - v * c * c / MASS]
 
         z, out = np.zeros(6), np.zeros((COUNT, 6))
@@ -98,7 +99,7 @@ def dop853() -> Simulation:
 
 
 def casadi_rk4() -> Simulation:
-    """CasADi: symbolic Runge-Kutta mapped over the grid, its Jacobian by algorithmic differentiation."""
+    """CasADi: symbolic Runge-Kutta mapped over the grid, differentiated algorithmically."""
     import casadi as ca
 
     x, u, p = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("p", 2)

@@ -1,4 +1,4 @@
-"""One NLS start at N = 501: ours against hand-written references that share problem and optimiser."""
+"""One NLS start at N = 501: ours beside hand-written references of problem and optimiser."""
 
 from __future__ import annotations
 

@@ -38,6 +38,7 @@ def through_nodes(layer: Layer, adjoint: Array, factor: Array) -> Array:
 
 
 def read_layer(kan: Any, plan: KanPlan, number: int) -> Layer:
+    """One layer of a pykan model as arrays, ready to be evaluated."""
     edges, knots, k = kan.act_fun[number], plan.knots[number], plan.k
     if float(kan.symbolic_fun[number].mask.abs().sum()) > 0.0:
         raise errors.BadSetting(errors.kan_symbolic(number))
