@@ -121,7 +121,7 @@ def map_output(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
     if function is not None:
         value = read(function, "function").xreplace({symbol(name): value})
     if clip is not None:
-        if isinstance(clip, str) or len(clip) != 2:
+        if not isinstance(clip, list | tuple) or len(clip) != 2:
             raise errors.BadModel(errors.bad_value(f"The clip of {where}", clip, "[lo, hi]"))
         value = expression_functions.clip(value, read(clip[0], "clip"), read(clip[1], "clip"))
     changed = dataclasses.replace(

@@ -80,11 +80,11 @@ def _check_names(model: Model) -> None:
         if seen.get(name) in ("input", "spline"):
             raise errors.BadModel(errors.duplicate_name(name, seen[name], "output"))
     for spline in model.splines:
-        if spline.degree < 1 or spline.size < 1 or any(
+        if spline.degree < 1 or spline.size < 1 or not all(map(math.isfinite, spline.knots)) or any(
                 b < a for a, b in zip(spline.knots, spline.knots[1:], strict=False)):
             raise errors.BadModel(errors.bad_value(
                 f"Spline '{spline.name}'", f"degree {spline.degree}, {len(spline.knots)} knots",
-                "of degree >= 1 with at least degree + 2 non-decreasing knots"))
+                "of degree >= 1 with at least degree + 2 finite, non-decreasing knots"))
 
 
 _NODES = (sp.Add, sp.Mul, sp.Pow, sp.Symbol, sp.Rational, sp.Float, sp.exp, type(sp.pi), type(sp.E),

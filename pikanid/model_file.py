@@ -73,7 +73,10 @@ def save(model: Model, path: str | os.PathLike[str]) -> None:
 def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
     """Build a `Model` from the file's content; `source` names it in error messages."""
     _known_keys(content, SECTIONS, source, "the file")
-    tables = {name: _table(content, name, source) for name in KEYS}
+    tables = {section: _table(content, section, source) for section in KEYS}
+    title = content.get("name", Path(source).stem)
+    if not isinstance(title, str):
+        raise errors.BadModel(errors.bad_value(f"'{source}': the name", title, "text in quotes"))
     if not isinstance(content.get("equations", {}), Mapping):
         raise errors.BadModel(errors.bad_value(f"'{source}': [equations]", "no table", "a table"))
     splines = tuple(_spline(n, e, source) for n, e in tables["splines"].items())
@@ -99,7 +102,7 @@ def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
         return sp.Float(_number(value, where)) if value else sp.Integer(0)
 
     model = Model(
-        name=str(content.get("name", Path(source).stem)),
+        name=title,
         states=tuple(_state(n, e, formula) for n, e in tables["states"].items()),
         inputs=tuple(_input(n, e) for n, e in tables["inputs"].items()),
         parameters=tuple(parameters.values()),
@@ -125,8 +128,8 @@ def to_dict(model: Model) -> dict[str, Any]:
             "delay": None if i.delay == 0 else _plain(i.delay)}) for i in model.inputs}
     if model.parameters:
         content["parameters"] = {p.name: _drop({
-            "unit": p.unit, ("guess" if p.free else "value"): p.value,
-            "bounds": None if p.bounds == (-math.inf, math.inf) else list(p.bounds),
+            "unit": p.unit, ("guess" if p.free else "value"): float(p.value),
+            "bounds": None if p.bounds == (-math.inf, math.inf) else [float(b) for b in p.bounds],
             "scope": None if p.scope == "shared" else p.scope,
             "description": p.description}) for p in model.parameters}
     content["equations"] = {n: to_text(e) for n, e in model.equations.items()}
@@ -134,7 +137,7 @@ def to_dict(model: Model) -> dict[str, Any]:
         "unit": o.unit, "expression": to_text(o.expression), "sigma": o.sigma,
         "delay": None if o.delay == 0 else _plain(o.delay)}) for o in model.outputs}
     if model.splines:
-        content["splines"] = {s.name: {"degree": s.degree, "knots": list(s.knots)}
+        content["splines"] = {s.name: {"degree": s.degree, "knots": [float(k) for k in s.knots]}
                               for s in model.splines}
     return content
 

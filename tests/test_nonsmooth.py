@@ -200,7 +200,7 @@ def test_dry_friction_on_both_axes() -> None:
 
 
 def test_block_on_a_block_on_the_ground() -> None:
-    """Two friction surfaces of which each carries the other's force, sticking singly and together."""
+    """Two friction surfaces that carry each other's force, sticking singly and together."""
     model = Model.from_dict({
         "states": {"x": {}, "v": {}, "y": {}, "w": {}}, "inputs": {"F": {}},
         "parameters": {"mu": {"guess": 1.0}, "nu": {"guess": 0.6}, "k": {"guess": 4.0}},
