@@ -7,5 +7,12 @@ from importlib.util import find_spec
 collect_ignore_glob = (
     []
     if find_spec("torch") and find_spec("kan")
-    else ["pikanid/approximators/kan/*.py", "pikanid/equivalence/*.py"]
+    else [
+        "pikanid/approximators/kan/*.py",
+        "pikanid/approximators/mlp.py",
+        "pikanid/equivalence/*.py",
+        "pikanid/optimise/gradient*.py",
+        "pikanid/simulation/torch_field.py",
+        "pikanid/strategies/pinn*.py",
+    ]
 )

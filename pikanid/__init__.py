@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pikanid.model import Input, Model, Output, Parameter, State
     from pikanid.recording import Channel, Recording
     from pikanid.simulation import simulate
-    from pikanid.strategies import IPDA, NLS, PDA, PIKAN
+    from pikanid.strategies import IPDA, NLS, PDA, PIKAN, PINN
 
 
 # Name -> the module that defines it; None where the name is itself a module of the package.
@@ -37,6 +37,7 @@ _HOMES: dict[str, str | None] = {
     "NLS": "pikanid.strategies",
     "PDA": "pikanid.strategies",
     "IPDA": "pikanid.strategies",
+    "PINN": "pikanid.strategies",
     "PIKAN": "pikanid.strategies",
     "simulate": "pikanid.simulation",
     "systems": None,
@@ -57,6 +58,7 @@ __all__ = [
     "NLS",
     "PDA",
     "IPDA",
+    "PINN",
     "PIKAN",
     "simulate",
     "systems",

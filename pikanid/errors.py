@@ -292,8 +292,8 @@ def header_twice(where: str, header: str) -> str:
 def no_time(where: str, known: Iterable[str]) -> str:
     return (
         f"'{where}' has no time column among: {_listed(known)}. Name it "
-        "(--column t=COLUMN, in Python columns={'t': 'its header'}) or give the sampling rate in Hz "
-        "(--rate, in Python rate=)."
+        "(--column t=COLUMN, in Python columns={'t': 'its header'}) or give the sampling rate "
+        "in Hz (--rate, in Python rate=)."
     )
 
 
@@ -506,8 +506,8 @@ def kan_not_shallow(width: object) -> str:
 
 def kan_not_a_curve(width: object) -> str:
     return (
-        f"A KAN of width {width} is no curve over time: it needs one input, one output and no masked "
-        "edges, as in (1, 5, 1)."
+        f"A KAN of width {width} is no curve over time: it needs one input, one output and no "
+        "masked edges, as in (1, 5, 1)."
     )
 
 
@@ -694,12 +694,15 @@ def covariance_unknown() -> str:
 
 def curve_misleads(name: str, value: float, reference: float, std: float, residual: float,
                    unit: str) -> str:
-    apart = abs(value - reference) / std if std > 0 else float("inf")
+    share = abs(value - reference) / max(abs(reference), 1e-300)
+    errors_apart = abs(value - reference) / std if std > 0 else float("inf")
+    # On clean data every difference is any number of standard errors.
+    how = (f"{errors_apart:.2g} standard errors" if errors_apart < 1e4 else f"{100 * share:.2g} %")
     return (
         f"The loss is low (the curve is within {residual:.2g} of the data) but '{name}' is not "
         f"where the data want it: {value:.5g} {unit}".rstrip()
-        + f" here, {reference:.5g} ± {std:.1g} by simulation from here (NLS), {apart:.2g} standard "
-        "errors apart. The curve has absorbed the difference: trust NLS."
+        + f" here, {reference:.5g} by simulation from here (NLS), {how} apart. The curve has "
+        "absorbed the difference: trust NLS."
     )
 
 
@@ -795,7 +798,7 @@ def reversed_window(start: float, stop: float) -> str:
 
 
 def nothing_free(model: str) -> str:
-    return f"Every parameter of '{model}' is fixed, so there is nothing to identify: use --free NAME."
+    return f"Every parameter of '{model}' is fixed: free one to identify (--free NAME)."
 
 
 def output_ending(option: str, path: str, endings: Sequence[str]) -> str:
@@ -842,8 +845,8 @@ def out_of_memory() -> str:
 
 def fit_diverged(where: str) -> str:
     return (
-        f"The fit broke down {where}, where the model's right-hand side or its cost was not finite: "
-        "the best iterate before that is kept. Try other guesses or bounds, or a larger first grid."
+        f"The fit broke down {where}, where the model's right-hand side or its cost was not "
+        "finite: the best iterate before that is kept. Try other guesses or bounds, or a larger first grid."
     )
 
 

@@ -99,6 +99,19 @@ class Descent:
         return self.data + self.lam * self.physics
 
 
+def present(device: str) -> bool:
+    """Whether torch has this device.
+
+    >>> present("cpu"), present("abacus")
+    (True, False)
+    """
+    try:
+        kind = torch.device(device).type
+    except RuntimeError:
+        return False
+    return kind == "cpu" or (kind == "cuda" and torch.cuda.is_available())
+
+
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Run torch on one thread meanwhile: layers this small lose time, or hang on busy cores, on two.

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from pikanid.approximators import Array
@@ -111,6 +112,12 @@ class TorchFunctional:
         none = np.full(sum(self.sizes[:-1]), np.inf)
         return (np.concatenate([-none, problem.lower / self.unit]),
                 np.concatenate([none, problem.upper / self.unit]))
+
+    def data_rows(self) -> NDArray[np.bool_]:
+        """Which rows of `residual` belong to samples."""
+        marks = [np.full(sites.weight.size, sites.target is not None)
+                 for r in range(len(self.free)) for sites in self.functional.families(r)]
+        return np.concatenate(marks)
 
     def residual(self, z: Array, lam: float) -> Array:
         """Stacked residual [data; √λ·physics] (rows,) at z, recording after recording."""

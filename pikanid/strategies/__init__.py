@@ -1,7 +1,7 @@
 """The identification strategies: one method a file, one result type.
 
-NLS shoots (Eq. 1); PDA, iPDA and PIKAN relax the ODE (Eq. 2, Table I).  Classes are imported when
-they are first used.
+NLS shoots (Eq. 1); PDA, iPDA, PINN and PIKAN relax the ODE (Eq. 2, Table I).  Classes are imported
+when they are first used.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from pikanid.strategies.nls import NLS
     from pikanid.strategies.pda import PDA
     from pikanid.strategies.pikan import PIKAN
+    from pikanid.strategies.pinn import PINN
 
-__all__ = ["IPDA", "NLS", "PDA", "PIKAN", "STRATEGIES", "strategy"]
+__all__ = ["IPDA", "NLS", "PDA", "PIKAN", "PINN", "STRATEGIES", "strategy"]
 
 # name on the command line -> class; in the order of the paper's tables
-STRATEGIES = {"nls": "NLS", "pda": "PDA", "ipda": "IPDA", "pikan": "PIKAN"}
+STRATEGIES = {"nls": "NLS", "pda": "PDA", "ipda": "IPDA", "pinn": "PINN", "pikan": "PIKAN"}
 
 
 def strategy(name: str) -> Any:
