@@ -518,6 +518,13 @@ def kan_order(order: int, highest: int) -> str:
     )
 
 
+def kan_kinks(count: int, most: int) -> str:
+    return (
+        f"The inputs switch so often that a deep KAN would need {count} kinks beside it, more than "
+        f"{most}: use a shallow one, width=(1, 1)."
+    )
+
+
 def kan_device(device: str, detail: str) -> str:
     return f"device = '{device}' cannot hold a KAN ({detail}): use device='cpu'."
 
@@ -846,7 +853,8 @@ def out_of_memory() -> str:
 def fit_diverged(where: str) -> str:
     return (
         f"The fit broke down {where}, where the model's right-hand side or its cost was not "
-        "finite: the best iterate before that is kept. Try other guesses or bounds, or a larger first grid."
+        "finite: the best iterate before that is kept. Try other guesses or bounds, or a larger "
+        "first grid."
     )
 
 
