@@ -81,7 +81,7 @@ def _key(model: Model, method: Method) -> str:
     parts = [method, _generator_version(), *model.state_names, "|", *model.input_names, "|",
              *model.parameter_names, "|", *map(to_text, model.equations.values()), "|",
              *(to_text(o.expression) for o in model.outputs), "|", repr(model.splines),
-             *(to_text(i.delay) for i in model.inputs)]
+             f"moving delays: {any(i.delay.free_symbols for i in model.inputs)}"]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:24]
 
 

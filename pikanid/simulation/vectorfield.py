@@ -127,7 +127,7 @@ class _Functions:
                 jp[:, row, column - n] = value
         for (row, index, order), z, weight in zip(
                 edges, values[len(places):len(places) + len(edges)],
-                values[len(places) + len(edges):-1], strict=True):
+                values[len(places) + len(edges):len(places) + 2 * len(edges)], strict=True):
             spline = self.model.splines[index]
             first = self.model.parameter_names.index(spline.coefficient_names[0])
             basis = _basis(spline.knots, spline.degree, np.broadcast_to(z, (count,)), order)
