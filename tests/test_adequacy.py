@@ -1,0 +1,92 @@
+"""The χ² verdict: its false-alarm rate, its power, and noise found from differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binom, chi2
+
+from pikanid.adequacy import difference_noise, judge
+
+
+def test_value_and_probability_are_those_of_the_chi_square() -> None:
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(0, 2.0, 100), rng.normal(0, 0.1, 40)
+    found = judge([a, b], [np.full(100, 2.0), np.full(40, 0.1)], [a, b], 3)
+    value = np.sum((a / 2.0) ** 2) + np.sum((b / 0.1) ** 2)
+    assert found.value == pytest.approx(value)
+    assert found.dof == 137
+    assert found.p_value == pytest.approx(chi2.sf(value, 137), rel=1e-9)
+    assert (found.verdict, found.source) == ("fits", "given")
+
+
+def test_right_models_are_blamed_as_often_as_stated() -> None:
+    rng, runs, alpha = np.random.default_rng(1), 4000, 0.05
+    blamed = sum(judge([r], [np.ones(50)], [r], 0, alpha).verdict == "misfit"
+                 for r in rng.normal(size=(runs, 50)))
+    assert binom.ppf(0.0005, runs, alpha) <= blamed <= binom.ppf(0.9995, runs, alpha)
+
+
+@pytest.mark.parametrize(("n", "factor"), [(51, 1.5), (501, 1.15), (5001, 1.05)])
+def test_a_systematic_residual_is_found(n: int, factor: float) -> None:
+    r = np.random.default_rng(2).normal(0, factor, n)
+    assert judge([r], [np.ones(n)], [r], 2).verdict == "misfit"
+
+
+def test_nothing_measured_is_unknown() -> None:
+    none = np.empty(0)
+    assert judge([none], [none], [none], 2).verdict == "unknown"
+    assert judge([], [], [], 0).verdict == "unknown"
+
+
+def test_no_more_samples_than_parameters_leaves_one_degree_of_freedom() -> None:
+    r = np.zeros(3)
+    found = judge([r], [np.ones(3)], [r], 5)
+    assert (found.dof, found.p_value, found.verdict) == (1, 1.0, "fits")
+
+
+def test_unknown_noise_is_taken_from_the_recording() -> None:
+    t = np.arange(1000) * 0.01
+    noise = np.random.default_rng(3).normal(0, 0.02, 1000)
+    y = np.sin(3 * t) + noise
+    assert judge([noise], [None], [y], 2).verdict == "fits"
+    assert judge([noise], [None], [y], 2).source == "differences"
+    assert judge([noise + 0.1 * np.sin(3 * t)], [None], [y], 2).verdict == "misfit"
+
+
+def test_one_known_and_one_unknown_noise() -> None:
+    t = np.arange(500) * 0.01
+    rng = np.random.default_rng(4)
+    a, b = rng.normal(0, 1.0, 500), rng.normal(0, 0.01, 500)
+    data = [np.sin(t) * 50 + a, np.cos(t) + b]
+    assert judge([a, b], [np.ones(500), None], data, 2).verdict == "fits"
+    assert judge([a, 10 * b], [np.ones(500), None], data, 2).verdict == "misfit"
+
+
+def test_exact_data_fits_where_the_residual_is_rounding() -> None:
+    t = np.linspace(0, 5, 501)
+    y = np.exp(-t) * np.sin(9 * t)
+    assert judge([1e-12 * np.sin(50 * t)], [None], [y], 2).verdict == "fits"
+
+
+@settings(max_examples=30)
+@given(st.floats(1e-6, 1e3), st.integers(0, 10**6), st.floats(-3, 3), st.floats(-3, 3))
+def test_differences_find_the_noise_on_a_smooth_curve(sigma: float, seed: int, a: float,
+                                                      b: float) -> None:
+    """Whatever cubic lies below; the median of 2000 differences is good to 10 % (5 std)."""
+    t = np.linspace(-1, 1, 2000)
+    y = sigma * (np.random.default_rng(seed).normal(size=2000)
+                 + 100 * (a * t + b * t**3) + 1e3 * t**2)
+    assert difference_noise(y) == pytest.approx(sigma, rel=0.15)
+
+
+def test_differences_are_not_fooled_by_a_few_jumps() -> None:
+    t = np.linspace(0, 1, 2000)
+    y = np.random.default_rng(5).normal(0, 0.1, 2000) + 30 * (t > 0.3) - 50 * (t > 0.7)
+    assert difference_noise(y) == pytest.approx(0.1, rel=0.15)
+
+
+def test_short_signals_have_their_spread_for_noise() -> None:
+    assert difference_noise(np.array([1.0, 3.0])) == 1.0
