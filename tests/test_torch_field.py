@@ -29,7 +29,8 @@ def made(formula: str, **extra: object) -> pk.Model:
         "name": "test", "states": {"x": {}, "v": {}}, "inputs": {"u": {}},
         "parameters": {"a": {"guess": 0.7}, "b": {"guess": 0.6}, **extra.pop("parameters", {})},
         "equations": {"x": "v", "v": formula},
-        "outputs": {"y": {"expression": f"x + 0.5*({formula})"}, "z": {"expression": "x"}}, **extra})
+        "outputs": {"y": {"expression": f"x + 0.5*({formula})"}, "z": {"expression": "x"}},
+        **extra})
 
 
 def points(model: pk.Model, count: int = 40) -> tuple[np.ndarray, ...]:

@@ -1,19 +1,21 @@
-"""A multi-layer perceptron with tanh units as a trajectory: x̂(t) = offset + scale·N(τ), τ ∈ [-1, 1].
+"""A multi-layer perceptron of tanh units as a trajectory: x̂(t) = offset + scale·N(τ), |τ| <= 1.
 
-Time derivatives are carried forward through the layers as a jet (value, first, ..., m-th derivative):
-one pass forwards and one backwards give the gradient of any function of all of them, without
-nested differentiation.  With z = (z, z', z'') before a unit and a = tanh z, s = 1 - a²:
+Time derivatives are carried forward through the layers as a jet (value, first, ... derivative): one
+pass forwards and one backwards give the gradient of any function of all of them, without nested
+differentiation.  With z = (z, z', z'') before a unit and a = tanh z, s = 1 - a²:
 
     a' = s z',    a'' = s z'' - 2 a z' a'.
 
-Two additions are optional: an initial state that holds exactly, because the network is multiplied by
-a gate that leaves t = start flat, and kinks where an input switches, which no smooth unit can follow.
+Two additions are optional: an initial state that holds exactly, because the network is multiplied
+by a gate that is flat at the start, and kinks where an input switches, which no smooth unit can
+follow.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import pairwise
 from math import comb, factorial
 from typing import Any
 
@@ -23,6 +25,7 @@ from numpy.polynomial import Polynomial
 from torch import Tensor
 
 from pikanid.approximators import Array
+from pikanid.approximators.decaying import Decaying, exponential
 
 KINK_ORDERS = 3  # a switch shows in the m-th derivative and, less and less, in the next ones
 
@@ -73,7 +76,7 @@ class MLP:
     def shapes(self) -> tuple[tuple[int, ...], ...]:
         """Shapes of weights and biases, layer by layer."""
         widths = (1, *self.hidden, 1)
-        return tuple(shape for a, b in zip(widths[:-1], widths[1:], strict=True)
+        return tuple(shape for a, b in pairwise(widths)
                      for shape in ((a, b), (b,)))
 
     @property
@@ -104,17 +107,18 @@ class MLP:
 
     def at(self, t: Array, order: int | None = None) -> MLPAt:
         """The network at fixed times t (M,), ready to be evaluated for many coefficients."""
-        return MLPAt(self, t, self.order if order is None else order)
+        t = np.ascontiguousarray(t, dtype=float)
+        return _at(self, t.tobytes(), self.order if order is None else order)
 
     def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
         """The `derivative`-th time derivative at t (M,), shape (M,)."""
         with torch.no_grad():
-            jet = self.at(np.asarray(t, float), derivative).jet(self._tensor(coefficients))
+            jet = self.at(t, derivative).jet(self._tensor(coefficients))
         return jet[derivative].cpu().numpy()
 
     def jacobian(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
         """Derivative of `values` with respect to the coefficients, shape (M, n)."""
-        table = self.at(np.asarray(t, float), derivative)
+        table = self.at(t, derivative)
         return table.jacobians(self._tensor(coefficients), (derivative,))[0].cpu().numpy()
 
     def _tensor(self, values: Array) -> Tensor:
@@ -196,6 +200,12 @@ class MLPAt:
         return rows
 
 
+@lru_cache(maxsize=64)
+def _at(net: MLP, times: bytes, order: int) -> MLPAt:
+    """Kept, because an optimiser asks for the same times again and again."""
+    return MLPAt(net, np.frombuffer(times), order)
+
+
 def _activated(sums: Tensor, bias: Tensor) -> Tensor:
     """Jet of tanh(z + bias) from the jet of z (order + 1, M, units)."""
     if sums.shape[0] <= 3:
@@ -262,47 +272,20 @@ def _product(left: Tensor, right: Tensor) -> Tensor:
     return torch.stack(terms)
 
 
-@dataclass(frozen=True)
-class _Decaying:
-    """size·P(s)·e^{-s} + constant for s = rate·(t - centre) >= 0, zero before."""
-
-    polynomial: Polynomial
-    rate: float
-    centre: float
-    size: float = 1.0
-    constant: float = 0.0
-
-    def jet(self, t: Array, order: int) -> Array:
-        """Value and derivatives (order + 1, M), from the right at the centre."""
-        s = self.rate * (t - self.centre)
-        after, decay = s >= 0.0, np.exp(-np.maximum(s, 0.0))
-        polynomial, rows = self.polynomial, []
-        for k in range(order + 1):
-            value = self.size * self.rate**k * polynomial(np.maximum(s, 0.0)) * decay
-            rows.append(np.where(after, value + (self.constant if k == 0 else 0.0), 0.0))
-            polynomial = polynomial.deriv() - polynomial
-        return np.array(rows)
-
-
-def _exponential(terms: int) -> Polynomial:
-    """Σ_{j<terms} s^j/j!: times e^{-s} it is 1 up to s^terms."""
-    return Polynomial([1.0 / factorial(j) for j in range(terms)])
-
-
-def _gate(net: MLP) -> _Decaying:
+def _gate(net: MLP) -> Decaying:
     """Rises from 0 to 1; it and its m - 1 derivatives are zero at the start."""
-    return _Decaying(-_exponential(net.order), net.rate, net.start, constant=1.0)
+    return Decaying(-exponential(net.order), net.rate, net.start, constant=1.0)
 
 
-def _linear_curves(net: MLP) -> list[_Decaying]:
+def _linear_curves(net: MLP) -> list[Decaying]:
     """One curve a leading coefficient: initial jet, then kinks."""
     curves = []
     for q in range(net.order * net.anchored):
         power = Polynomial([*np.zeros(q), 1.0 / factorial(q)])
-        curves.append(_Decaying(power * _exponential(net.order - q), net.rate, net.start,
+        curves.append(Decaying(power * exponential(net.order - q), net.rate, net.start,
                                 size=net.rate**-q))
     for centre in net.kinks:
         for q in range(net.order, net.order + KINK_ORDERS):
             power = Polynomial([*np.zeros(q), 1.0 / factorial(q)])
-            curves.append(_Decaying(power, net.rate, centre, size=net.scale))
+            curves.append(Decaying(power, net.rate, centre, size=net.scale))
     return curves

@@ -62,8 +62,9 @@ def levenberg_marquardt(residual: Residual, linearised: Linearised, start: Array
         held = (z <= lower) & (slope > 0.0) | (z >= upper) & (slope < 0.0)
         norms = np.einsum("ij,ij->j", jacobian, jacobian)
         scale = np.where(held, np.inf, np.maximum(norms, FLOOR * norms.mean() + 1e-300))
+        system = _Damped(jacobian, r, scale)
         while True:
-            step = _damped_step(jacobian, r, damping * scale)
+            step = system.step(damping)
             trial = np.clip(z + step, lower, upper)
             with np.errstate(all="ignore"):
                 there = residual(trial)
@@ -83,21 +84,25 @@ def levenberg_marquardt(residual: Residual, linearised: Linearised, start: Array
     return Solution(z, r, jacobian, count, False, damping)
 
 
-def _damped_step(jacobian: Array, r: Array, penalty: Array) -> Array:
-    """-(JᵀJ + diag(penalty))⁻¹ Jᵀ r; an infinite penalty holds its entry."""
-    rows, columns = jacobian.shape
-    inverse = 1.0 / penalty
-    try:
-        if rows < columns:
-            # (JᵀJ + D)⁻¹ Jᵀ = D⁻¹ Jᵀ (J D⁻¹ Jᵀ + 1)⁻¹
-            weighted = jacobian * inverse
-            gram = weighted @ jacobian.T
-            gram[np.diag_indices(rows)] += 1.0
-            return -weighted.T @ cho_solve(cho_factor(gram, check_finite=False), r)
-        root = np.sqrt(inverse)
-        scaled = jacobian * root
-        gram = scaled.T @ scaled
-        gram[np.diag_indices(columns)] += 1.0
-        return -root * cho_solve(cho_factor(gram, check_finite=False), scaled.T @ r)
-    except LinAlgError:
-        return np.zeros(columns)
+class _Damped:
+    """-(JᵀJ + μ diag(scale))⁻¹ Jᵀ r for any μ; an infinite scale holds its entry.
+
+    With A = J·scale^-½ it is -scale^-½ (AᵀA + μ)⁻¹ Aᵀ r = -scale^-½ Aᵀ (AAᵀ + μ)⁻¹ r.
+    """
+
+    def __init__(self, jacobian: Array, r: Array, scale: Array):
+        self.root = 1.0 / np.sqrt(scale)
+        self.scaled = jacobian * self.root
+        self.wide = jacobian.shape[0] < jacobian.shape[1]
+        self.gram = self.scaled @ self.scaled.T if self.wide else self.scaled.T @ self.scaled
+        self.pull = r if self.wide else self.scaled.T @ r
+
+    def step(self, damping: float) -> Array:
+        """The step (n,); zero where rounding leaves nothing to solve, so that it is refused."""
+        matrix = self.gram.copy()
+        matrix[np.diag_indices_from(matrix)] += damping
+        try:
+            solved = cho_solve(cho_factor(matrix, overwrite_a=True, check_finite=False), self.pull)
+        except LinAlgError:
+            return np.zeros(self.root.size)
+        return -self.root * (self.scaled.T @ solved if self.wide else solved)

@@ -114,7 +114,7 @@ def present(device: str) -> bool:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Run torch on one thread meanwhile: layers this small lose time, or hang on busy cores, on two.
+    """Run torch on one thread meanwhile: layers this small lose time on two, much on busy cores.
 
     The number of threads is as before afterwards.
     """
@@ -210,7 +210,8 @@ def lbfgs(loss: Loss, start: Array, *, steps: int, lam: float, lower: Array | No
             history.append(_report(count, lam, parts_of_best, progress))
 
     bounds = None if lower is None or upper is None else list(zip(lower, upper, strict=True))
-    found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, callback=tell,
+    found = minimize(  # type: ignore[call-overload]  # jac=True is not in its stubs
+        cost, start, jac=True, method="L-BFGS-B", bounds=bounds, callback=tell,
                      options={"maxiter": steps, "maxfun": 4 * steps, "maxls": 40, "ftol": 1e-15,
                               "gtol": 1e-12, "maxcor": memory})
     finished = bool(found.status == 0) and not broken

@@ -6,7 +6,7 @@ in units of its guess, so that all entries are of the order of one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,25 +70,35 @@ class TorchFunctional:
 
     def __call__(self, z: Tensor) -> tuple[Tensor, Tensor]:
         """Data and physics part at z (n,)."""
+        data, physics = z.new_zeros(()), z.new_zeros(())
+        for families in self._residuals(z):
+            *seen, equation = families
+            for residual in seen:
+                data = data + residual.square().sum()
+            physics = physics + equation.square().sum()
+        return data / self.functional.n_data, physics / self.functional.n_data
+
+    def _residuals(self, z: Tensor) -> Iterator[list[Tensor]]:
+        """For every recording its weighted residuals: data families, then physics without λ."""
         *pieces, scaled = torch.split(z, self.sizes)
         theta = (scaled * self._unit).unbind()
-        data, physics = z.new_zeros(()), z.new_zeros(())
         chains = self.functional.chains
         for r, own in enumerate(pieces):
             p: list[Tensor | float] = list(self._fixed[r])
             for position, column in zip(*self.functional.problem.columns(r), strict=True):
                 p[position] = theta[column]
             jets = self._jets(r, own, p)
+            families = []
             for family in self.data[r]:
                 x = self._states([family.of(jet) for jet in jets])
                 y = self.field.outputs(family.t, x, family.u, p, only=(family.output,))
-                data = data + (family.weight * (y - family.target)).square().sum()
+                assert family.target is not None
+                families.append(family.weight * (y - family.target))
             family = self.physics[r]
             there = [family.of(jet) for jet in jets]
             f = self.field.rhs(family.t, self._states(there), family.u, p, only=chains.top)
             tops = torch.stack([jet[m] for jet, m in zip(there, chains.lengths, strict=True)], 1)
-            physics = physics + (family.weight * self._scale * (tops - f)).square().sum()
-        return data / self.functional.n_data, physics / self.functional.n_data
+            yield [*families, family.weight * self._scale * (tops - f)]
 
     def pack(self, point: Point) -> Array:
         """z (n,) of coefficients and θ."""
@@ -121,8 +131,11 @@ class TorchFunctional:
 
     def residual(self, z: Array, lam: float) -> Array:
         """Stacked residual [data; √λ·physics] (rows,) at z, recording after recording."""
-        point = self.unpack(z)
-        return self.functional.residual(point.coefficients, point.theta, lam)
+        rows = []
+        with torch.no_grad():
+            for *seen, equation in self._residuals(self._tensor(z)):
+                rows += [*seen, np.sqrt(lam) * equation]
+        return np.concatenate([row.cpu().numpy().ravel() for row in rows])
 
     def linearised(self, z: Array, lam: float) -> tuple[Array, Array]:
         """Residual (rows,) and its Jacobian (rows, n) by z.

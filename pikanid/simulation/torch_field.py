@@ -1,7 +1,7 @@
-"""Right-hand side and outputs of a model as torch functions, for strategies that descend gradients.
+"""Right-hand side and outputs of a model as torch functions, for descent along gradients.
 
-Generated from the same lowered formulas as `VectorField`, whose values they repeat; derivatives come
-from autograd.  A switch s = sgn g is constant between its jumps, where its gradient is zero.
+Generated from the same lowered formulas as `VectorField`, whose values they repeat; derivatives
+come from autograd.  A switch s = sgn g is constant between its jumps, where its gradient is zero.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ STEEP = 1e-9
 class TorchField:
     """Torch functions of a model.
 
-    Arguments: t (M,), x (M, n), u (M, m), p: all parameters in model order, as a tensor (P,) or as a
-    list of numbers and scalar tensors, of which the numbers cost no gradient.
+    Arguments: t (M,), x (M, n), u (M, m), p: all parameters in model order, as a tensor (P,) or as
+    a list of numbers and scalar tensors, of which the numbers cost no gradient.
 
     >>> from pikanid.systems import sloshing
     >>> field = TorchField(sloshing())

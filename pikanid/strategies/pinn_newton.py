@@ -2,16 +2,19 @@
 
 λ is raised whenever the physics residual costs less than a tenth of what the noise does (while the
 data are not yet met, of the geometric mean of both), and while the curve still follows the noise
-(less than the noise is left in the data: Morozov's discrepancy principle).  So λ ends where this network can just meet the physics, and no higher: beyond that it
-would trade the data for it and lock (1/l -> 0 minimises the physics alone).
+(less than the noise is left in the data: Morozov's discrepancy principle).  So λ ends where this
+network can just meet the physics, and no higher: beyond that it would trade the data for it and
+lock (1/l -> 0 minimises the physics alone).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from pikanid.approximators import Array
@@ -20,6 +23,7 @@ from pikanid.optimise.dense import levenberg_marquardt
 from pikanid.optimise.gradient_functional import TorchFunctional
 from pikanid.optimise.schedules import moved
 
+Mask = NDArray[np.bool_]
 Progress = Callable[[dict[str, float]], None]
 CHUNK = 10  # iterations at one λ
 WARMUP = 20  # in which only the curve moves
@@ -45,9 +49,13 @@ class Climb:
     history: tuple[dict[str, float], ...]
 
 
-def climb(loss: TorchFunctional, start: Array, *, noise: float, lam: float | None,
+def climb(loss: TorchFunctional, start: Array, *, noise: float, known: bool, lam: float | None,
           iterations: int, progress: Progress | None) -> Climb:
-    """Minimise Eq. (2) at rising λ, or at the given one, from `start` (n,)."""
+    """Minimise Eq. (2) at rising λ, or at the given one, from `start` (n,).
+
+    `noise` is the standard deviation of the data rows; where it is not `known`, it is what samples
+    that lie far apart make of the signal, and a closer fit corrects it downwards.
+    """
     lower, upper = loss.bounds()
     size = loss.functional.problem.guess.size
     held_lower, held_upper = lower.copy(), upper.copy()
@@ -58,9 +66,9 @@ def climb(loss: TorchFunctional, start: Array, *, noise: float, lam: float | Non
     used, calm, damping, move, history = 0, 0, 1e-3, np.inf, []
     std = np.full(size, np.inf)
     while used < iterations:
-        first, now = used == 0, weight
+        first = used == 0
         found = levenberg_marquardt(
-            lambda q, w=now: loss.residual(q, w), lambda q, w=now: loss.linearised(q, w), z,
+            partial(loss.residual, lam=weight), partial(loss.linearised, lam=weight), z,
             lower=held_lower if first else lower, upper=held_upper if first else upper,
             iterations=min(WARMUP if first else CHUNK, iterations - used), damping=damping)
         used += found.iterations
@@ -76,9 +84,11 @@ def climb(loss: TorchFunctional, start: Array, *, noise: float, lam: float | Non
         here, there = loss.unpack(before).theta, loss.unpack(z).theta
         std, old = np.sqrt(np.abs(np.nan_to_num(np.diag(cov)))), std
         move = moved(here, there, std, RELATIVE)
+        if not known and not first:
+            expected = min(expected, data)
         growth = 1.0 if lam is not None else float(np.clip(
             SHARE * np.sqrt(max(data, expected) * expected) / max(physics, 1e-300), 1.0, FASTEST))
-        if lam is None and data < OVERFIT * expected:
+        if lam is None and known and data < OVERFIT * expected:
             growth = max(growth, 3.0)
         # While standard errors still fall, a larger λ has more to tell.
         steady = move <= SETTLED and bool(np.all(std > FALLING * old))
@@ -90,13 +100,13 @@ def climb(loss: TorchFunctional, start: Array, *, noise: float, lam: float | Non
     return Climb(z, weight, used, move <= NEARLY, move, tuple(history))
 
 
-def _flat_noise(data_rows: Array, data: float, expected: float) -> Array:
+def _flat_noise(data_rows: Mask, data: float, expected: float) -> Array:
     """The same deviation for all data rows, from the cost."""
     count = int(np.count_nonzero(data_rows))
     return np.full(count, np.sqrt(max(min(data, 4.0 * expected), 1e-300) / count))
 
 
-def covariance(loss: TorchFunctional, jacobian: Array, data_rows: Array, noise: Array
+def covariance(loss: TorchFunctional, jacobian: Array, data_rows: Mask, noise: Array
                ) -> tuple[Array, float]:
     """Sandwich covariance (b, b) of θ and the number of parameters that the curve uses up.
 
