@@ -14,6 +14,8 @@ from typing import Annotated, Any, TextIO
 import typer
 
 from pikanid import errors
+from pikanid.commands.conceal import EXAMPLES as CONCEAL
+from pikanid.commands.conceal import conceal
 from pikanid.commands.equivalence import EXAMPLES as EQUIVALENCE
 from pikanid.commands.equivalence import equivalence
 from pikanid.commands.identify import EXAMPLES as IDENTIFY
@@ -48,6 +50,7 @@ app.command(epilog=SIMULATE)(simulate)
 app.command(epilog=MODELS)(models)
 app.command(epilog=STUDY)(study)
 app.command(epilog=EQUIVALENCE)(equivalence)
+app.command(epilog=CONCEAL)(conceal)
 
 
 @app.callback(invoke_without_command=True, epilog=EXAMPLES)

@@ -12,7 +12,6 @@ import numpy as np
 from pikanid import errors
 from pikanid.concealed import excitations, files
 from pikanid.concealed import noise as noises
-from pikanid.concealed.arrays import Array
 from pikanid.concealed.deck import FLOW, Card
 from pikanid.concealed.effect import Effect, Scales
 from pikanid.concealed.experiment import Experiment
@@ -101,11 +100,12 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     frequency = math.sqrt(base.gravity / base.length) / (2 * math.pi)
     train, held_out = excitations.pair(
         order.excitation, rng, frequency, lambda e: measured(base, e), swing)
-    scales = _scales(base, train)
+    scales = _scales(base, train, held_out)
     hidden = (_in_tank(tank) if tank
               else _in_rig(order.card, base, train, scales, noise, rng))
-    clean = {"train": measured(hidden.train, train), "held_out": measured(hidden.held_out, held_out)}
     experiments = {"train": train, "held_out": held_out}
+    clean = {"train": measured(hidden.train, train),
+             "held_out": measured(hidden.held_out, held_out)}
     recordings = {
         f"{order.name}_{key}.csv": files.csv(experiments[key], noise.spoilt(clean[key], rng))
         for key in ("train", "held_out")}
@@ -135,9 +135,11 @@ def _base(rng: np.random.Generator, tank: Tank | None) -> Rig:
     return Rig(length=tank.length, damping=2 * tank.ratios[0] * rate * Rig().mass)
 
 
-def _scales(base: Rig, train: Experiment) -> Scales:
-    angle = float(np.max(measured(base, train)))
-    return Scales(float(f"{angle:.4g}"), float(np.max(np.abs(train.u_x))), train.duration,
+def _scales(base: Rig, *experiments: Experiment) -> Scales:
+    # The smaller peak, so that a wall or a limit is met in both recordings.
+    angle = min(float(np.max(measured(base, e))) for e in experiments)
+    push = min(float(np.max(np.abs(e.u_x))) for e in experiments)
+    return Scales(float(f"{angle:.4g}"), push, experiments[0].duration,
                   math.sqrt(base.gravity / base.length))
 
 

@@ -21,7 +21,7 @@ NEAR = (
         Quantity("c", "rad/s^2", (("one_way", 1),), ((0.005, 6.0),), (0.3,), (0.0, 30.0)),),
         near="coulomb_friction"),
     Effect("hard_stop", "near", "dynamics", (
-        Quantity("theta_stop", "rad", (("stop", 1),), ((0.995, 0.5),), (0.8,), (0.1, 1.5),
+        Quantity("theta_stop", "rad", (("stop", 1),), ((0.99995, 0.5),), (0.8,), (0.1, 1.5),
                  relative="angle", log=False),
         Quantity("restitution", "", (("restitution", 1),), ((0.2, 0.9),), (0.5,), (0.0, 1.0))),
         near="wall_impact"),

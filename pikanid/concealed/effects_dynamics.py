@@ -37,7 +37,7 @@ EFFECTS = (
                  (1.15, 6.0), relative="rate"),
         Quantity("zeta2", "", (("mode_damping", 1),), ((0.005, 0.06),), (0.02,), (0.0, 1.0)))),
     Effect("wall_impact", "catalogue", "dynamics", (
-        Quantity("theta_wall", "rad", (("wall", 1),), ((0.995, 0.4),), (0.9, 0.75, 0.6, 0.45),
+        Quantity("theta_wall", "rad", (("wall", 1),), ((0.99995, 0.4),), (0.9, 0.75, 0.6, 0.45),
                  (0.2, 1.5), relative="angle", log=False),
         Quantity("stiffness", "1/s^2", (("wall_stiffness", 1),), ((3e3, 3e4),), (1e4,),
                  (1e2, 1e6)))),

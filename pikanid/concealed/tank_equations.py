@@ -8,6 +8,9 @@ Q = a_11s the first mode and the driven modes s obey
     a_s η_s'' + Q η₁ η₁'' + (Q - ½P) η₁'² = -g η_s - a_s c_s η_s'.
 """
 
+# mypy: disallow-untyped-defs=False
+# Numba infers the types of compiled functions from the call.
+
 from __future__ import annotations
 
 from numba import njit

@@ -18,13 +18,15 @@ from pikanid.concealed.arrays import Array
 from pikanid.concealed.effect import Effect, Quantity, Scales
 from pikanid.concealed.effects import CATALOGUE
 from pikanid.concealed.experiment import Experiment
-from pikanid.concealed.fisher import Refit, refit, unexplained
+from pikanid.concealed.fisher import MOST_STEPS, Refit, refit, unexplained
 from pikanid.concealed.noise import Noise
 from pikanid.concealed.rig import Rig
 from pikanid.concealed.simulate import measured
 
 FROM_NOMINAL, FROM_RIVAL = 5.0, 4.0
-REFINED = 5  # rivals refitted in full; the others lose already to first order
+# Rivals that get a rough refit after the screening to first order, and a full one after that.
+ROUGH, FULL = 12, 4
+ROUGH_STEPS = 2
 BASE_LOW, BASE_HIGH = np.array([0.003, 0.0]), np.array([1.0, 20.0])
 BASE_SCALE = np.array([0.005, 0.1])
 
@@ -84,11 +86,11 @@ class Candidate:
                 found.append((low, high, typical))
         return found
 
-    def refitted(self, target: Array, start: Array) -> Refit:
-        """Adjusted to a whitened target (N,)."""
+    def refitted(self, target: Array, start: Array, steps: int = MOST_STEPS) -> Refit:
+        """Adjusted to a whitened target (N,) in at most so many steps."""
         low, high, scale = np.array(self._columns()).reshape(-1, 3).T
         return refit(self.response, target, start, np.r_[BASE_LOW, low],
-                     np.r_[BASE_HIGH, high], np.r_[BASE_SCALE, scale])
+                     np.r_[BASE_HIGH, high], np.r_[BASE_SCALE, scale], steps)
 
 
 def starts(effect: Effect, scales: Scales) -> Iterator[Array]:
@@ -136,7 +138,7 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
             half = Candidate((kept,), scales, experiment, noise, Rig())
             fit = contest.fits.get((kept.id,)) or contest.best_start(half, nominal, kept)
             contest.enter(half, fit, [c for c in CATALOGUE if is_rival(c, other)
-                                      and c.id != kept.id and c.id not in kept.twins], 2)
+                                      and c.id != kept.id and c.id not in kept.twins], 5, 2)
     names, distance = contest.winner()
     return Visibility(nominal.distance, names, min(distance, nominal.distance),
                       float(nominal.values[0]), float(nominal.values[1]))
@@ -150,17 +152,20 @@ class _Contest:
         self.fits: dict[tuple[str, ...], Refit] = {}
 
     def enter(self, against: Candidate, fit: Refit, rivals: Sequence[Effect],
-              most: int = REFINED) -> None:
+              rough: int = ROUGH, full: int = FULL) -> None:
         """Let rivals extend a fitted candidate, and refit the most promising."""
-        screened = []
-        for rival in rivals:
-            candidate = Candidate((*against.effects, rival), self.scales, self.experiment,
-                                  self.noise, Rig())
-            score, start = self._screen(candidate, fit, rival)
-            screened.append((score, len(screened), candidate, start))
-        screened.sort(key=lambda entry: (-entry[0], entry[1]))
-        for _, _, candidate, start in screened[:most]:
-            self._keep(candidate, candidate.refitted(self.target, start))
+        candidates = [
+            Candidate((*against.effects, rival), self.scales, self.experiment, self.noise, Rig())
+            for rival in rivals]
+        screened = [(c, *self._screen(c, fit, rival))
+                    for c, rival in zip(candidates, rivals, strict=True)]
+        # Stable sorts: of equals the first in the catalogue comes first, in every run.
+        screened.sort(key=lambda entry: -entry[1])
+        roughly = [(c, c.refitted(self.target, start, ROUGH_STEPS))
+                   for c, _, start in screened[:rough]]
+        roughly.sort(key=lambda entry: entry[1].distance)
+        for candidate, found in roughly[:full]:
+            self._keep(candidate, candidate.refitted(self.target, found.values))
 
     def best_start(self, candidate: Candidate, nominal: Refit, effect: Effect) -> Refit:
         """One effect alone, refitted."""
