@@ -6,18 +6,22 @@ Good for many small models; compiled code is tested with a few shared ones.
 
 from __future__ import annotations
 
+import functools
 import types
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 
 from pikanid.model import Model
 from pikanid.problem import bind
 from pikanid.recording import Recording
 from pikanid.simulation import compiled as compiler
 from pikanid.simulation import support
+from pikanid.simulation.compiled import Method
 from pikanid.simulation.simulator import Simulator
+from pikanid.simulation.structure import Structure
 from pikanid.simulation.synthetic import with_outputs
 
 
@@ -25,8 +29,14 @@ def _plain(*_: Any, **__: Any) -> Callable[[Any], Any]:
     return lambda function: function
 
 
-def module(model: Model, method: str = "explicit") -> types.ModuleType:
+def module(model: Model, method: Method = "explicit") -> types.ModuleType:
     """The model's generated module with plain Python functions."""
+    return _module(Structure(model), method)
+
+
+@functools.cache
+def _module(structure: Structure, method: Method) -> types.ModuleType:
+    model = structure.model
     source = compiler._source(model, method)
     source = source.replace("from numba import njit\n", "")
     made = types.ModuleType("interpreted")
@@ -48,6 +58,12 @@ def module(model: Model, method: str = "explicit") -> types.ModuleType:
 def simulator(model: Model, recording: Recording, t: np.ndarray | None = None) -> Simulator:
     """A simulator of `model` under `recording`, outputs at t (N,), run by Python."""
     made = Simulator(model, bind(model, with_outputs(model, recording, t)))
-    for method in ("explicit", "implicit"):
+    methods: tuple[Method, ...] = ("explicit", "implicit")
+    for method in methods:
         made._kept[method] = module(model, method)
     return made
+
+
+def instead_of_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let everything in this test run by Python: for fits of small models of their own."""
+    monkeypatch.setattr("pikanid.simulation.simulator.compiled", module)

@@ -1,110 +1,215 @@
-"""NLS: joint fits, scopes, bounds, starts, multiple shooting, determinism."""
+"""NLS: exactness on clean data, weighting, joint fits, starts, bounds, failures, verdicts."""
 
 from __future__ import annotations
 
-import math
-
+import interpreted
 import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid import errors
-from pikanid.strategies.nls import NLS
+from pikanid import errors, excitation, systems
+from pikanid.model import Model, Parameter
+from pikanid.recording import Recording
 
-SIGMA = math.radians(0.1)
-
-
-def slosh(seed: int = 0, **parameters: float) -> pk.Recording:
-    return pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=SIGMA, seed=seed,
-                       parameters=parameters)
-
-
-def started() -> pk.Model:
-    return pk.systems.sloshing().with_values(l_theta=0.06, d_theta=0.05)
+SIGMA = 0.1 * np.pi / 180
+START = systems.sloshing().with_values(l_theta=0.06, d_theta=0.05)
+CLEAN = pk.simulate(systems.sloshing(), excitation.two_pulse())
+NOISY = pk.simulate(systems.sloshing(), excitation.two_pulse(), sigma=SIGMA, seed=0)
 
 
-def test_two_recordings_are_fitted_jointly() -> None:
-    both = NLS().fit(started(), [slosh(0), slosh(1)])
-    alone = [NLS().fit(started(), slosh(k)) for k in (0, 1)]
-    weights = [1 / a.std("l_theta") ** 2 for a in alone]
-    mean = np.average([a.value("l_theta") for a in alone], weights=weights)
-    assert both.value("l_theta") == pytest.approx(mean, abs=0.05 * both.std("l_theta"))
-    assert both.std("l_theta") == pytest.approx(sum(weights) ** -0.5, rel=0.02)
-    assert both.n == 1002
+def test_clean_data_give_the_parameters_back() -> None:
+    for recording in (CLEAN, CLEAN.decimate(10, channels=["theta"])):
+        found = pk.NLS().fit(START, recording)
+        assert found.value("l_theta") == pytest.approx(0.045, rel=1e-6)
+        assert found.value("d_theta") == pytest.approx(0.15, rel=1e-6)
+        assert found.ok
 
 
-def test_a_parameter_of_its_own_for_every_recording() -> None:
-    model = started().per_recording("d_theta")
-    found = NLS().fit(model, [slosh(0, d_theta=0.1), slosh(1, d_theta=0.3)])
+def test_reference_optimum_of_the_study() -> None:
+    """N = 501, σ = 0.1°, default_rng(0): an optimum found by other software."""
+    found = pk.NLS().fit(START, NOISY)
+    # sub-steps are as fine as a hundredth of a standard error asks for
+    difference = np.abs(found.theta - [0.04501202, 0.14891704])
+    assert np.all(difference < 0.01 * np.sqrt(np.diag(found.covariance)))
+    assert found.cost == pytest.approx(7.814036e-4, rel=1e-6)
+    assert found.ok
+    assert found.adequacy.source == "given"
+
+
+def test_standard_errors_are_the_cramer_rao_bound_at_the_estimate() -> None:
+    found = pk.NLS().fit(START, NOISY)
+    bound = pk.uncertainty.cramer_rao(found.fitted_model, NOISY)
+    for name in ("l_theta", "d_theta"):
+        assert found.std(name) == pytest.approx(bound.std(name), rel=1e-3)
+
+
+def test_the_same_seed_gives_the_same_bits() -> None:
+    a, b = (pk.NLS(starts=3, seed=5).fit(START, NOISY) for _ in range(2))
+    np.testing.assert_array_equal(a.theta, b.theta)
+    np.testing.assert_array_equal(a.covariance, b.covariance)
+    assert a.history == b.history
+
+
+def test_noise_that_differs_from_sample_to_sample_is_weighted() -> None:
+    """A stretch of wild samples with a large σ does no harm; taken for good ones it would."""
+    values = NOISY["theta"].values.copy()
+    values[100:200] += np.random.default_rng(1).normal(0, 1.0, 100)
+    sigma = np.full(501, SIGMA)
+    sigma[100:200] = 1.0
+    wild = Recording.from_arrays(NOISY.t, {"u_x": NOISY["u_x"].values, "theta": values},
+                                 sigma={"theta": sigma}, hold={"u_x": "zero"})
+    found = pk.NLS().fit(START, wild)
+    assert found.ok
+    assert abs(found.value("l_theta") - 0.045) < 4 * found.std("l_theta")
+    blind = pk.NLS().fit(START, wild.with_sigma(theta=None))
+    assert abs(blind.value("d_theta") - 0.15) > 4 * found.std("d_theta")
+
+
+def test_missing_samples_change_nothing_but_the_information() -> None:
+    values = NOISY["theta"].values.copy()
+    values[[0, 3, 50, 51, 52, 500]] = np.nan
+    gappy = NOISY.with_channels(NOISY["theta"].__class__(
+        "theta", NOISY.t, values, "rad", SIGMA))
+    found = pk.NLS().fit(START, gappy)
+    assert found.n == 495
+    assert found.ok
+    np.testing.assert_allclose(found.theta, pk.NLS().fit(START, NOISY).theta, rtol=0.02)
+
+
+def test_recordings_fitted_jointly_share_what_is_shared() -> None:
+    true = systems.sloshing()
+    second = pk.simulate(true.with_values(d_theta=0.3), excitation.two_pulse(amplitude=0.6),
+                         sigma=SIGMA, seed=1)
+    found = pk.NLS().fit(START.per_recording("d_theta"), [NOISY, second])
     assert [f.label for f in found.free] == ["l_theta", "d_theta[0]", "d_theta[1]"]
-    assert found.value("d_theta", 0) == pytest.approx(0.1, abs=5 * found.std("d_theta", 0))
-    assert found.value("d_theta", 1) == pytest.approx(0.3, abs=5 * found.std("d_theta", 1))
+    for value, std, expected in ((found.value("l_theta"), found.std("l_theta"), 0.045),
+                                 (found.value("d_theta", 0), found.std("d_theta", 0), 0.15),
+                                 (found.value("d_theta", 1), found.std("d_theta", 1), 0.30)):
+        assert abs(value - expected) < 4 * std
+    alone = pk.NLS().fit(START, NOISY)
+    assert found.std("l_theta") < alone.std("l_theta")
+    tied = pk.NLS().fit(START, [NOISY, second])
+    assert not tied.ok  # one damping cannot explain both
 
 
-def test_an_optimum_at_a_bound_is_found_and_said() -> None:
-    model = started().with_values(d_theta=0.5).with_bounds(d_theta=(0.2, 1.0))
-    found = NLS(starts=1).fit(model, slosh())
-    assert found.value("d_theta") == pytest.approx(0.2, abs=1e-6)
-    assert any("bound" in w for w in found.warnings)
+def test_all_parameters_fixed_is_a_mere_verdict() -> None:
+    found = pk.NLS().fit(systems.sloshing().fix("l_theta", "d_theta"), NOISY)
+    assert found.ok
+    assert found.theta.shape == (0,)
+    wrong = pk.NLS().fit(systems.sloshing().fix("d_theta", l_theta=0.05), NOISY)
+    assert not wrong.ok
+
+
+def test_optimum_at_a_bound_is_named() -> None:
+    found = pk.NLS(starts=1).fit(
+        START.with_bounds(d_theta=(0.0, 0.1)), NOISY)
+    assert found.value("d_theta") == pytest.approx(0.1)
+    assert any("bound" in w and "d_theta" in w for w in found.warnings)
     assert np.isnan(found.std("d_theta"))
+    assert found.std("l_theta") > 0
 
 
-def test_same_seed_same_numbers() -> None:
-    far = pk.systems.sloshing().with_values(l_theta=0.007, d_theta=0.05)
-    sparse = slosh().decimate(10, channels=["theta"])
-    one, two = (NLS(seed=3).fit(far, sparse) for _ in range(2))
-    np.testing.assert_array_equal(one.theta, two.theta)
-    assert one.history == two.history
+def test_a_parameter_without_influence_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    interpreted.instead_of_compiled(monkeypatch)
+    found = pk.NLS(starts=1).fit(START.with_parameters(Parameter("idle", 1.0)), NOISY)
+    assert any("idle" in w and "no influence" in w for w in found.warnings)
+    assert found.value("idle") == 1.0
+    assert found.value("l_theta") == pytest.approx(0.04501202, abs=1e-7)
 
 
-def test_the_papers_protocol_tries_five_starts() -> None:
-    found = NLS(protocol="paper").fit(started(), slosh())
-    assert len(found.history) == 5
+def test_parameters_that_only_act_together_are_named() -> None:
+    """d_theta/m: freeing m as well leaves only the ratio determined."""
+    found = pk.NLS(starts=1).fit(START.free("m"), NOISY)
+    assert any("d_theta" in w and "m" in w and "combination" in w for w in found.warnings)
+    assert found.value("d_theta") / found.value("m") == pytest.approx(0.14891704 / 0.3, rel=1e-4)
+
+
+def test_misfit_is_reported_never_as_success() -> None:
+    """Dry friction left out of the model."""
+    truth = systems.sloshing().with_term("theta_dot", "-mu*sign(theta_dot)", [Parameter("mu", 2.0)])
+    recording = pk.simulate(truth, excitation.two_pulse(), sigma=SIGMA, seed=0)
+    found = pk.NLS(starts=1).fit(START, recording)
+    assert found.adequacy.verdict == "misfit"
+    assert not found.ok
+    assert any("does not explain" in w for w in found.warnings)
+    right = pk.NLS(starts=1).fit(truth.with_values(mu=1.6), recording)
+    assert right.ok
+    assert abs(right.value("mu") - 2.0) < 4 * right.std("mu")
+
+
+@pytest.mark.xfail(reason="the steps of the last start are kept, even if it had none",
+                   raises=IndexError)
+def test_starts_that_cannot_be_simulated_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """x' = k x² explodes for k > 1/2; the fit starts there all the same."""
+    monkeypatch.setattr("pikanid.simulation.simulator.FINEST", 8)  # give up sooner
+    interpreted.instead_of_compiled(monkeypatch)
+    model = Model.from_dict({
+        "states": {"x": {"initial": 1.0}}, "parameters": {"k": {"guess": 0.2, "bounds": [-5, 5]}},
+        "equations": {"x": "k*x**2"}, "outputs": {"x": {"expression": "x"}}})
+    t = np.linspace(0, 2, 41)
+    recording = Recording.from_arrays(t, {"x": 1 / (1 - 0.3 * t)})
+    found = pk.NLS(starts=1).fit(model, recording)
+    assert found.value("k") == pytest.approx(0.3, rel=1e-6)
+    far = pk.NLS(starts=6).fit(model.with_values(k=4.0), recording)
+    assert far.value("k") == pytest.approx(0.3, rel=1e-6)
+    with pytest.raises(errors.SimulationFailed, match="starting point"):
+        pk.NLS(starts=1).fit(model.with_values(k=4.0), recording)
+
+
+def test_unknown_noise_is_estimated_from_the_residual() -> None:
+    found = pk.NLS().fit(START, NOISY.with_sigma(theta=None))
+    assert found.adequacy.source == "differences"
+    assert found.ok
+    known = pk.NLS().fit(START, NOISY)
+    for name in ("l_theta", "d_theta"):
+        assert found.std(name) == pytest.approx(known.std(name), rel=0.15)
+        assert found.value(name) == pytest.approx(known.value(name), rel=1e-6)
+
+
+def test_outputs_of_different_size_are_weighted_by_their_own_noise(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without σ, an angle in rad and one in thousandths must not count a million to one."""
+    interpreted.instead_of_compiled(monkeypatch)
+    model = Model.from_dict({**systems.sloshing().to_dict(), "outputs": {
+        "theta": {"expression": "theta"}, "rate": {"expression": "1000*theta_dot"}}})
+    recording = pk.simulate(model, excitation.two_pulse(2.0, 0.02), seed=2,
+                            sigma={"theta": 1e-3, "rate": 100.0})
+    blind = Recording.from_arrays(
+        recording.t, {n: recording[n].values for n in ("u_x", "theta", "rate")},
+        hold={"u_x": "zero"})
+    a = pk.NLS().fit(model.with_values(l_theta=0.06), recording)
+    b = pk.NLS().fit(model.with_values(l_theta=0.06), blind)
+    assert np.all(np.abs(a.theta - b.theta) < 0.3 * np.sqrt(np.diag(a.covariance)))
+
+
+def test_paper_protocol_is_best_of_five_within_a_fifth() -> None:
+    found = pk.NLS(protocol="paper").fit(START, NOISY)
+    assert found.settings["tried"] == 5
     assert found.ok
 
 
-def test_multiple_shooting_fits_a_chaotic_recording_where_single_shooting_cannot() -> None:
-    lorenz = pk.Model.from_dict({
-        "name": "lorenz",
-        "states": {"x": {"initial": 1.0}, "y": {"initial": 1.0}, "z": {"initial": 20.0}},
-        "parameters": {"s": {"guess": 10.0, "bounds": [1, 50]},
-                       "r": {"guess": 28.0, "bounds": [1, 100]},
-                       "b": {"guess": 2.6667, "bounds": [0.1, 10]}},
-        "equations": {"x": "s*(y-x)", "y": "x*(r-z)-y", "z": "x*y-b*z"},
-        "outputs": {"x": {"expression": "x"}, "z": {"expression": "z"}}})
-    clock = pk.Recording.from_arrays(np.arange(0, 6, 0.02), {"tick": np.arange(300.0)})
-    recording = pk.simulate(lorenz, clock, sigma=0.2, seed=1)
-    start = lorenz.with_values(s=7.0, r=35.0, b=1.5)
-    assert not NLS(starts=1, method="explicit").fit(start, recording).ok
-    led = NLS(starts=1, segments=20, method="explicit").fit(start, recording)
-    assert led.ok
-    assert led.theta == pytest.approx([10.0, 28.0, 2.6667], rel=0.01)
+def test_free_initial_state_and_delay_are_estimated(monkeypatch: pytest.MonkeyPatch) -> None:
+    interpreted.instead_of_compiled(monkeypatch)
+    truth = systems.sloshing().with_initial(theta="free").map_input(
+        "u_x", [Parameter("tau", 0.0137, "s", (0.0, 0.1))], delay="tau").with_values(theta_0=0.05)
+    recording = pk.simulate(truth, excitation.two_pulse(2.0, 0.02), sigma=SIGMA, seed=4)
+    found = pk.NLS().fit(truth.with_values(theta_0=0.0, tau=0.03, l_theta=0.05), recording)
+    assert found.ok
+    for name, value in truth.values.items():
+        if name in found.model.free_names:
+            assert abs(found.value(name) - value) < 4 * found.std(name)
 
 
-def test_a_model_that_explodes_is_one_sentence() -> None:
-    model = pk.Model.from_dict({
-        "name": "bang", "states": {"x": {"initial": 1.0}},
-        "parameters": {"k": {"guess": 5.0, "bounds": [4.0, 6.0]}},
-        "equations": {"x": "k*x**2"}, "outputs": {"x": {"expression": "x"}}})
-    t = np.linspace(0, 2, 40)
-    with pytest.raises(errors.SimulationFailed):
-        NLS(method="explicit").fit(model, pk.Recording.from_arrays(t, {"x": np.sin(t)}))
-
-
-def test_fewer_samples_than_parameters() -> None:
-    few = pk.Recording.from_arrays([0.0, 1.0], {"u_x": [0.0, 1.0], "theta": [0.0, 0.1]})
-    three = pk.systems.sloshing().free("m")
-    with pytest.raises(errors.BadRecording, match="2 usable samples for 3"):
-        NLS().fit(three, few)
-
-
-def test_an_input_that_lacks_is_an_error_unless_it_has_a_default() -> None:
-    recording = slosh()
-    with pytest.raises(errors.BadRecording, match="u_x"):
-        NLS().fit(started(), recording.without("u_x"))
-    renamed = recording.rename({"u_x": "ux"})
-    with pytest.raises(errors.BadRecording, match="u_x"):
-        NLS().fit(started(), renamed)
-    found = NLS().fit(started(), recording.with_channels(
-        pk.Channel("temperature", recording.t, recording.t, "s")))
-    assert any("temperature" in w for w in found.warnings)
+@pytest.mark.slow
+def test_multiple_shooting_finds_a_long_chaotic_record() -> None:
+    """A driven Duffing oscillator past the horizon of single shooting from a distant guess."""
+    truth = systems.duffing_oscillator().with_bounds(k=(-50.0, 50.0)).with_values(
+        k=-1.0, k3=1.0, c=0.3).fix("b")
+    t = np.arange(0, 60, 0.05)
+    drive = Recording.from_arrays(t, {"u": 0.5 * np.cos(1.2 * t)}, hold={"u": "first"})
+    recording = pk.simulate(truth, drive, sigma=0.01, seed=0)
+    guess = truth.with_values(k=-0.6, k3=0.7, c=0.5)
+    found = pk.NLS(segments=30, starts=1).fit(guess, recording)
+    assert found.ok
+    for name, value in (("k", -1.0), ("k3", 1.0), ("c", 0.3)):
+        assert abs(found.value(name) - value) < 4 * found.std(name)
