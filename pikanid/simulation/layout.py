@@ -56,7 +56,7 @@ class Work(NamedTuple):
     gS: np.ndarray
     GS: np.ndarray
     ds: np.ndarray
-    index: np.ndarray
+    held_at_zero: np.ndarray
     eye: np.ndarray
     fx: np.ndarray
     matrix: np.ndarray

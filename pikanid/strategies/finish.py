@@ -39,7 +39,8 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
             notes.append(f"'{f.label}' ended at its bound; its standard error is not known.")
     if adequacy.verdict == "misfit":
         notes.append("The model, simulated at these estimates, does not explain the recording: "
-                     "they are biased or make up for missing physics, and standard errors mean little.")
+                     "they are biased or make up for missing physics, and standard errors mean "
+                     "little.")
     notes += identifiability_warnings(jacobian, problem.free, ~at_bound)
     for e in problem.experiments:
         if e.unused:

@@ -18,7 +18,7 @@ def resolve(t, x, u, v, p, mode, w):
     s = w.s
     for k in range(K):
         s[k] = mode[k]
-    sliding = sliding_indices(mode, w.index)
+    sliding = sliding_indices(mode, w.held_at_zero)
     if sliding == 0:
         return
     switching_rate(w.bs, t, x, u, v, p, s, w.G)
@@ -30,12 +30,12 @@ def resolve(t, x, u, v, p, mode, w):
                 s[k] -= w.G[k] / w.Gs[k, k]
         return
     for i in range(sliding):
-        w.change[i, 0] = -w.G[w.index[i]]
+        w.change[i, 0] = -w.G[w.held_at_zero[i]]
         for j in range(sliding):
-            w.matrix[i, j] = w.Gs[w.index[i], w.index[j]]
+            w.matrix[i, j] = w.Gs[w.held_at_zero[i], w.held_at_zero[j]]
     solve_small(w.matrix[:sliding, :sliding], w.change[:sliding])
     for i in range(sliding):
-        s[w.index[i]] += w.change[i, 0]
+        s[w.held_at_zero[i]] += w.change[i, 0]
 
 
 @called
@@ -60,16 +60,16 @@ def sliding_signs(t, x, S, u, v, ud, p, act, sliding, w):
     switching_rate_sensitivity(w.bs, t, x, S, u, v, ud, p, w.s, act, w.rp, w.GS, w.Gs, w.Fs)
     for i in range(sliding):
         for j in range(sliding):
-            w.matrix[i, j] = w.Gs[w.index[i], w.index[j]]
+            w.matrix[i, j] = w.Gs[w.held_at_zero[i], w.held_at_zero[j]]
         for a in range(A):
-            w.ds[i, a] = -w.GS[w.index[i], a]
+            w.ds[i, a] = -w.GS[w.held_at_zero[i], a]
     solve_small(w.matrix[:sliding, :sliding], w.ds[:sliding, :A])
 
 
 @called
 def show_signs(t, x, S, u, v, p, mode, act, w):
     """Add to w.J what outputs see of the signs of sliding surfaces: a friction force, say."""
-    sliding = sliding_indices(mode, w.index)
+    sliding = sliding_indices(mode, w.held_at_zero)
     if sliding == 0 or not SHOWS_SIGNS:
         return
     sliding_signs(t, x, S, u, v, w.ud, p, act, sliding, w)
@@ -78,7 +78,7 @@ def show_signs(t, x, S, u, v, p, mode, act, w):
     for o in range(Q):
         for i in range(sliding):
             for a in range(len(act)):
-                w.J[o, a] += w.Hs[o, w.index[i]] * w.ds[i, a]
+                w.J[o, a] += w.Hs[o, w.held_at_zero[i]] * w.ds[i, a]
 
 
 @inlined
@@ -90,13 +90,13 @@ def field(t, x, S, u, v, ud, p, mode, act, w, f, dS):
         rhs(w.bs, t, x, u, p, w.s, f)
         return
     variational(w.bs, t, x, S, u, ud, p, w.s, act, f, w.fp, dS)
-    sliding = sliding_indices(mode, w.index)
+    sliding = sliding_indices(mode, w.held_at_zero)
     if sliding == 0:
         return
     sliding_signs(t, x, S, u, v, ud, p, act, sliding, w)
     for r in range(N):
         for i in range(sliding):
-            push = w.Fs[r, w.index[i]]
+            push = w.Fs[r, w.held_at_zero[i]]
             if push != 0.0:
                 for a in range(A):
                     dS[a, r] += push * w.ds[i, a]
