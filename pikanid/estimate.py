@@ -183,10 +183,10 @@ class Estimate:
         rows = []
         for f in self.free:
             low, high = self.interval(f.name, recording=f.recording)
-            rows.append({"parameter": f.label, "value": self.value(f.name, f.recording),
-                         "std": self.std(f.name, f.recording), "lower": low, "upper": high,
-                         "unit": f.unit})
-        return pd.DataFrame(rows).set_index("parameter")
+            rows.append((f.label, self.value(f.name, f.recording), self.std(f.name, f.recording),
+                         low, high, f.unit))
+        columns = ["parameter", "value", "std", "lower", "upper", "unit"]
+        return pd.DataFrame(rows, columns=columns).set_index("parameter")
 
     def plot(self) -> matplotlib.figure.Figure:
         """Measured against fitted, and the residual; one row of axes an output and recording."""

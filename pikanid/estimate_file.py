@@ -74,7 +74,7 @@ def load(path: str | os.PathLike[str]) -> Estimate:
     except OSError as problem:
         detail = problem.strerror or "it is no complete gzip file"
         raise errors.BadSetting(errors.estimate_file(str(path), detail)) from None
-    except (ValueError, KeyError, TypeError, EOFError):
+    except (ValueError, KeyError, TypeError, AttributeError, EOFError):
         detail = "it does not hold a saved estimate"
         raise errors.BadSetting(errors.estimate_file(str(path), detail)) from None
 

@@ -72,6 +72,8 @@ def save(model: Model, path: str | os.PathLike[str]) -> None:
 
 def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
     """Build a `Model` from the file's content; `source` names it in error messages."""
+    if not isinstance(content, Mapping):
+        raise errors.BadModel(errors.bad_value(f"The model '{source}'", content, "a table"))
     _known_keys(content, SECTIONS, source, "the file")
     tables = {section: _table(content, section, source) for section in KEYS}
     title = content.get("name", Path(source).stem)
