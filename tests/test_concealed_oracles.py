@@ -117,7 +117,7 @@ def test_hysteresis_loads_exponentially_and_stores_energy() -> None:
     theta = x[:, 0]
     work = force * (theta - give * (1 - np.exp(-theta / give)))
     assert np.all(np.diff(theta) > 0)
-    assert x[:, 6] == pytest.approx(1 - np.exp(-theta / give), abs=TIGHT)
+    assert x[:, equations.HYSTERESIS] == pytest.approx(1 - np.exp(-theta / give), abs=TIGHT)
     assert x[:, 1] ** 2 == pytest.approx(start**2 - 2 * work, abs=TIGHT)
 
 
@@ -247,7 +247,7 @@ def test_internal_resonance_conserves_energy_and_exchanges_it() -> None:
     rig = Rig(damping=0.0, internal=200.0, mode_rate=2 * np.sqrt(9.81 / 0.045), mode_damping=0.0,
               start_angle=0.1)
     _, x = dense(rig, 10.0)
-    theta, v, q, w = x[:, :4].T
+    theta, v, q, w = x[:, [0, 1, equations.MODE, equations.MODE + 1]].T
     energy = (0.5 * v**2 + 0.5 * w**2 + rig.gravity / rig.length * (1 - np.cos(theta))
               + 0.5 * rig.mode_rate**2 * q**2 - 0.5 * 200.0 * theta**2 * q)
     assert energy == pytest.approx(energy[0], rel=1e-8)

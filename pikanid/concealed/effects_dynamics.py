@@ -51,7 +51,7 @@ EFFECTS = (
         Quantity("peak", "rad/s^2", (("bump", 1),), ((0.05, 60.0),), (3.0,), (-500.0, 500.0),
                  signed=True),
         Quantity("time", "s", (("bump_time", 1),), ((0.2, 0.85),),
-                 tuple(k / 14 for k in range(1, 14)), (0.02, 0.98), relative="duration",
+                 tuple(k / 11 for k in range(1, 11)), (0.02, 0.98), relative="duration",
                  log=False),
         Quantity("width", "s", (("bump_width", 1),), ((0.1, 0.6),), (0.25,), (0.03, 3.0))),
         held_out="absent"),

@@ -1,7 +1,7 @@
 """Equations of motion of the reference rig, compiled.
 
-State: θ, θ', second mode q, q', actuator, sensor, hysteresis z, then the boundary layer's
-relaxation states.  Only as many as a rig needs are integrated (2, 7 or all).
+State: θ, θ', actuator, sensor, hysteresis z, second mode q, q', then the boundary layer's
+relaxation states.  Only the first n that a rig needs are integrated.
 
 Nothing here asks for the sign of θ' or for contact: the integrator knows both exactly and passes
 them, so that the right-hand side is smooth between events.
@@ -33,7 +33,8 @@ WEIGHTS = _H / math.pi * np.exp(_Y / 2)
 SLOW = float(WEIGHTS[0] * math.exp(-_H / 2) / (1 - math.exp(-_H / 2)))
 FAST = float(WEIGHTS[-1] / RATES[-1] * math.exp(-_H / 2) / (1 - math.exp(-_H / 2)))
 LAYERS = len(RATES)
-FIRST_LAYER = 7
+# Positions in the state.
+ACTUATOR, SENSOR, HYSTERESIS, MODE, FIRST_LAYER = 2, 3, 4, 5, 7
 CREEP = 1e-3  # ε [rad/s]
 
 
@@ -64,12 +65,14 @@ def rhs(t, x, n, u, p, sign, contact, memory_sign, stuck, dx):
     """
     theta, v = x[0], x[1]
     push = u[0]
-    if n > 2 and p[ACTUATOR_LAG] > 0.0:
-        push = x[4]
-        dx[4] = (u[0] - x[4]) / p[ACTUATOR_LAG]
-    elif n > 2:
-        dx[4] = 0.0
-    along = push + p[LEAK_Y] * u[1] + p[GRAVITY] * math.sin(p[LEAK_PITCH] * u[2])
+    if n > ACTUATOR:
+        dx[ACTUATOR] = 0.0
+        if p[ACTUATOR_LAG] > 0.0:
+            push = x[ACTUATOR]
+            dx[ACTUATOR] = (u[0] - push) / p[ACTUATOR_LAG]
+    along = push + p[LEAK_Y] * u[1]
+    if p[LEAK_PITCH] != 0.0:
+        along += p[GRAVITY] * math.sin(p[LEAK_PITCH] * u[2])
     length = p[LENGTH] * (1.0 + p[LENGTH_DRIFT] * t)
     if p[WOBBLE] != 0.0:
         length *= 1.0 + p[WOBBLE] * math.sin(p[WOBBLE_RATE] * t)
@@ -90,18 +93,22 @@ def rhs(t, x, n, u, p, sign, contact, memory_sign, stuck, dx):
             f += p[BUMP] * 0.5 * (1.0 + math.cos(2.0 * math.pi * phase))
     if contact:
         f -= p[WALL_STIFFNESS] * (theta - p[WALL]) * (1.0 + p[WALL_DAMPING] * v)
-    if n > 2:
-        q, w = x[2], x[3]
-        dx[2] = w
-        dx[3] = (p[MODE_GAIN] * push - 2.0 * p[MODE_DAMPING] * p[MODE_RATE] * w
-                 - p[MODE_RATE] ** 2 * q + 0.5 * p[INTERNAL] * theta * theta)
+    shown = theta
+    if n > MODE:
+        q, w = x[MODE], x[MODE + 1]
+        dx[MODE] = w
+        dx[MODE + 1] = (p[MODE_GAIN] * push - 2.0 * p[MODE_DAMPING] * p[MODE_RATE] * w
+                        - p[MODE_RATE] ** 2 * q + 0.5 * p[INTERNAL] * theta * theta)
         f += p[INTERNAL] * theta * q
-        dx[5] = (theta + q - x[5]) / p[SENSOR_LAG] if p[SENSOR_LAG] > 0.0 else 0.0
-        z = x[6]
-        dx[6] = 0.0
+        shown += q
+    if n > SENSOR:
+        dx[SENSOR] = (shown - x[SENSOR]) / p[SENSOR_LAG] if p[SENSOR_LAG] > 0.0 else 0.0
+    if n > HYSTERESIS:
+        z = x[HYSTERESIS]
+        dx[HYSTERESIS] = 0.0
         if p[MEMORY] != 0.0:
             f -= p[MEMORY] * z
-            dx[6] = (v - 0.5 * (sign * v * z + v * memory_sign * z)) / p[YIELD_ANGLE]
+            dx[HYSTERESIS] = (v - 0.5 * (sign * v * z + v * memory_sign * z)) / p[YIELD_ANGLE]
     if n > FIRST_LAYER:
         shear = SLOW * v
         for i in range(LAYERS):

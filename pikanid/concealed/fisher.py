@@ -27,7 +27,7 @@ class Refit:
     Attributes:
         values: (p,) adjusted.
         residual: (N,) whitened target less model.
-        jacobian: (N, p) derivative of the whitened response.
+        jacobian: (N, p) derivative of the whitened response, where the last step began.
     """
 
     values: Array
@@ -61,8 +61,9 @@ def refit(response: Response, target: Array, start: Array, low: Array, high: Arr
     v = np.clip(start, low, high)
     r = target - response(v)
     cost, damping = float(np.sum(r**2)), 1e-6
-    jacobian = sensitivities(response, v, target - r, high, scale)
+    jacobian = np.zeros((len(r), len(v)))
     for _ in range(steps):
+        jacobian = sensitivities(response, v, target - r, high, scale)
         # einsum sums in a fixed order; a BLAS might not, and then bits depend on its threads.
         normal = np.einsum("ni,nj->ij", jacobian, jacobian)
         gradient = np.einsum("ni,n->i", jacobian, r)
@@ -79,8 +80,7 @@ def refit(response: Response, target: Array, start: Array, low: Array, high: Arr
             break
         gain = cost - cost_trial
         v, r, cost, damping = trial, r_trial, cost_trial, max(damping / 30.0, 1e-9)
-        jacobian = sensitivities(response, v, target - r, high, scale)
-        if gain < 1e-4 * cost or cost < 1e-4:
+        if gain < 3e-4 * cost or cost < 1e-4:
             break
     return Refit(v, r, jacobian)
 

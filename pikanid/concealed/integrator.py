@@ -25,6 +25,11 @@ from pikanid.concealed import tank_equations
 STAGES = int(DOP853.n_stages)
 A, B, C = np.array(DOP853.A[:STAGES, :STAGES]), np.array(DOP853.B), np.array(DOP853.C[:STAGES])
 E3, E5 = np.array(DOP853.E3[:STAGES]), np.array(DOP853.E5[:STAGES])
+# Many coefficients are zero: for each stage the earlier ones that count, and those of the result.
+USED = np.array([len(np.flatnonzero(row)) for row in A])
+PLACES = np.array([np.r_[np.flatnonzero(row), np.zeros(STAGES - k, int)]
+                   for row, k in zip(A, USED, strict=True)])
+FINAL = np.flatnonzero((B != 0) | (E3 != 0) | (E5 != 0))
 
 RIG, TANK = 0, 1
 # Tolerances of one step; a recording takes some 2000.
@@ -55,26 +60,25 @@ def _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new):
     for i in range(STAGES):
         for j in range(n):
             x_new[j] = x[j]
-        for k in range(i):
+        for place in range(USED[i]):
+            k = PLACES[i, place]
             a = h * A[i, k]
-            if a != 0.0:
-                for j in range(n):
-                    x_new[j] += a * stages[k, j]
+            for j in range(n):
+                x_new[j] += a * stages[k, j]
         _rhs(kind, t + C[i] * h, x_new, n, row, drive, p, mode, u, stages[i])
     fifth, third = 0.0, 0.0
     for j in range(n):
         change, e5, e3 = 0.0, 0.0, 0.0
-        for i in range(STAGES):
-            change += B[i] * stages[i, j]
-            e5 += E5[i] * stages[i, j]
-            e3 += E3[i] * stages[i, j]
+        for stage in FINAL:
+            change += B[stage] * stages[stage, j]
+            e5 += E5[stage] * stages[stage, j]
+            e3 += E3[stage] * stages[stage, j]
         x_new[j] = x[j] + h * change
         scale = ABSOLUTE + RELATIVE * max(abs(x[j]), abs(x_new[j]))
         fifth += (e5 / scale) ** 2
         third += (e3 / scale) ** 2
-    if fifth == 0.0 and third == 0.0:
-        return 0.0
-    return abs(h) * fifth / np.sqrt((fifth + 0.01 * third) * n)
+    both = fifth + 0.01 * third
+    return abs(h) * fifth / np.sqrt(both * n) if both > 1e-200 else 0.0
 
 
 @njit
@@ -112,7 +116,7 @@ def _guard(which, kind, t, x, n, row, drive, p, mode, u, dx):
     if which == STOP:
         return p[eq.STOP] - x[0]
     if which == MEMORY:
-        return mode[MEMORY_SIGN] * x[6]
+        return mode[MEMORY_SIGN] * x[eq.HYSTERESIS]
     free = _rhs(kind, t, x, n, row, drive, p, mode, u, dx)
     if mode[HELD]:
         return free
@@ -168,9 +172,10 @@ def _locate(which, kind, t, h, x, n, row, drive, p, mode, u, stages, x_new, dx):
     for _ in range(60):
         if high - low <= 1e-14 + 4e-16 * t:
             break
-        trial = (low * g_high - high * g_low) / (g_high - g_low)
-        if not low < trial < high:
-            trial = 0.5 * (low + high)
+        trial = 0.5 * (low + high)
+        if g_low - g_high > 1e-200:
+            secant = (low * g_high - high * g_low) / (g_high - g_low)
+            trial = secant if low < secant < high else trial
         _step(kind, t, trial, x, n, row, drive, p, mode, u, stages, x_new)
         g = _guard(which, kind, t + trial, x_new, n, row, drive, p, mode, u, dx)
         if g < 0.0:

@@ -37,9 +37,11 @@ def measured(rig: Rig | Tank, experiment: Experiment) -> Array:
     # The camera samples at t, but sees what was there `sensor_delay` before.
     seen_at = np.maximum(experiment.t * (1.0 + rig.clock) - rig.sensor_delay, 0.0)
     states = motion(rig, experiment, seen_at)
-    s = states[:, 0].copy()
-    if states.shape[1] > 2:
-        s = states[:, 5].copy() if rig.sensor_lag > 0.0 else s + states[:, 2]
+    s = states[:, 0]
+    if rig.sensor_lag > 0.0:
+        s = states[:, equations.SENSOR]
+    elif states.shape[1] > equations.MODE:
+        s = s + states[:, equations.MODE]
     y = rig.sensor_gain * (s + rig.sensor_cubic * s**3)
     y = np.clip(y, rig.sensor_low, rig.sensor_high)
     return y + rig.offset + rig.sensor_drift * experiment.t
@@ -140,15 +142,16 @@ def _reverses(rig: Rig) -> bool:
 def _start(rig: Rig) -> Array:
     """State at rest under the constant forces, plus what the initial state is off by."""
     n = 2
-    if rig.mode_gain or rig.actuator_lag or rig.sensor_lag or rig.memory or rig.internal:
-        n = equations.FIRST_LAYER
-    if rig.layer:
-        n = equations.FIRST_LAYER + equations.LAYERS
+    for needed, last in ((rig.actuator_lag, equations.ACTUATOR), (rig.sensor_lag, equations.SENSOR),
+                         (rig.memory, equations.HYSTERESIS),
+                         (rig.mode_gain or rig.internal, equations.MODE + 1),
+                         (rig.layer, equations.FIRST_LAYER + equations.LAYERS - 1)):
+        n = last + 1 if needed else n
     x0 = np.zeros(n)
     x0[0] = _angle_at_rest(rig) + rig.start_angle
     x0[1] = rig.start_rate
-    if n > 2:
-        x0[5] = x0[0]
+    if n > equations.SENSOR:
+        x0[equations.SENSOR] = x0[0]
     return x0
 
 

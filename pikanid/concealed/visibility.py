@@ -26,7 +26,8 @@ from pikanid.concealed.simulate import measured
 FROM_NOMINAL, FROM_RIVAL = 5.0, 4.0
 # Rivals that get a rough refit after the screening to first order, and a full one after that.
 ROUGH, FULL = 12, 4
-ROUGH_STEPS = 2
+ROUGH_STEPS = 1
+IN_PAIRS = 6, 2  # the same, where one of two effects is replaced
 BASE_LOW, BASE_HIGH = np.array([0.003, 0.0]), np.array([1.0, 20.0])
 BASE_SCALE = np.array([0.005, 0.1])
 
@@ -107,10 +108,9 @@ def is_rival(rival: Effect, true_effect: Effect) -> bool:
 
 
 def nominal_fit(truth: Array, experiment: Experiment, noise: Noise, base: Rig) -> Refit:
-    """The nominal pendulum adjusted to a whitened truth (N,), from wherever it starts well."""
+    """The nominal pendulum adjusted to a whitened truth (N,), starting at the true l and d."""
     candidate = Candidate((), Scales(1.0, 1.0, 1.0, 1.0), experiment, noise, Rig())
-    begun = [np.array([base.length * factor, base.damping]) for factor in (1.0, 0.97, 1.03)]
-    return min((candidate.refitted(truth, start) for start in begun), key=lambda f: f.distance)
+    return candidate.refitted(truth, np.array([base.length, base.damping]))
 
 
 def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
@@ -137,8 +137,9 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
         for kept, other in (true_effects, true_effects[::-1]):
             half = Candidate((kept,), scales, experiment, noise, Rig())
             fit = contest.fits.get((kept.id,)) or contest.best_start(half, nominal, kept)
-            contest.enter(half, fit, [c for c in CATALOGUE if is_rival(c, other)
-                                      and c.id != kept.id and c.id not in kept.twins], 5, 2)
+            others = [c for c in CATALOGUE
+                      if is_rival(c, other) and c.id != kept.id and c.id not in kept.twins]
+            contest.enter(half, fit, others, *IN_PAIRS)
     names, distance = contest.winner()
     return Visibility(nominal.distance, names, min(distance, nominal.distance),
                       float(nominal.values[0]), float(nominal.values[1]))
