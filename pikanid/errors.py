@@ -737,6 +737,13 @@ def edge_argument_still(argument: str, value: float) -> str:
     )
 
 
+def no_static_law(arguments: Sequence[str]) -> str:
+    return (
+        f"No static law of {', '.join(arguments)} explains the recording: what is missing depends "
+        "on something else, on the past, or sits in a sensor or an input."
+    )
+
+
 def discrepancy_not_simulated() -> str:
     return (
         "The model with its discrepancy cannot be simulated along the whole recording: use fewer "
