@@ -17,6 +17,7 @@ from pikanid.version import __version__
 
 if TYPE_CHECKING:
     from pikanid import datasets, excitation, systems, uncertainty
+    from pikanid.discrepancy import kan_discrepancy
     from pikanid.estimate import Estimate
     from pikanid.model import Input, Model, Output, Parameter, State
     from pikanid.recording import Channel, Recording
@@ -39,6 +40,7 @@ _HOMES: dict[str, str | None] = {
     "IPDA": "pikanid.strategies",
     "PINN": "pikanid.strategies",
     "PIKAN": "pikanid.strategies",
+    "kan_discrepancy": "pikanid.discrepancy",
     "simulate": "pikanid.simulation",
     "systems": None,
     "excitation": None,
@@ -60,6 +62,7 @@ __all__ = [
     "IPDA",
     "PINN",
     "PIKAN",
+    "kan_discrepancy",
     "simulate",
     "systems",
     "excitation",

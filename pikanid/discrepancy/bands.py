@@ -1,0 +1,128 @@
+"""What is known about each edge: its band and the test of whether it is there at all.
+
+Bands are Bayesian: the posterior covariance (A + Λ)⁻¹ of coefficients and parameters together,
+whose pointwise intervals cover as often as they say when coverage is averaged along the curve
+(Wahba, J. R. Stat. Soc. B 45, 1983, p. 133; Nychka, J. Am. Stat. Assoc. 83, 1988, p. 1134).  The
+uncertainty of the smoothness ρ is passed on through ∂θ/∂ρ = -(A + Λ)⁻¹ (∂Λ/∂ρ) θ (Wood, Pya &
+Säfken, J. Am. Stat. Assoc. 111, 2016, p. 1548).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.stats import chi2
+
+from pikanid.discrepancy.fit import PenalisedFit
+from pikanid.discrepancy.gauge import Gauge
+from pikanid.discrepancy.smoothness import LARGEST
+
+FEWEST, MOST = 3, 8  # degrees of freedom of the test of an edge
+DRAWS = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Covariance V (n, n) of θ and effective degrees of freedom of every entry (n,)."""
+
+    covariance: np.ndarray
+    freedom: np.ndarray
+
+
+def posterior(fit: PenalisedFit) -> Posterior:
+    """The posterior at the fit; NaN for parameters at a bound."""
+    A, inside = fit.information, fit.inside
+    keep = np.ix_(inside, inside)
+    factor = cho_factor((A + fit.smoothness.precision(fit.rho))[keep])
+    V = cho_solve(factor, np.eye(int(inside.sum())))
+    slopes = []
+    for prior, own in zip(fit.smoothness.priors, fit.smoothness.split(fit.rho), strict=True):
+        for change in prior.slopes(own):
+            push = np.zeros(len(A))
+            push[prior.at] = change @ fit.theta[prior.at]
+            slopes.append(-V @ push[inside])
+    moved = np.column_stack(slopes)
+    spread = fit.smoothness.spread(A, fit.gain, fit.rho)
+    full = np.full(A.shape, np.nan)
+    full[keep] = V + moved @ spread @ moved.T
+    freedom = np.zeros(len(A))
+    freedom[inside] = np.diag(V @ A[keep])
+    return Posterior(full, freedom)
+
+
+def edge_test(fit: PenalisedFit, k: int, gauges: Sequence[Gauge], freedom: float
+              ) -> tuple[float, int]:
+    """p-value and degrees of freedom of the Wald test that edge k is zero after gauge-fixing.
+
+    Tested are the coordinates along the smoothest gauge-fixed functions (and the step), as many as
+    the fit used up, without a penalty on them; what the gauge takes out of the edge is free, other
+    edges keep their smoothness.  Under the null the statistic is χ², or less.
+    """
+    prior, gauge = fit.smoothness.priors[k], gauges[k]
+    count = int(np.clip(round(freedom), FEWEST, MOST))
+    tested = _smoothest(gauge, count)
+    precision = fit.smoothness.precision(fit.rho)
+    precision[np.ix_(prior.at, prior.at)] = np.eye(len(prior.at)) / (
+        len(prior.at) * (LARGEST * prior.size) ** 2)
+    others = np.setdiff1d(np.flatnonzero(fit.inside), prior.at)
+    first = tested.shape[1]
+    columns = np.zeros((len(fit.theta), first + gauge.removed.shape[1] + len(others)))
+    columns[prior.at, :first] = tested
+    columns[prior.at, first:first + gauge.removed.shape[1]] = gauge.removed
+    columns[others, np.arange(columns.shape[1] - len(others), columns.shape[1])] = 1.0
+    H = columns.T @ (fit.information + precision) @ columns
+    V = np.linalg.inv(H)
+    held = np.where(fit.inside, 0.0, fit.theta)
+    estimate = V @ (columns.T @ (fit.gain - fit.information @ held))
+    statistic = float(estimate[:first] @ np.linalg.solve(V[:first, :first], estimate[:first]))
+    return float(chi2.sf(statistic, first)), first
+
+
+def _smoothest(gauge: Gauge, count: int) -> np.ndarray:
+    """Coefficients (K, count) of the smoothest gauge-fixed functions of unit size over the data."""
+    values = np.sqrt(gauge.weights)[:, None] * gauge.plan.basis(gauge.a)
+    moments = values.T @ values
+    bends = gauge.plan.bends()
+    roughness = bends.T @ bends + 1e-9 * np.eye(gauge.plan.size)
+    if gauge.plan.step:
+        roughness[-1, -1] = 1e-9
+    # directions that the data never visit, or that the gauge takes out, have no size
+    u = np.linalg.svd(gauge.projection)[0]
+    basis = u[:, : gauge.plan.size - gauge.removed.shape[1]]
+    inner = basis.T @ moments @ basis + 1e-10 * np.trace(moments) * np.eye(basis.shape[1])
+    _, vectors = eigh(basis.T @ roughness @ basis, inner, subset_by_index=[0, count - 1])
+    return np.asarray(basis @ vectors)
+
+
+def simultaneous_factor(curves: np.ndarray, covariance: np.ndarray, level: float = 0.95) -> float:
+    """How many standard deviations hold the whole curve with probability `level`.
+
+    `curves` (M, K) takes coefficients to values; the largest deviation over the M points is drawn
+    from the posterior (Ruppert, Wand & Carroll, Semiparametric Regression, 2003, sec. 6.5).
+    """
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    spread = curves @ root
+    std = np.linalg.norm(spread, axis=1)
+    drawn = np.random.default_rng(0).normal(size=(spread.shape[1], DRAWS))
+    seen = std > 1e-9 * std.max()
+    worst = np.abs(spread[seen] @ drawn / std[seen, None]).max(axis=0)
+    return float(np.quantile(worst, level))
+
+
+def holm(p: Sequence[float], alpha: float) -> list[bool]:
+    """Which of several tests are significant at α together (Holm, Scand. J. Stat. 6, 1979, p. 65).
+
+    >>> holm([0.004, 0.5, 0.02], 0.05)
+    [True, False, True]
+    """
+    order = np.argsort(p)
+    found = [False] * len(p)
+    for rank, k in enumerate(order):
+        if p[k] > alpha / (len(p) - rank):
+            break
+        found[int(k)] = True
+    return found

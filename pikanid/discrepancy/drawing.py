@@ -1,0 +1,63 @@
+"""Edges drawn, and the same as a piece of HTML."""
+
+from __future__ import annotations
+
+import base64
+import io
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pikanid.discrepancy.result import Discrepancy
+
+LINE, FAINT, BAND = "#0072B2", "#777777", "#BBBBBB"
+
+
+def draw(found: Discrepancy) -> Figure:
+    """One axes an edge: value, 95 % band, and below it how often each value was visited."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    count = len(found.edges)
+    figure = Figure(figsize=(4.0 * count, 3.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    for k, edge in enumerate(found.edges):
+        axes = figure.add_subplot(1, count, k + 1)
+        colour = LINE if edge.significant else FAINT
+        low, high = edge.band
+        axes.fill_between(edge.grid, low, high, color=BAND, alpha=0.6, linewidth=0)
+        # a step is drawn as a gap, not as a steep line
+        jump = np.zeros(len(edge.grid), bool)
+        if edge.step is not None:
+            jump[1:] = np.sign(edge.grid[1:]) != np.sign(edge.grid[:-1])
+        axes.plot(edge.grid, np.where(jump, np.nan, edge.values), color=colour)
+        axes.axhline(0.0, color="black", linewidth=0.6)
+        seen = np.random.default_rng(0).permutation(edge.gauge.a)[:400]
+        axes.plot(seen, np.zeros_like(seen), "|", color="black", alpha=0.15, markersize=8,
+                  transform=axes.get_xaxis_transform())
+        axes.set_xlabel(edge.argument)
+        axes.set_ylabel(f"δ [{edge.unit}]" if k == 0 else "")
+        verdict = "significant" if edge.significant else "nothing significant"
+        axes.set_title(f"{verdict}, p = {edge.p_value:.2g}", fontsize=10)
+    figure.suptitle(f"{found.nominal.model.name}: missing in the equation of {found.equation}")
+    return figure
+
+
+def page(found: Discrepancy) -> str:
+    """Table, sentence and drawing as HTML."""
+    rows = "".join(
+        f"<tr><td>{escape(e.argument)}</td><td>{e.range[0]:.4g} ... {e.range[1]:.4g}</td>"
+        f"<td>{np.max(np.abs(e.values)):.3g} {escape(e.unit)}</td><td>{e.p_value:.2g}</td>"
+        f"<td>{'yes' if e.significant else 'no'}</td></tr>" for e in found.edges)
+    image = io.BytesIO()
+    found.plot().savefig(image, format="png", dpi=90)
+    data = base64.b64encode(image.getvalue()).decode()
+    return (f"<b>Discrepancy</b> of {escape(found.nominal.model.name)} in the equation of "
+            f"{escape(found.equation)}<table><tr><th>edge</th><th>visited range</th>"
+            f"<th>largest</th><th>p</th><th>significant</th></tr>{rows}</table>"
+            f"<p>{escape(found.estimate.sentence())}</p>"
+            f'<img alt="edges with bands" src="data:image/png;base64,{data}">')

@@ -1,0 +1,64 @@
+"""How the outputs would answer to a force that switches its sign with an edge's argument.
+
+Answers w(t) = sign(a(t)) through the variational equation along the fitted trajectory,
+
+    S' = f_x S + e w(t),   δy = h_x S,
+
+with f_x constant over each interval between stops (second order in its length).  It says whether a
+step is worth a fit of its own, before anything is compiled or simulated for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm
+
+from pikanid.discrepancy.edges import EdgePlan, argument_model
+from pikanid.problem import Problem
+from pikanid.shooting import Shooting
+from pikanid.simulation.vectorfield import VectorField
+
+
+def step_responses(shooting: Shooting, theta: np.ndarray, equation: str,
+                   plans: tuple[EdgePlan, ...]) -> np.ndarray:
+    """Standardised answers (rows, edges) of all samples to a unit step at zero of every edge."""
+    problem = shooting.problem
+    parts = []
+    for r, response in enumerate(shooting.responses(theta, states=True)):
+        p = problem.parameters(theta, r)
+        parts.append(_one(problem, r, p, response.t, response.states, equation, plans))
+    return np.concatenate(parts) * shooting.weights[:, None]
+
+
+def _one(problem: Problem, r: int, p: np.ndarray, t: np.ndarray, x: np.ndarray, equation: str,
+         plans: tuple[EdgePlan, ...]) -> np.ndarray:
+    model, experiment = problem.model, problem.experiments[r]
+    field = VectorField(model)
+    right, left = experiment.inputs(t), experiment.inputs(t, side="left")
+    slopes = 0.5 * (field.rhs_jacobians(t[:-1], x[:-1], right[:-1], p)[0]
+                    + field.rhs_jacobians(t[1:], x[1:], left[1:], p)[0])
+    seen = VectorField(argument_model(model, plans))
+    force = _mean_sign(seen.outputs(t[:-1], x[:-1], right[:-1], p),
+                       seen.outputs(t[1:], x[1:], left[1:], p))
+    n = x.shape[1]
+    joint = np.zeros((len(slopes), n + 1, n + 1))
+    joint[:, :n, :n] = slopes
+    joint[:, model.state_names.index(equation), n] = 1.0
+    joint = expm(joint * np.diff(t)[:, None, None])
+    S = np.zeros((len(t), n, len(plans)))
+    for i, (step, push) in enumerate(zip(joint, force, strict=True)):
+        S[i + 1] = step[:n, :n] @ S[i] + step[:n, n:] * push
+    rows = []
+    for samples in experiment.samples:
+        hx = field.output_jacobians(t, x, right, p)[0][:, samples.output]
+        answer = np.einsum("ln,lne->le", hx, S)
+        rows.append(np.column_stack([np.interp(samples.t, t, a) for a in answer.T]))
+    return np.concatenate(rows)
+
+
+def _mean_sign(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Mean of sign(a) over an interval in which a goes straight from `before` to `after`."""
+    span = np.abs(before) + np.abs(after)
+    crossed = (np.sign(before) * np.sign(after) < 0) & (span > 0)
+    share = (np.abs(before) - np.abs(after)) / np.where(span > 0, span, 1.0)
+    return np.where(crossed, np.sign(before) * share, np.sign(before + after))

@@ -1,0 +1,164 @@
+"""How smooth an edge is: second differences of its coefficients, weighed by the evidence.
+
+The prior of an edge's coefficients c (K,) is Gaussian with precision (P-splines: Eilers & Marx,
+Statistical Science 11, 1996, p. 89; as a prior: Lang & Brezger, J. Comp. Graph. Stat. 13, 2004)
+
+    Λ(ρ) = Dᵀ diag(e^{ρ(z)}) D / s² + I/(K (s/10)²),   |D c|² = ∫ (d²δ/dz²)² dz,
+
+with D the second differences and s the size of the equation.  The second part says that a
+discrepancy is small beside the physics that it corrects; it is weak wherever the data speak, and
+makes the prior proper.  log λ = ρ(z) is constant, or a broken line along the edge: then it may be
+rough in one place and smooth elsewhere, as a law with a jump is.
+
+ρ maximises the marginal likelihood of the linearised problem,
+
+    log p(y|ρ) = ½ bᵀ(A + Λ)⁻¹b - ½ log|A + Λ| + ½ log|Λ| + const,   A = JᵀJ, b = Jᵀ(Jθ - r),
+
+(MacKay, Neural Computation 4, 1992, p. 415), whose gradient is exact.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid.discrepancy.edges import EdgePlan
+
+STIFF = 8.0  # log λ of an edge that is nearly straight
+SMOOTHEST, ROUGHEST = 18.0, -12.0  # limits of log λ: beyond them nothing changes any more
+LARGEST = 0.1  # prior size of a discrepancy, in units of the equation's size
+# Prior of the steps between neighbouring pieces of log λ: e^±3 from one to the next is usual.
+STEP = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class EdgePrior:
+    """The prior of the coefficients at positions `at` (K,) in θ.
+
+    `size` is the root mean square of the equation's right-hand side, `pieces` the number of pieces
+    of log λ; `hats` (K', pieces) spreads them over the second differences `bends` (K', K).
+    """
+
+    plan: EdgePlan
+    at: np.ndarray
+    size: float
+    pieces: int = 1
+
+    @functools.cached_property
+    def bends(self) -> np.ndarray:
+        """Second differences in units of the equation's size."""
+        return self.plan.bends() / self.size
+
+    @functools.cached_property
+    def hats(self) -> np.ndarray:
+        """Shares of the pieces in every second difference."""
+        if self.pieces == 1:
+            return np.ones((len(self.bends), 1))
+        place, nodes = np.linspace(0, 1, len(self.bends)), np.linspace(0, 1, self.pieces)
+        return np.column_stack([np.interp(place, nodes, row) for row in np.eye(self.pieces)])
+
+    def precision(self, rho: np.ndarray) -> np.ndarray:
+        """Λ (K, K) at log λ pieces ρ (k,)."""
+        weight = np.exp(self.hats @ rho)
+        return self.bends.T @ (weight[:, None] * self.bends) + np.eye(
+            len(self.at)) / (len(self.at) * (LARGEST * self.size) ** 2)
+
+    def slopes(self, rho: np.ndarray) -> list[np.ndarray]:
+        """∂Λ/∂ρ (K, K), one a piece."""
+        weight = np.exp(self.hats @ rho)
+        D = self.bends
+        return [D.T @ ((weight * hat)[:, None] * D) for hat in self.hats.T]
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothness:
+    """The priors of all edges together; ρ (k_1 + k_2 + ...,) holds their pieces one by one.
+
+    `weak` (n,) are fixed precisions of the entries of θ that are not coefficients.
+    """
+
+    priors: tuple[EdgePrior, ...]
+    weak: np.ndarray
+
+    @property
+    def stiff(self) -> np.ndarray:
+        """ρ of edges that are nearly straight."""
+        return np.full(sum(p.pieces for p in self.priors), STIFF)
+
+    def split(self, rho: np.ndarray) -> list[np.ndarray]:
+        """ρ edge by edge."""
+        return np.split(rho, np.cumsum([p.pieces for p in self.priors])[:-1])
+
+    def precision(self, rho: np.ndarray) -> np.ndarray:
+        """Λ (n, n)."""
+        full = np.diag(self.weak)
+        for prior, own in zip(self.priors, self.split(rho), strict=True):
+            full[np.ix_(prior.at, prior.at)] = prior.precision(own)
+        return full
+
+    def choose(self, A: np.ndarray, b: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, float]:
+        """The ρ of largest evidence (times the prior of its steps), and -log evidence there.
+
+        The evidence has several maxima: it is climbed from `start` and from stiff edges.
+
+        Parameters
+        ----------
+        A, b : JᵀJ (n, n) and Jᵀ(Jθ - r) (n,) in units of the noise
+        """
+        from scipy.optimize import minimize
+
+        def cost(rho: np.ndarray) -> tuple[float, np.ndarray]:
+            return self.cost(A, b, rho)
+
+        found = [minimize(cost, first, jac=True, method="L-BFGS-B",
+                          bounds=[(ROUGHEST, SMOOTHEST)] * len(start),
+                          options={"maxiter": 60, "ftol": 1e-8})
+                 for first in (start, np.full_like(start, STIFF))]
+        best = min(found, key=lambda f: f.fun)
+        return np.asarray(best.x), float(best.fun)
+
+    def cost(self, A: np.ndarray, b: np.ndarray, rho: np.ndarray) -> tuple[float, np.ndarray]:
+        """-log evidence and its gradient in ρ."""
+        from scipy.linalg import cho_factor, cho_solve
+
+        factor = cho_factor(A + self.precision(rho))
+        inverse = cho_solve(factor, np.eye(len(b)))
+        theta = inverse @ b
+        cost = -0.5 * float(b @ theta) + float(np.log(np.diag(factor[0])).sum())
+        gradient = []
+        for prior, own in zip(self.priors, self.split(rho), strict=True):
+            own_precision = prior.precision(own)
+            cost -= 0.5 * float(np.linalg.slogdet(own_precision)[1])
+            spread = inverse[np.ix_(prior.at, prior.at)] - np.linalg.inv(own_precision)
+            c = theta[prior.at]
+            gradient += [0.5 * float(np.sum(spread * slope) + c @ slope @ c)
+                         for slope in prior.slopes(own)]
+        steps, back = self._steps(rho)
+        return cost + 0.5 * float(steps @ steps), np.array(gradient) + back
+
+    def _steps(self, rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Differences of neighbouring pieces over STEP, and the gradient of half their square."""
+        steps, back = [], []
+        for own in self.split(rho):
+            step = np.diff(own) / STEP
+            steps.append(step)
+            edge = np.zeros(len(own))
+            edge[1:] += step / STEP
+            edge[:-1] -= step / STEP
+            back.append(edge)
+        return np.concatenate(steps), np.concatenate(back)
+
+    def spread(self, A: np.ndarray, b: np.ndarray, rho: np.ndarray) -> np.ndarray:
+        """Covariance of ρ (k, k): inverse curvature of the cost, by differences of its gradient."""
+        k = len(rho)
+        curvature = np.zeros((k, k))
+        for i in range(k):
+            move = np.zeros(k)
+            move[i] = 0.1
+            ahead, behind = (self.cost(A, b, rho + s * move)[1] for s in (1.0, -1.0))
+            curvature[i] = (ahead - behind) / 0.2
+        values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+        # where the evidence is flat ρ is still known to a few units: its limits
+        return (vectors / np.maximum(values, 0.1)) @ vectors.T
