@@ -919,3 +919,10 @@ def conceal_other_settings(place: str) -> str:
 
 def truth_unreadable(path: str, detail: str) -> str:
     return f"The truth file '{_short(path, 200)}' cannot be read: {detail}."
+
+
+def diagnosis_unreadable(case: str, detail: object) -> str:
+    return (
+        f"The diagnosis of case '{_short(case)}' cannot be scored: {_short(str(detail))} (wanted: "
+        "verdict, mismatch, and hypotheses with effects' ids and a probability)."
+    )
