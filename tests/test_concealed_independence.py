@@ -53,7 +53,7 @@ def test_making_a_set_loads_nothing_else() -> None:
         "from pikanid.concealed.generate import orders_of\n"
         "from pikanid.concealed.case import make\n"
         "from pikanid.concealed.seal import Settings, secret\n"
-        "make(orders_of(Settings(1, 'two_pulse', 1e-3, {'single': 1.0}), secret(0))[0])\n"
+        "make(orders_of(Settings(1, 'two_pulse', 1e-3, {'nothing': 1.0}), secret(0))[0])\n"
         "print(*sorted(name for name in sys.modules if name.startswith('pikanid.')))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     foreign = {name for name in done.stdout.split() if not allowed(name)}

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,9 @@ from pikanid.concealed.seal import Settings
 from pikanid.concealed.visibility import Visibility
 from pikanid.recording import Recording
 
-SMALL = Settings(8, "two_pulse", 0.1 * np.pi / 180, dict(DEFAULT_MIX))
+SMALL = Settings(4, "two_pulse", 0.1 * np.pi / 180, dict(DEFAULT_MIX))
 CLEAN = Settings(3, "two_pulse", 1e-3, {"nothing": 1.0})
+LONGER = Settings(6, "two_pulse", 1e-3, {"nothing": 1.0})
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -47,7 +49,7 @@ def test_what_is_written(made: tuple[Path, Path]) -> None:
     truth = json.loads(file.read_text())
     assert truth["open"]
     assert not truth["sealed"]
-    assert len(truth["cases"]) == 8
+    assert len(truth["cases"]) == 4
     wanted = {"seal.json"} | {n for entry in truth["cases"] for n in entry["files"].values()}
     assert set(content(folder)) == wanted
     assert not (file.parent / "truth.json.unfinished").exists()
@@ -88,11 +90,13 @@ def test_altered_recording_is_noticed(tmp_path: Path) -> None:
     assert not seal.matches(tmp_path / "d", tmp_path / "t.json")
 
 
-def test_same_seed_same_bytes_whatever_the_workers(made: tuple[Path, Path],
-                                                   tmp_path: Path) -> None:
-    generate(tmp_path / "d", tmp_path / "t.json", SMALL, seed=11, workers=2)
-    assert content(tmp_path / "d") == content(made[0])
-    assert (tmp_path / "t.json").read_bytes() == made[1].read_bytes()
+@pytest.mark.parametrize("settings", [
+    CLEAN, pytest.param(replace(SMALL, cases=12), marks=pytest.mark.slow)], ids=["clean", "mixed"])
+def test_same_seed_same_bytes_whatever_the_workers(settings: Settings, tmp_path: Path) -> None:
+    for name, workers in (("a", 1), ("b", 2)):
+        generate(tmp_path / name, tmp_path / f"{name}.json", settings, seed=11, workers=workers)
+    assert content(tmp_path / "a") == content(tmp_path / "b")
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
 def test_sealed_sets_differ_and_keep_their_seed_in_the_truth(tmp_path: Path) -> None:
@@ -108,8 +112,8 @@ def test_sealed_sets_differ_and_keep_their_seed_in_the_truth(tmp_path: Path) -> 
     assert content(tmp_path / "a")["001_train.csv"] != content(tmp_path / "b")["001_train.csv"]
 
 
-def test_interrupted_run_goes_on(made: tuple[Path, Path], tmp_path: Path,
-                                 monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    generate(tmp_path / "whole", tmp_path / "whole.json", LONGER, seed=11, workers=1)
     make, done = room.make, []
 
     def stopped(order: room.Order) -> object:
@@ -120,18 +124,18 @@ def test_interrupted_run_goes_on(made: tuple[Path, Path], tmp_path: Path,
 
     monkeypatch.setattr(room, "make", stopped)
     with pytest.raises(KeyboardInterrupt):
-        generate(tmp_path / "d", tmp_path / "t.json", SMALL, seed=11, workers=1)
+        generate(tmp_path / "d", tmp_path / "t.json", LONGER, seed=11, workers=1)
     assert not (tmp_path / "t.json").exists()
     assert content(tmp_path / "d") == {}  # nothing half-made is given away
     monkeypatch.setattr(room, "make", make)
     # What a killed run may leave behind: a recording without its entry, a half-written file.
     progress = tmp_path / "t.json.unfinished"
-    (progress / "008_train.csv").write_text("half")
+    (progress / "006_train.csv").write_text("half")
     (tmp_path / "d" / ".001_train.csv.abc").write_text("half")
-    again = generate(tmp_path / "d", tmp_path / "t.json", SMALL, seed=11, workers=1)
-    assert (again.kept, again.made) == (3, 5)
-    assert content(tmp_path / "d") == content(made[0])
-    assert (tmp_path / "t.json").read_bytes() == made[1].read_bytes()
+    again = generate(tmp_path / "d", tmp_path / "t.json", LONGER, seed=11, workers=1)
+    assert (again.kept, again.made) == (3, 3)
+    assert content(tmp_path / "d") == content(tmp_path / "whole")
+    assert (tmp_path / "t.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
 
 
 def test_damaged_case_of_an_unfinished_set_is_made_again(tmp_path: Path,
@@ -149,7 +153,7 @@ def test_damaged_case_of_an_unfinished_set_is_made_again(tmp_path: Path,
 def test_finished_set_is_left_alone(made: tuple[Path, Path]) -> None:
     before = content(made[0])
     again = generate(*made, SMALL, seed=11)
-    assert (again.made, again.kept) == (0, 8)
+    assert (again.made, again.kept) == (0, 4)
     assert content(made[0]) == before
     with pytest.raises(errors.BadSetting, match="something else"):
         generate(*made, SMALL, seed=12)
@@ -276,13 +280,14 @@ def test_classifier_on_metadata_would_see_a_hint() -> None:
     assert p < 0.01
 
 
-@pytest.mark.parametrize("excitation", [
-    "two_pulse", pytest.param("rich", marks=pytest.mark.slow)])
-def test_metadata_carry_no_hint(excitation: str, tmp_path: Path,
+@pytest.mark.parametrize(("excitation", "cases"), [
+    ("two_pulse", 40), pytest.param("two_pulse", 200, marks=pytest.mark.slow),
+    pytest.param("rich", 200, marks=pytest.mark.slow)])
+def test_metadata_carry_no_hint(excitation: str, cases: int, tmp_path: Path,
                                 monkeypatch: pytest.MonkeyPatch) -> None:
     # How visible an effect is does not enter its files: left out, to be quick.
     monkeypatch.setattr(case, "visibility", lambda *a: Visibility(0.0, (), 0.0, 0.05, 0.1))
-    settings = Settings(100, excitation, 1e-3, dict(DEFAULT_MIX))
+    settings = Settings(cases, excitation, 1e-3, dict(DEFAULT_MIX))
     generate(tmp_path / "d", tmp_path / "t.json", settings, seed=4, workers=1)
     truth = json.loads((tmp_path / "t.json").read_text())
     x = np.array([features(tmp_path / "d", entry) for entry in truth["cases"]], dtype=float)

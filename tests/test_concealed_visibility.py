@@ -102,6 +102,10 @@ def test_half_of_a_pair_is_a_rival() -> None:
     faint = seen(Rig(coulomb=2.0, offset=1e-5), "coulomb_friction", "sensor_offset")
     assert "coulomb_friction" in faint.rival
     assert faint.distance < 1.0
+
+
+@pytest.mark.slow
+def test_strong_pair_has_no_close_rival() -> None:
     strong = seen(Rig(coulomb=2.0, offset=0.02), "coulomb_friction", "sensor_offset")
     assert strong.distance > 5.0
 
