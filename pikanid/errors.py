@@ -571,7 +571,7 @@ def not_finite(time: float, values: str) -> str:
 
 def too_many_events(time: float) -> str:
     return (
-        f"The model switches without end near t = {time:g} s (more than 100000 events): "
+        f"The model switches without end near t = {time:g} s (over 1000 events in one step): "
         "a non-smooth term chatters; check its sign."
     )
 
@@ -749,6 +749,20 @@ def discrepancy_not_simulated() -> str:
         "The model with its discrepancy cannot be simulated along the whole recording: use fewer "
         "arguments, or a nominal model that follows the recording more closely."
     )
+
+
+# --- formulas of edges ---------------------------------------------------------------------------
+
+
+def edge_points(x: int, y: int, fewest: int) -> str:
+    return (
+        f"An edge of {x} arguments and {y} values cannot be named: give at least {fewest} finite "
+        "points (x, y) over which x moves."
+    )
+
+
+def candidate_without_argument(text: str, argument: str) -> str:
+    return f"The candidate '{_short(text)}' does not contain its argument '{argument}'."
 
 
 # --- estimates -----------------------------------------------------------------------------------

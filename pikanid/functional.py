@@ -73,6 +73,12 @@ class Functional:
         """Number of samples that take part."""
         return sum(sites.t.size for part in self.parts for sites in part.data)
 
+    @property
+    def data_square(self) -> float:
+        """Weighted sum of squares of the samples themselves."""
+        return sum(float(np.sum((sites.weight * sites.target) ** 2))
+                   for part in self.parts for sites in part.data if sites.target is not None)
+
     def complete(self, r: int, coefficients: Array, theta: Array) -> Array:
         """The coefficients with the held ones set from the initial state x0(p)."""
         part = self.parts[r]

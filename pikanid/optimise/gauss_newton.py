@@ -207,6 +207,8 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
 # A stop without decrease counts as converged up to this many times one datum's share of the cost:
 # the estimate is then within a tenth of a standard error.
 ROUNDING = 1e-2
+# A promise below this share of the samples' own sum of squares is one of rounding (clean data).
+NOTHING = 1e-16
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,9 +231,10 @@ def gauss_newton(system: BandedSystem, point: Point, lam: float, lower: Array, u
     """
     at = system.linearise(point, lam)
     share = 1.0 / max(1, system.functional.n_data)
+    nothing = NOTHING * system.functional.data_square
     damping, done = 0.0, 0
     step = damped_step(system, at, lower, upper, damping)
-    while step.promised > tolerance * share * at.cost:
+    while step.promised > max(tolerance * share * at.cost, nothing):
         if done == iterations:
             return Outcome(at, damped_step(system, at, lower, upper, 0.0), done, False)
         for _ in range(20):

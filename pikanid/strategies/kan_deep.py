@@ -42,6 +42,7 @@ ROOM = 1.6  # of a hidden grid's half width to the start's amplitude in it
 ITERATIONS = 30  # at one λ
 CALM = 10  # iterations without a move of θ that count as convergence
 LARGEST_LAMBDA = 1e9
+MOST_KINKS = 500  # a border of the normal equations, dense
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,10 @@ def deep_fit(setup: Setup, start: RelaxedFit, shape: Shape, lam: float | None,
     assert isinstance(grid, KanGrid)
     if max(chains.lengths) > HIGHEST:
         raise errors.BadSetting(errors.kan_order(max(chains.lengths), HIGHEST))
+    kinks = sum(len(network.kink_columns) for part in start.functional.parts
+                for network in part.approximators if isinstance(network, ShallowKAN))
+    if kinks > MOST_KINKS:
+        raise errors.BadSetting(errors.kan_kinks(kinks, MOST_KINKS))
     curves = []
     for part, c in zip(start.functional.parts, start.coefficients, strict=True):
         curves.append(tuple(

@@ -19,6 +19,8 @@ from pikanid.approximators.tables import gauss_nodes
 from pikanid.chains import Chains
 from pikanid.problem import Experiment, Problem
 
+MOST_CELLS = 20_000  # of a grid whose cells follow the switches
+
 
 @dataclass(frozen=True)
 class KanGrid:
@@ -32,6 +34,8 @@ class KanGrid:
         spaced collocation points, Table II)
     base : "zero" (w_b = 0) or "silu"
     seed : of pykan's initial coefficients, which a fit overwrites
+    points : Gauss nodes in a cell
+    apart : cells between two switches that both get kinks, at least
     """
 
     intervals: int
@@ -41,6 +45,8 @@ class KanGrid:
     count: int = 501
     base: Literal["zero", "silu"] = "zero"
     seed: int = 0
+    points: int = 3
+    apart: float = 2.0
 
     knots = "kan"
     locks = True
@@ -74,9 +80,9 @@ class KanGrid:
         if not self.exact_switches:
             return []
         # more than a few kinks a cell would make the basis dependent: the grid must resolve them
-        spacing = (stop - start) / self.intervals
-        if len(times) > 1 and np.min(np.diff(times)) < 2 * spacing:
-            times = times[np.concatenate([[True], np.diff(times) >= 2 * spacing])]
+        least = (self.apart - 1e-6) * (stop - start) / self.intervals
+        if len(times) > 1 and np.min(np.diff(times)) < least:
+            times = times[np.concatenate([[True], np.diff(times) >= least])]
         return [float(t) for t in times]
 
     def nodes(self, problem: Problem, chains: Chains) -> list[tuple[Array, Array]]:
@@ -87,13 +93,34 @@ class KanGrid:
                 t = np.linspace(e.t0, e.t1, self.count)
                 found.append((t, np.ones(self.count)))
                 continue
-            found.append(gauss_nodes(self.panels(e), 3))
+            found.append(gauss_nodes(self.panels(e), self.points))
         return found
 
     def panels(self, experiment: Experiment) -> Array:
         """Grid cells (E + 1,), split where an input switches: no Gauss node may straddle that."""
         cells = np.linspace(experiment.t0, experiment.t1, self.intervals + 1)
         return np.union1d(cells, experiment.breakpoints()) if self.exact_switches else cells
+
+    @staticmethod
+    def crowded(problem: Problem, order: int, cells: float) -> KanGrid | None:
+        """A grid for inputs that switch all the time; None where they do not, or too unevenly.
+
+        Where there are more than a quarter as many switches as cells that the motion asks for, the
+        cells are as wide as the shortest time between switches.  With a switch in every cell, and
+        kinks of the equation's order there beside splines of one degree more, the space is that of
+        collocation at two Gauss points: as many coefficients as conditions.
+        """
+        count = 0.0
+        for e in problem.experiments:
+            times, duration = e.breakpoints(), e.t1 - e.t0
+            if 4 * times.size <= cells:
+                return None
+            gaps = np.diff(np.concatenate([[e.t0], times, [e.t1]]))
+            count = max(count, duration / float(gaps.min()))
+        intervals = int(np.ceil(max(count, cells) - 1e-6))
+        if intervals > MOST_CELLS:
+            return None
+        return KanGrid(intervals, order + 1, points=2, apart=1.0)
 
     def refined(self) -> KanGrid:
         """Every cell halved."""

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
 from pikanid import errors
 from pikanid.approximators import Array
@@ -19,6 +20,7 @@ from pikanid.functional import Functional
 from pikanid.optimise.gauss_newton import BandedSystem, Outcome, Point, damped_step
 from pikanid.optimise.schedules import Stage
 from pikanid.strategies.kan_grids import KanGrid
+from pikanid.strategies.kan_shallow import unfitted
 from pikanid.strategies.relaxation import RelaxedFit, Setup, conclude
 
 STAGES = ((10, 0.0, 200), (20, 0.05, 200), (40, 0.1, 200), (40, 1.0, 500))  # grid, λ, steps
@@ -48,13 +50,18 @@ def paper_fit(setup: Setup, degree: int, seed: int, progress: Progress | None
         stages.append(Stage(lam, theta, np.full(theta.size, np.nan), *costs, used, used < steps))
         if progress is not None:
             progress({"grid": float(cells), "lam": lam, "data": costs[0], "physics": costs[1]})
+    said = {"gradient_norm": gradient, "steps": used}
     system = BandedSystem(functional)
     at = system.linearise(point, lam)
-    step = damped_step(system, at, setup.problem.lower, setup.problem.upper, 1e-8)
+    try:
+        step = damped_step(system, at, setup.problem.lower, setup.problem.upper, 1e-8)
+    except LinAlgError:
+        note = errors.fit_diverged("under L-BFGS")
+        return unfitted(setup, grid, functional, point, note, stages), said
     finished = stages[-1].converged
     notes = [] if finished else [errors.lbfgs_stopped(steps, gradient)]
     fit = conclude(setup, grid, system, Outcome(at, step, used, finished), stages, notes)
-    return fit, {"gradient_norm": gradient, "steps": used}
+    return fit, said
 
 
 def _refined(old: list[tuple[ShallowKAN, ...]], functional: Functional
@@ -90,10 +97,9 @@ def _lbfgs(functional: Functional, point: Point, lam: float, steps: int
 
     def cost(z: Array) -> tuple[float, Array]:
         at = unpack(z)
-        r = functional.residual(at.coefficients, at.theta, lam)
-        gradient = functional.jacobian(at.coefficients, at.theta, lam).T @ r
+        value, gradient = cost_and_gradient(functional, at, lam)
         gradient[sizes[-1]:] *= unit
-        return float(r @ r), 2 * gradient
+        return value, gradient
 
     free = [(None, None)] * int(sizes[-1])
     box = [(b[0] / s, b[1] / s) for b, s in zip(
@@ -103,6 +109,27 @@ def _lbfgs(functional: Functional, point: Point, lam: float, steps: int
                      options={"maxiter": steps, "maxfun": 10 * steps, "ftol": 1e-15,
                               "gtol": 1e-10, "maxcor": 20})
     return unpack(found.x), float(np.linalg.norm(found.jac)), int(found.nit)
+
+
+def cost_and_gradient(functional: Functional, at: Point, lam: float) -> tuple[float, Array]:
+    """The cost of Eq. (2) and its gradient in [α_1, α_2, ..., θ]."""
+    total, by_theta, pieces = 0.0, np.zeros(at.theta.size), []
+    for r, c in enumerate(at.coefficients):
+        own, (_, columns) = np.zeros(c.size), functional.problem.columns(r)
+        for sites, rows in zip(functional.families(r), functional.rows(r, c, at.theta, lam),
+                               strict=True):
+            total += float(np.sum(rows.residual**2))
+            if rows.by_state is not None:
+                pulls = np.einsum("me,mes->ms", rows.residual, rows.by_state)
+                for pull, table in zip(pulls.T, sites.states, strict=True):
+                    own[table.part] += pull @ table.basis
+            if rows.by_top is not None:
+                for pull, table in zip((rows.residual * rows.by_top).T, sites.tops, strict=True):
+                    own[table.part] += pull @ table.basis
+            if rows.by_theta is not None:
+                by_theta[columns] += np.einsum("me,meb->b", rows.residual, rows.by_theta)
+        pieces.append(own)
+    return total, 2.0 * np.concatenate([*pieces, by_theta])
 
 
 def _costs(functional: Functional, point: Point, lam: float) -> tuple[float, float]:

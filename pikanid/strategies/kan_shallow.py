@@ -41,7 +41,7 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, refine: bool, max_grid: int, lam
     the next, finer grid starts from the last one's curve at a tenth of its λ.
     """
     if refine:
-        cells = _cells(setup)
+        cells = cells_of(setup)
         while grid.intervals < cells and 2 * grid.intervals <= max_grid:
             grid = grid.refined()
     functional = setup.functional(grid)
@@ -62,7 +62,7 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, refine: bool, max_grid: int, lam
         except LinAlgError:
             broken = errors.fit_diverged(f"on a grid of {grid.intervals} cells")
             if best is None:
-                return _unfitted(setup, grid, functional, point, broken)
+                return unfitted(setup, grid, functional, point, broken)
             return conclude(setup, best[0], best[1], best[2], stages, [broken])
         tell(grid.intervals, found)
         gap = np.inf if not stages else moved(
@@ -83,21 +83,22 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, refine: bool, max_grid: int, lam
     return conclude(setup, *best, stages, notes)
 
 
-def _cells(setup: Setup) -> float:
+def cells_of(setup: Setup) -> float:
     """Cells that the fastest linearised motion asks for."""
     rates = [fastest_rate(setup.problem, setup.field, r) * (e.t1 - e.t0)
              for r, e in enumerate(setup.problem.experiments)]
     return max(rates) / RADIANS
 
 
-def _unfitted(setup: Setup, grid: KanGrid, functional: Functional, point: Point,
-              note: str) -> RelaxedFit:
-    """The curves that smooth the data, θ at its guess: all there is where no step was possible."""
+def unfitted(setup: Setup, grid: KanGrid, functional: Functional, point: Point, note: str,
+             stages: Sequence[Stage] = ()) -> RelaxedFit:
+    """A point without covariances: all there is where no Gauss-Newton step is possible."""
     unknown = np.full((point.theta.size, point.theta.size), np.nan)
     cost = sum(float(np.sum(rows.residual**2)) for r, c in enumerate(point.coefficients)
                for rows in functional.data_rows(r, c, point.theta))
+    lam = stages[-1].lam if stages else 0.0
     return RelaxedFit(setup.problem, point.theta, unknown, unknown, point.coefficients, functional,
-                      grid, 0.0, (), cost, np.nan, np.nan, False, (note,))
+                      grid, lam, tuple(stages), cost, np.nan, np.nan, False, (note,))
 
 
 def _carried(old: Functional, new: Functional, point: Point) -> Point:

@@ -27,7 +27,7 @@ from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.kan_deep import Shape, deep_fit
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.kan_paper import paper_fit
-from pikanid.strategies.kan_shallow import shallow_fit
+from pikanid.strategies.kan_shallow import cells_of, shallow_fit
 from pikanid.strategies.kan_trajectories import KanTrajectories
 from pikanid.strategies.relaxation import RelaxedFit, Setup, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
@@ -122,8 +122,13 @@ class PIKAN:
         longest = max(setup.chains.lengths)
         grid = KanGrid(self.grid or FIRST_GRID, self.degree or max(5, longest + 3),
                        self.exact_switches, base="zero" if deep else self.base, seed=self.seed)
-        fit = shallow_fit(setup, grid, refine=self.grid is None, max_grid=self.max_grid,
-                          lam=self.lam, tell=self._tell)
+        most = self.max_grid
+        if self.grid is None and self.exact_switches and self.degree is None:
+            found = KanGrid.crowded(problem, longest, cells_of(setup))
+            if found is not None:
+                grid, most = found, max(most, 2 * found.intervals)
+        fit = shallow_fit(setup, grid, refine=self.grid is None, max_grid=most, lam=self.lam,
+                          tell=self._tell)
         if not deep or not fit.stages:
             return fit
         if self.grid is not None:  # what the shallow one lacks on this grid, this one may have
