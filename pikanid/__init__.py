@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from pikanid.version import __version__
 
 if TYPE_CHECKING:
-    from pikanid import datasets, excitation, systems, uncertainty
+    from pikanid import datasets, excitation, symbolic, systems, uncertainty
     from pikanid.discrepancy import kan_discrepancy
     from pikanid.estimate import Estimate
     from pikanid.model import Input, Model, Output, Parameter, State
@@ -42,6 +42,7 @@ _HOMES: dict[str, str | None] = {
     "PIKAN": "pikanid.strategies",
     "kan_discrepancy": "pikanid.discrepancy",
     "simulate": "pikanid.simulation",
+    "symbolic": None,
     "systems": None,
     "excitation": None,
     "uncertainty": None,
@@ -64,6 +65,7 @@ __all__ = [
     "PIKAN",
     "kan_discrepancy",
     "simulate",
+    "symbolic",
     "systems",
     "excitation",
     "uncertainty",

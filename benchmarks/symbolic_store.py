@@ -1,0 +1,30 @@
+"""Results of a long report, kept one a line in build/, so that an interrupted run goes on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+BUILD = Path("build") / "symbolic"
+
+
+def collected(part: str, function: Callable[..., dict[str, Any]],
+              cases: Sequence[tuple[Any, ...]]) -> list[dict[str, Any]]:
+    """The result of every case, from the file of an earlier run where it is there."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    path = BUILD / f"{part}.jsonl"
+    known: dict[str, dict[str, Any]] = {}
+    if path.exists():
+        for line in path.read_text(encoding="utf-8").splitlines():
+            entry = json.loads(line)
+            known[json.dumps(entry["case"])] = entry["result"]
+    for case in cases:
+        key = json.dumps(list(case))
+        if key in known:
+            continue
+        known[key] = function(*case)
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"case": list(case), "result": known[key]}) + "\n")
+    return [known[json.dumps(list(case))] for case in cases]

@@ -1,0 +1,152 @@
+"""One edge as data: points with noise, or a spline's coefficients with their covariance.
+
+Naming needs least squares of y against a few functions of x, in units of the noise, beside columns
+that are free anyway: the constant, and what an edge cannot show (its gauge).  `Curve` gives exactly
+that, whatever the edge came from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.symbolic.numeric import Array
+
+FEWEST = 8  # points that can name anything
+EXACT = 1e-6  # of the spread of y: closer than this nothing is told apart
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """An edge over its range.
+
+    Attributes
+    ----------
+    x, y : argument and value (n,), sorted by x
+    weight : functions of x are compared as `weight @ f`: (r, n), or (n,) for a diagonal; in units
+        of the noise where `known`
+    known : whether the noise is known, or only that all of `weight` is equally noisy
+    free : further columns (n, m) that every candidate may use
+    samples : number of observations behind the curve, for BIC
+    argument, unit, x_unit : what x and y are
+    """
+
+    x: Array
+    y: Array
+    weight: Array
+    known: bool
+    free: Array
+    samples: int
+    argument: str = "x"
+    unit: str = ""
+    x_unit: str = ""
+    target: Array = field(default_factory=lambda: np.empty(0))
+
+    @staticmethod
+    def of_points(x: Array, y: Array, sigma: float | Array | None = None, *,
+                  argument: str = "x", unit: str = "", x_unit: str = "") -> Curve:
+        """Points with independent noise of standard deviation sigma; None: equal and unknown.
+
+        Raises
+        ------
+        pikanid.errors.BadSetting : fewer than 8 points, values that are not finite, an x that does
+            not move, a sigma that is not positive
+        """
+        x, y = np.asarray(x, float).ravel(), np.asarray(y, float).ravel()
+        if len(x) != len(y) or len(x) < FEWEST or not np.isfinite([x, y]).all() or np.ptp(x) == 0:
+            raise errors.BadSetting(errors.edge_points(len(x), len(y), FEWEST))
+        order = np.argsort(x, kind="stable")
+        spread = np.ones(len(x))
+        if sigma is not None:
+            spread = np.broadcast_to(np.asarray(sigma, float), x.shape)[order]
+            if not (np.isfinite(spread).all() and np.all(spread > 0)):
+                raise errors.BadSetting(errors.bad_value("sigma", sigma, "a positive number"))
+        weight = 1.0 / spread
+        return Curve(x[order], y[order], weight, sigma is not None, np.empty((len(x), 0)), len(x),
+                     argument, unit, x_unit, weight * y[order])
+
+    @staticmethod
+    def of_covariance(x: Array, y: Array, covariance: Array, *, samples: int | None = None,
+                      free: Array | None = None, argument: str = "x", unit: str = "",
+                      x_unit: str = "") -> Curve:
+        """Values (n,) with a full covariance (n, n), which may be singular.
+
+        Directions of y that have no variance at all are left out of the comparison: a spline is
+        not blamed for what it cannot follow.
+        """
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        order = np.argsort(x, kind="stable")
+        V = 0.5 * (covariance + covariance.T)[np.ix_(order, order)]
+        values, vectors = np.linalg.eigh(V)
+        good = values > 1e-9 * values[-1]
+        weight = (vectors[:, good] / np.sqrt(values[good])).T
+        extra = np.empty((len(x), 0)) if free is None else np.asarray(free, float)[order]
+        return Curve(x[order], y[order], weight, True, extra, samples or int(good.sum()), argument,
+                     unit, x_unit, weight @ y[order])
+
+    @property
+    def low(self) -> float:
+        """Lower end of the range."""
+        return float(self.x[0])
+
+    @property
+    def high(self) -> float:
+        """Upper end of the range."""
+        return float(self.x[-1])
+
+    @property
+    def rows(self) -> int:
+        """Number of whitened values r."""
+        return len(self.target)
+
+    def whiten(self, functions: Array) -> Array:
+        """Functions of x (..., n) as they are compared (..., r)."""
+        if self.weight.ndim == 1:
+            return functions * self.weight
+        return functions @ self.weight.T
+
+    @cached_property
+    def fixed(self) -> Array:
+        """Orthonormal basis (r, m) of the whitened constant and free columns."""
+        columns = np.vstack([np.ones(len(self.x)), self.free.T])
+        u, s, _ = np.linalg.svd(self.whiten(columns).T, full_matrices=False)
+        return np.asarray(u[:, s > 1e-10 * s[0]])
+
+    def project(self, whitened: Array) -> Array:
+        """Whitened functions (..., r) without their constant and free parts."""
+        return whitened - (whitened @ self.fixed) @ self.fixed.T
+
+    @cached_property
+    def centred(self) -> Array:
+        """The whitened values (r,) without their constant and free parts."""
+        return self.project(self.target)
+
+    @cached_property
+    def total(self) -> float:
+        """Sum of squares of `centred`."""
+        return float(self.centred @ self.centred)
+
+    @cached_property
+    def floor(self) -> float:
+        """Mean square that counts as none: rounding, and iterations that stop."""
+        return EXACT**2 * self.total / self.rows
+
+    def score(self, rss: float, parameters: int) -> float:
+        """BIC of a fit with this residual sum of squares, up to a constant of the curve."""
+        penalty = parameters * float(np.log(max(self.samples, 2)))
+        if self.known:
+            return rss + penalty
+        return self.rows * float(np.log(rss / self.rows + self.floor + 1e-300)) + penalty
+
+    def variance(self, rss: float, parameters: int) -> float:
+        """Of whitened values: 1 where the noise is known."""
+        return 1.0 if self.known else rss / max(self.rows - parameters, 1)
+
+    def thinned(self, most: int) -> Callable[[Array], Array]:
+        """Which points a first search may do with: a slice of functions (..., n)."""
+        step = 1 if self.weight.ndim == 2 else max(1, len(self.x) // most)
+        return lambda functions: functions[..., ::step]

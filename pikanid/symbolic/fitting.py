@@ -1,0 +1,247 @@
+"""Fits one form to one curve by variable projection.
+
+For given parameters inside a form its amplitudes follow from linear least squares, so that only the
+one or two parameters inside are searched: over a grid, all of it at once, then by
+Levenberg-Marquardt on the projected residual (Golub & Pereyra, SIAM J. Numer. Anal. 10, 1973,
+p. 413; the Jacobian is Kaufman's, BIT 15, 1975, p. 49).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.library import Form
+from pikanid.symbolic.numeric import Array
+
+SEARCHED = 400  # points of the first search
+STARTS = 2
+ITERATIONS = 60
+GAIN = 1e-6  # relative decrease below which no ranking changes
+
+
+@dataclass(frozen=True, eq=False)
+class FormFit:
+    """A form at its best on a curve.
+
+    `amplitudes` (k,), `inside` (q,) and `offset`; `covariance` (k + q + 1,) squared in this order;
+    `values` (n,) on the curve's x, the free columns' part left out; `shape` (r,) whitened, without
+    constant and free parts.
+    """
+
+    form: Form
+    amplitudes: Array
+    inside: Array
+    offset: float
+    rss: float
+    covariance: Array
+    values: Array
+    shape: Array
+
+    @property
+    def finite(self) -> bool:
+        """Whether there is a fit at all."""
+        return bool(np.isfinite(self.rss))
+
+
+def fit_form(form: Form, curve: Curve) -> FormFit | None:
+    """The least-squares fit; None where the form does not exist on the curve's range."""
+    if not form.fits_range(curve.low, curve.high):
+        return None
+    if not form.knobs:
+        return _finish(form, curve, np.empty(0))
+    starts = _search(form, curve)
+    if form.smooth:
+        starts = [_descend(form, curve, start) for start in starts]
+    fits = [f for f in (_finish(form, curve, p) for p in starts) if f is not None]
+    return min(fits, key=lambda f: f.rss, default=None)
+
+
+def _search(form: Form, curve: Curve) -> list[Array]:
+    """The best places of a grid, apart from each other."""
+    count = len(curve.x)
+    thin = curve.thinned(SEARCHED)
+    x, free = thin(curve.x), thin(curve.free.T)
+    grids = [k.grid(curve.low, curve.high, count) for k in form.knobs]
+    if not form.smooth:  # a step: between any two samples
+        at = np.unique(x)
+        grids = [0.5 * (at[1:] + at[:-1])]
+    mesh = np.stack([g.ravel() for g in np.meshgrid(*grids, indexing="ij")], axis=1)
+    rss = _profile(form, curve, mesh, x, free, thin)
+    order = np.argsort(rss)
+    found: list[Array] = []
+    for i in order[np.isfinite(rss[order])]:
+        near = [np.all(np.abs(mesh[i] - q) <= 2.01 * _spacing(grids, q)) for q in found]
+        if not any(near):
+            found.append(mesh[i])
+        if len(found) == STARTS:
+            break
+    if not form.smooth and found:
+        found = [_nearest_gap(form, curve, q) for q in found]
+    return found
+
+
+def _spacing(grids: list[Array], q: Array) -> Array:
+    return np.array([np.max(np.diff(g)[max(0, np.searchsorted(g, v) - 1):][:2], initial=0.0)
+                     for g, v in zip(grids, q, strict=True)])
+
+
+def _nearest_gap(form: Form, curve: Curve, q: Array) -> Array:
+    """The best place of a step among all samples around q."""
+    at = np.unique(curve.x)
+    middle = 0.5 * (at[1:] + at[:-1])
+    k = int(np.searchsorted(middle, q[0]))
+    width = 1 + len(at) // SEARCHED
+    near = middle[max(0, k - 2 * width):k + 2 * width + 1]
+    rss = _profile(form, curve, near[:, None], curve.x, curve.free.T, lambda f: f)
+    return near[[int(np.argmin(rss))]]
+
+
+def _profile(form: Form, curve: Curve, mesh: Array, x: Array, free: Array, thin: object) -> Array:
+    """Residual sums of squares (P,) at parameters mesh (P, q), amplitudes at their best."""
+    if curve.weight.ndim == 1:
+        weight = thin(curve.weight)  # type: ignore[operator]
+        base = np.vstack([np.ones(len(x)), free]) * weight
+        u, s, _ = np.linalg.svd(base.T, full_matrices=False)
+        fixed = u[:, s > 1e-10 * s[0]]
+        y = thin(curve.target)  # type: ignore[operator]
+        y = y - fixed @ (fixed.T @ y)
+    else:
+        weight, fixed, y = None, curve.fixed, curve.centred
+    raw = form.values(x, *(mesh[:, [j]] for j in range(mesh.shape[1])))
+    with np.errstate(all="ignore"):
+        columns = [np.broadcast_to(c, (len(mesh), len(x))) for c in raw]
+        columns = [c * weight if weight is not None else c @ curve.weight.T for c in columns]
+        columns = [c - (c @ fixed) @ fixed.T for c in columns]
+        left = np.broadcast_to(y, columns[0].shape).copy()
+        sizes: list[Array] = []
+        for k, c in enumerate(columns):  # Gram-Schmidt
+            whole = np.einsum("pn,pn->p", c, c)
+            for b in columns[:k]:
+                c = c - np.einsum("pn,pn->p", b, c)[:, None] * b
+            norm = np.sqrt(np.einsum("pn,pn->p", c, c))
+            c = np.where((norm > 1e-7 * np.sqrt(whole))[:, None], c / norm[:, None], 0.0)
+            columns[k] = c
+            sizes.append(norm)
+            left = left - np.einsum("pn,pn->p", c, left)[:, None] * c
+        rss = np.einsum("pn,pn->p", left, left)
+    return np.where(np.isfinite(rss), rss, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class _Projected:
+    """A form at fixed parameters inside: amplitudes (k,) in closed form.
+
+    `raw` (n, k) are its columns, `phi` (r, k) the same whitened, without constant and free parts,
+    `basis` (r, k) orthonormal, `left` (r,) the residual.
+    """
+
+    raw: Array
+    phi: Array
+    basis: Array
+    amplitudes: Array
+    left: Array
+
+    @property
+    def rss(self) -> float:
+        return float(self.left @ self.left)
+
+
+def _linear(form: Form, curve: Curve, p: Array) -> _Projected | None:
+    """None where the form is not finite, or the curve cannot show it."""
+    raw = np.column_stack(form.values(curve.x, *p)) if form.columns else np.empty(
+        (len(curve.x), 0))
+    if not np.isfinite(raw).all():
+        return None
+    phi = curve.project(curve.whiten(raw.T)).T
+    size = np.linalg.norm(phi, axis=0)
+    if np.any(size <= 1e-9 * np.linalg.norm(curve.whiten(raw.T), axis=-1)) or not np.all(size > 0):
+        return None
+    q, r = np.linalg.qr(phi / size)
+    if r.size and np.abs(np.diag(r)).min() < 1e-9:
+        return None
+    part = q.T @ curve.centred
+    a = np.linalg.solve(r, part) / size if r.size else np.empty(0)
+    return _Projected(raw, phi, q, a, curve.centred - q @ part)
+
+
+def _descend(form: Form, curve: Curve, start: Array) -> Array:
+    """Levenberg-Marquardt on the projected residual, within the parameters' limits."""
+    limits = np.array([k.limits(curve.low, curve.high, len(curve.x)) for k in form.knobs])
+    p = np.clip(start, limits[:, 0], limits[:, 1])
+    at = _linear(form, curve, p)
+    if at is None:
+        return start
+    damping, scale = 1e-3, np.diff(limits, axis=1)[:, 0]
+    tiny = 1e-26 * curve.total
+    for _ in range(ITERATIONS):
+        J = _inside_jacobian(form, curve, p, at.amplitudes)
+        if at.rss <= tiny or not np.isfinite(J).all():
+            break
+        J = (J - at.basis @ (at.basis.T @ J)) * scale
+        A, g = J.T @ J, J.T @ at.left
+        better = None
+        for _ in range(8):
+            ridge = damping * np.diag(np.diag(A) + 1e-12 * A.trace() + 1e-300)
+            step = np.linalg.lstsq(A + ridge, g, rcond=None)[0] * scale
+            q = np.clip(p + step, limits[:, 0], limits[:, 1])
+            there = _linear(form, curve, q)
+            if there is not None and there.rss < at.rss:
+                better = there
+                break
+            damping *= 8.0
+        if better is None:
+            break
+        gain = 1.0 - better.rss / at.rss
+        p, at = q, better
+        damping = max(damping / 8.0, 1e-12)
+        if gain < GAIN:
+            break
+    return p
+
+
+def _inside_jacobian(form: Form, curve: Curve, p: Array, amplitudes: Array) -> Array:
+    """Derivative (r, q) of the whitened candidate by its parameters inside, constant removed."""
+    q = len(form.knobs)
+    table = np.array(form.derivatives(curve.x, *p)).reshape(len(form.columns), q, -1)
+    return curve.project(curve.whiten(np.einsum("k,kqn->qn", amplitudes, table))).T
+
+
+def _finish(form: Form, curve: Curve, p: Array) -> FormFit | None:
+    found = _linear(form, curve, p)
+    if found is None:
+        return None
+    a, rss, shape = found.amplitudes, found.rss, found.phi @ found.amplitudes
+    values = found.raw @ a
+    offset, base = _offset(curve, values)
+    covariance = _covariance(form, curve, p, found.raw, a, base)
+    covariance = covariance * curve.variance(rss, form.count + curve.free.shape[1])
+    return FormFit(form, a, p, offset, rss, covariance, values + offset, shape)
+
+
+def _offset(curve: Curve, values: Array) -> tuple[float, Array]:
+    """The constant d beside given values, and the whitened constant and free columns (r, m)."""
+    base = curve.whiten(np.vstack([np.ones(len(curve.x)), curve.free.T])).T
+    found = np.linalg.lstsq(base, curve.target - curve.whiten(values), rcond=1e-10)[0]
+    return float(found[0]), base
+
+
+def _covariance(form: Form, curve: Curve, p: Array, raw: Array, a: Array, base: Array) -> Array:
+    """(k + q + 1,) squared: amplitudes, parameters inside, offset, at unit variance."""
+    q = len(form.knobs)
+    columns = curve.whiten(raw.T).T
+    if q:
+        table = np.array(form.derivatives(curve.x, *p)).reshape(len(form.columns), q, -1)
+        columns = np.hstack([columns, curve.whiten(np.einsum("k,kqn->qn", a, table)).T])
+    J = np.hstack([columns, base])
+    if not np.isfinite(J).all():
+        return np.full((len(a) + q + 1,) * 2, np.nan)
+    size = np.linalg.norm(J, axis=0)
+    flat = size <= 0.0
+    size[flat] = 1.0
+    inverse = np.linalg.pinv((J / size).T @ (J / size), 1e-13, True) / np.outer(size, size)
+    inverse[flat] = inverse[:, flat] = np.nan
+    keep = len(a) + q + 1
+    return np.asarray(inverse[:keep, :keep])

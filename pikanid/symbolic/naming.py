@@ -1,0 +1,105 @@
+"""Names an edge: every form fitted, ranked by probability, tested for what it leaves behind.
+
+With prior probabilities π (half for "nothing", half shared by the families) and the Bayesian
+information criterion as -2 log of the marginal likelihood (Schwarz, Ann. Stat. 6, 1978, p. 461),
+
+    P(form | edge) ∝ π(form) exp(-BIC/2).
+
+A form that leaves a trace in the residual (`adequacy`) is out, whatever its rank; where every form
+is out, or a free spline is more probable than all of them, the answer is "no simple form".
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pikanid.symbolic.adequacy import ALPHA, Smoother
+from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.fitting import FormFit, fit_form
+from pikanid.symbolic.library import LIBRARY, NOTHING, Form
+from pikanid.symbolic.named import Candidate, NamedEdge
+
+PRIOR_NOTHING = 0.5
+PRIOR_FREE = 0.02  # of the other half: what no library holds is rare, but there
+AGREES = 9.0  # squared distance of two fits, in units of the noise, that data cannot tell apart
+
+
+def name_edge(x: np.ndarray, y: np.ndarray, *, sigma: float | np.ndarray | None = None,
+              covariance: np.ndarray | None = None, library: Sequence[Form] = LIBRARY,
+              argument: str = "x", unit: str = "", x_unit: str = "") -> NamedEdge:
+    """Name the function behind the points of one edge.
+
+    Parameters
+    ----------
+    x, y : argument and value (n,), in `x_unit` and `unit`
+    sigma : standard deviation of independent noise, one or (n,); unknown and equal unless given
+    covariance : of y (n, n) instead, as a spline's values have it
+    library : the candidates; "nothing" always competes
+    argument : what x is, for sentences and the expression
+
+    Raises
+    ------
+    pikanid.errors.BadSetting : fewer than 8 points, values that are not finite, an x that does not
+        move, a sigma that is not positive
+
+    >>> x = np.linspace(-1.0, 1.0, 200)
+    >>> noise = np.random.default_rng(0).normal(0.0, 0.05, x.size)
+    >>> edge = name_edge(x, 2.0*x**3 + noise)
+    >>> edge.name, round(edge.best.values["a"], 1)
+    ('cubic', 2.0)
+    >>> name_edge(x, noise).name
+    'nothing'
+    """
+    if covariance is None:
+        curve = Curve.of_points(x, y, sigma, argument=argument, unit=unit, x_unit=x_unit)
+    else:
+        curve = Curve.of_covariance(x, y, covariance, argument=argument, unit=unit, x_unit=x_unit)
+    return name_curve(curve, library)
+
+
+def name_curve(curve: Curve, library: Sequence[Form] = LIBRARY) -> NamedEdge:
+    """The same for a curve that is ready."""
+    forms = [NOTHING, *(f for f in library if f.columns)]
+    fits = [f for f in (fit_form(form, curve) for form in forms) if f is not None and f.finite]
+    smoother = Smoother.of(curve)
+    sizes = Counter(f.family for f in forms)
+    families = len(sizes) - 1
+    scores = np.array([_score(fit, curve, sizes, families) for fit in fits])
+    p_values = np.array([smoother.p_value(fit) for fit in fits])
+    free, free_rss, free_count = smoother.free()
+    free -= 2.0 * np.log((1.0 - PRIOR_NOTHING) * PRIOR_FREE)
+    good = p_values >= ALPHA
+    every = np.append(np.where(good, scores, np.inf), free)
+    if not np.isfinite(every).any():  # too few points for a free spline
+        every[-1] = 0.0
+    share = np.exp(-0.5 * (every - every.min()))
+    share /= share.sum()
+    candidates = [Candidate(fit.form, fit, float(p), float(score), float(adequate))
+                  for fit, p, score, adequate in zip(fits, share, scores, p_values, strict=False)]
+    variance = curve.variance(free_rss, free_count)
+    return NamedEdge(curve, _ranked(candidates, curve, variance), float(share[-1]),
+                     float(np.sqrt(variance)))
+
+
+def _score(fit: FormFit, curve: Curve, sizes: Counter[str], families: int) -> float:
+    form = fit.form
+    prior = PRIOR_NOTHING
+    if form is not NOTHING:
+        prior = (1.0 - PRIOR_NOTHING) * (1.0 - PRIOR_FREE) / families / sizes[form.family]
+    return curve.score(fit.rss, form.count + curve.free.shape[1]) - 2.0 * float(np.log(prior))
+
+
+def _ranked(candidates: list[Candidate], curve: Curve, variance: float) -> tuple[Candidate, ...]:
+    """Most probable first; those that the data cannot tell from the first are marked."""
+    ranked = sorted(candidates, key=lambda c: (-c.probability, c.score))
+    if not ranked:
+        return ()
+    first = ranked[0].fit
+    noise = max(variance, curve.rows * curve.floor)
+    return tuple(
+        replace(c, agrees=bool(np.sum((c.fit.shape - first.shape) ** 2) <= AGREES * noise))
+        for c in ranked)
