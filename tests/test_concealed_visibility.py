@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from pikanid.concealed import visibility as room
 from pikanid.concealed.deck import FLOW
 from pikanid.concealed.effect import Effect, Scales
 from pikanid.concealed.effects import CATALOGUE, variants
@@ -102,6 +103,19 @@ def test_half_of_a_pair_is_a_rival() -> None:
     faint = seen(Rig(coulomb=2.0, offset=1e-5), "coulomb_friction", "sensor_offset")
     assert "coulomb_friction" in faint.rival
     assert faint.distance < 1.0
+
+
+def test_a_variant_is_no_half_of_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both ways of hysteresis are kept apart: backlash has one quantity, a Bouc-Wen force two."""
+    monkeypatch.setattr(room, "CATALOGUE", (*variants("hysteresis"), effect("sensor_drift")))
+    bouc_wen, backlash = variants("hysteresis")
+    # What the rival backlash explains best is not to be taken for a fit of the Bouc-Wen force.
+    truth = measured(Rig(backlash=0.3, memory=0.1, offset=0.01), two_pulse())
+    found = visibility(truth, two_pulse(), NOISE, Rig(), [bouc_wen, effect("sensor_offset")],
+                       SCALES)
+    candidate = Candidate((backlash,), SCALES, two_pulse(), NOISE, Rig())
+    half = candidate.refitted(NOISE.whitened(truth), np.array([0.045, 0.15, 0.3]))
+    assert found.distance <= 1.01 * half.distance < found.nominal
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ from pikanid.concealed.simulate import measured
 FROM_NOMINAL, FROM_RIVAL = 5.0, 4.0
 # Rivals that get a rough refit after the screening to first order, and a full one after that.
 ROUGH, FULL = 12, 4
-ROUGH_STEPS = 1
+ROUGH_STEPS = 2
 IN_PAIRS = 6, 2  # the same, where one of two effects is replaced
 BASE_LOW, BASE_HIGH = np.array([0.003, 0.0]), np.array([1.0, 20.0])
 BASE_SCALE = np.array([0.005, 0.1])
@@ -136,7 +136,7 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
     if len(true_effects) == 2 and nominal.distance > 1.0:
         for kept, other in (true_effects, true_effects[::-1]):
             half = Candidate((kept,), scales, experiment, noise, Rig())
-            fit = contest.fits.get((kept.id,)) or contest.best_start(half, nominal, kept)
+            fit = contest.fits.get((kept,)) or contest.best_start(half, nominal, kept)
             others = [c for c in CATALOGUE
                       if is_rival(c, other) and c.id != kept.id and c.id not in kept.twins]
             contest.enter(half, fit, others, *IN_PAIRS)
@@ -150,7 +150,8 @@ class _Contest:
 
     def __init__(self, target: Array, experiment: Experiment, noise: Noise, scales: Scales):
         self.target, self.experiment, self.noise, self.scales = target, experiment, noise, scales
-        self.fits: dict[tuple[str, ...], Refit] = {}
+        # By effects, not by their ids: variants of one id have other quantities.
+        self.fits: dict[tuple[Effect, ...], Refit] = {}
 
     def enter(self, against: Candidate, fit: Refit, rivals: Sequence[Effect],
               rough: int = ROUGH, full: int = FULL) -> None:
@@ -179,13 +180,13 @@ class _Contest:
         """Ids and distance of the closest rival."""
         if not self.fits:
             return (), np.inf
-        names = min(self.fits, key=lambda key: self.fits[key].distance)
-        return names, self.fits[names].distance
+        effects = min(self.fits, key=lambda key: self.fits[key].distance)
+        return tuple(effect.id for effect in effects), self.fits[effects].distance
 
     def _keep(self, candidate: Candidate, found: Refit) -> None:
-        key = tuple(effect.id for effect in candidate.effects)
-        if key not in self.fits or found.distance < self.fits[key].distance:
-            self.fits[key] = found
+        known = self.fits.get(candidate.effects)
+        if known is None or found.distance < known.distance:
+            self.fits[candidate.effects] = found
 
     def _screen(self, candidate: Candidate, fit: Refit, rival: Effect) -> tuple[float, Array]:
         """How much of the residual a rival takes away to first order, and where to start it."""
