@@ -551,8 +551,22 @@ def kan_kink(time: float, start: float, stop: float) -> str:
     return f"A kink at t = {time:g} s does not lie inside the KAN's grid ({start:g}, {stop:g}) s."
 
 
+def kan_kink_elsewhere(time: float) -> str:
+    return (
+        f"The kink at t = {time:g} s belongs to other knots than the KAN's: carry curve and kinks "
+        "over together, with `refined`."
+    )
+
+
 def kan_file(path: str, detail: str) -> str:
     return f"'{path}' is not a saved KAN that can be read: {detail}."
+
+
+def kan_points(x: object, y: object, inputs: int, outputs: int) -> str:
+    return (
+        f"A KAN with {inputs} inputs and {outputs} outputs cannot be fitted to x {x} and y {y}: "
+        "give finite x (points, inputs) and y (points,) and a KAN with one output."
+    )
 
 
 def kan_coefficients(given: object, wanted: object) -> str:
@@ -765,6 +779,21 @@ def candidate_without_argument(text: str, argument: str) -> str:
     return f"The candidate '{_short(text)}' does not contain its argument '{argument}'."
 
 
+def reading_inputs(given: int, names: Sequence[str]) -> str:
+    return (
+        f"{given} inputs do not fit the names {', '.join(names) or '(none)'}: give one name an "
+        "input, and no formulas where the reading is to be evaluated."
+    )
+
+
+def network_without_inputs() -> str:
+    return "The network has seen no inputs yet: give x, the inputs over which it is to be read."
+
+
+def nothing_read() -> str:
+    return "No formula of the library is finite over the network's inputs: add forms that are."
+
+
 # --- estimates -----------------------------------------------------------------------------------
 
 
@@ -884,6 +913,44 @@ def lbfgs_stopped(steps: int, gradient: float) -> str:
         f"L-BFGS stopped after {steps} steps with a gradient of norm {gradient:.2g}: it is not at "
         "a minimum, and the estimate depends on where it stopped."
     )
+
+# --- the next experiment -------------------------------------------------------------------------
+
+
+def bad_drive_bound(name: str, given: float) -> str:
+    return f"The bound of {name} is {given:g}; give a positive number, inf for none."
+
+
+def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: float) -> str:
+    return (
+        f"No profile fits into {duration:g} s with {quiet:g} s of rest and samples every {dt:g} s "
+        f"for a model that rings at {frequency:.3g} Hz: leave two periods of motion, and ten "
+        "samples a period."
+    )
+
+
+def too_few_hypotheses(given: int) -> str:
+    return f"There are {given} hypotheses; an experiment can separate two or more."
+
+
+def nothing_to_learn(model: str) -> str:
+    return f"Model '{_short(model)}' has no free parameter that an experiment could determine."
+
+
+def nothing_to_drive(models: str) -> str:
+    return f"{_short(models, 200)}: no input that an experiment could drive."
+
+
+def no_profile_simulated(candidates: int) -> str:
+    return (
+        f"None of {candidates} profiles can be simulated with every hypothesis within the limits: "
+        "offer smaller ones."
+    )
+
+
+def limits_not_kept(profile: str) -> str:
+    return f"Profile '{_short(profile)}' exceeds the limits however small it is made."
+
 
 # --- concealed effects ---------------------------------------------------------------------------
 

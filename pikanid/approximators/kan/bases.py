@@ -63,7 +63,7 @@ def power_blossom(knots: Array, degree: int, centre: float, order: int) -> Array
     return symmetric[order] / ways
 
 
-def truncated_power(t: Array, centre: float, order: int, derivative: int = 0) -> Array:
+def truncated_power(t: Array, centre: float | Array, order: int, derivative: int = 0) -> Array:
     """(t - centre)^order_+ / order! or a derivative, from the right at ``centre``.
 
     >>> truncated_power(np.array([0.0, 1.0, 3.0]), 1.0, 2, derivative=2)

@@ -1,8 +1,7 @@
 """A deep KAN as a curve over time, with the known kinks of the trajectory beside it.
 
-x̂(t) = KAN(t) + Σ height_j · bump_j(t).  A bump is a truncated power (t - t_j)^o_+ / o! less the
-spline on the first layer's knots that equals it on either side, over (knot spacing)^o: it jumps
-in its o-th derivative at t_j and is zero more than k cells away, so that nothing grows with time.
+x̂(t) = KAN(t) + Σ height_j · bump_j(t).  A bump is a kink (see `kinks`) on the first layer's knots,
+of jump 1 / (knot spacing)^order.
 """
 
 from __future__ import annotations
@@ -16,9 +15,10 @@ import numpy as np
 from pikanid import errors
 from pikanid.approximators.kan.build import build_kan
 from pikanid.approximators.kan.deep import DeepKAN
+from pikanid.approximators.kan.kinks import Kink
 from pikanid.approximators.kan.plan import Array
 from pikanid.approximators.kan.refine import regrid
-from pikanid.approximators.kan.shallow import Kink, ShallowKAN
+from pikanid.approximators.kan.shallow import ShallowKAN
 from pikanid.approximators.kan.sweeps import LocalJet
 
 HIGHEST = 2  # time derivative that `DeepKAN` evaluates

@@ -2,61 +2,40 @@
 
 Its values and time derivatives are basis matrices, fixed as long as the knots are.  Where an input
 switches, the true curve has a kink in a derivative that no spline on simple knots can follow; the
-basis may therefore be joined by ½(t-t_j)²₊ and (t-t_j)³₊/6 at the switches t_j (`kinks`).  They
-are kept beside the pykan model, in plain sight: curve = kan.forward + kinks.
+basis may therefore be joined by kinks of order 2 and 3 at the switches (see `Kink`).  They are kept
+beside the pykan model, in plain sight: curve = kan.forward + kinks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from pikanid import errors
-from pikanid.approximators.kan.bases import (
-    power_blossom,
-    silu,
-    spline_rows,
-    truncated_power,
-)
+from pikanid.approximators.kan.bases import power_blossom, silu, spline_rows
 from pikanid.approximators.kan.build import plan_of, read, write
+from pikanid.approximators.kan.kinks import Kink, KinkTable
 from pikanid.approximators.kan.plan import Array
 
 # A kink of the spline's own degree this near to a knot (in spacings) is what the knot does already.
 _NEAR_KNOT = 0.05
 
 
-@dataclass(frozen=True, eq=False)
-class Kink:
-    """One enrichment: jump · (t - time)^order_+ / order!, a jump in the order-th derivative."""
-
-    time: float
-    order: int
-    jump: Array
-
-    def __call__(self, t: Array, derivative: int = 0) -> Array:
-        """Its part of the curve at ``t`` (M,), shape (M, outputs)."""
-        return (
-            truncated_power(np.asarray(t, float), self.time, self.order, derivative)[:, None]
-            * self.jump
-        )
-
-
 class ShallowKAN:
     """A [1, n] pykan model seen as a linear approximator.
 
     The coefficients of one output are (n_basis,): spline coefficients (mask · scale_sp · coef) in
-    the order of their knots, a kink's coefficient between those that its time separates, and w_b
-    last where the KAN has a base function.  A kink column is the kink function less the spline
-    that equals it on either side, scaled by the knot spacing: it spans the same space, vanishes
-    outside k cells, and keeps every row of the basis short.  With w_b the rows are full.
+    the order of their knots, a kink's coefficient (jump · spacing^order) between those that its
+    time separates, and w_b last where the KAN has a base function.  Kinks vanish outside k cells,
+    so that every row of the basis is short; with w_b the rows are full.
 
     Args:
         kan: A pykan model of width [1, n] (`build_kan`).
-        kinks: Times of the kinks [s], inside the grid, or ready `Kink`s with their jumps.
+        kinks: Times of the kinks [s], inside the grid, or ready `Kink`s on the same knots.
         orders: Orders at each time, 1 to k, by default 2 and 3 (2 alone at k = 2); order k next to
             a knot is left out (it is a knot).
 
@@ -120,7 +99,7 @@ class ShallowKAN:
     def kinks(self) -> tuple[Kink, ...]:
         """The enrichments with their present jumps."""
         return tuple(
-            Kink(time, order, jump.copy())
+            Kink(time, order, jump.copy(), self.knots, self.degree)
             for (time, order), jump in zip(self._kinks, self._jumps, strict=True)
         )
 
@@ -142,11 +121,8 @@ class ShallowKAN:
         first = self._row_start[active]
         local = np.zeros((t.size, self._row_width))
         local[rows, self._spline_at[columns] - first[:, None]] = values
-        for number, (time, order) in enumerate(self._kinks):
-            here = (active >= self._split[number] - self.degree) & (active < self._split[number])
-            spline = np.sum(values[here] * self._beside[number][columns[here]], axis=1)
-            kink = truncated_power(t[here], time, order, derivative) - spline
-            local[here, self._kink_at[number] - first[here]] = kink / self._spacing**order
+        at, kink, heights = self._table.entries(t, active, values, derivative)
+        local[at, self._kink_at[kink] - first[at]] = heights / self._scale[kink]
         if self.has_base:
             local[:, -1] = silu(t, derivative)
         width = self._row_width
@@ -169,7 +145,6 @@ class ShallowKAN:
         mask = read(edges.mask)[0]
         found = np.empty((self.n_basis, self.n_outputs))
         found[self._spline_at] = (mask * read(edges.scale_sp)[0])[None] * read(edges.coef)[0].T
-        found[self._spline_at] += self._beside.T @ self._jumps
         found[self._kink_at] = self._jumps * self._scale[:, None]
         if self.has_base:
             found[-1] = mask * read(edges.scale_base)[0]
@@ -191,7 +166,7 @@ class ShallowKAN:
         mask = read(edges.mask)[0]
         scale = mask * read(edges.scale_sp)[0]
         self._jumps = given[self._kink_at] / self._scale[:, None]
-        splines = given[self._spline_at] - self._beside.T @ self._jumps
+        splines = given[self._spline_at]
         # A masked edge is zero whatever its coefficients are.
         coef = np.divide(splines, scale, out=np.zeros_like(splines), where=scale != 0.0)
         write(edges.coef, coef.T[None])
@@ -212,30 +187,29 @@ class ShallowKAN:
         return curve
 
     def refined(self, grid: int) -> ShallowKAN:
-        """The same curve on ``grid`` intervals, with the same kinks."""
-        from pikanid.approximators.kan.refine import refine
-
-        return self.carried_to(refine(self.kan, grid).kan)
-
-    def carried_to(self, kan: Any) -> ShallowKAN:
-        """These kinks, with their jumps, beside another [1, n] model (one just refined, say).
+        """The same curve on ``grid`` intervals; exact where they are a multiple of the old number.
 
         A kink of order k that now falls on a knot goes into the spline, which contains it.
         """
-        inner = plan_of(kan).knots[0][0]
-        free: list[Kink] = []
-        absorbed: list[Kink] = []
+        from pikanid.approximators.kan.refine import change_of_knots, refine
+
+        kan = refine(self.kan, grid).kan
+        knots, k = plan_of(kan).knots[0][0], self.degree
+        finer, _ = change_of_knots(self.knots, knots, k)
+        centres = KinkTable((), knots, k).centres
+        splines, kept = np.zeros((centres.size, self.n_outputs)), []
         for kink in self.kinks:
-            on_knot = np.abs(inner - kink.time).min() < 1e-9 * self._spacing
-            (absorbed if kink.order == self.degree and on_knot else free).append(kink)
-        other = ShallowKAN(kan, free)
+            # Old and new kink are one power less splines: these differ near the kink alone.
+            new, old = (_beside(kink, *on) for on in ((knots, centres),
+                                                      (self.knots, self._table.centres)))
+            near = np.abs(centres - kink.time) <= (k + 1) * self._spacing
+            splines += np.where(near, new - finer @ old, 0.0)[:, None] * kink.jump
+            if kink.order < k or np.abs(knots - kink.time).min() >= 1e-9 * self._spacing:
+                kept.append(replace(kink, knots=knots))
+        other = ShallowKAN(kan, kept)
         found = other.coefficients
-        for kink in absorbed:
-            right = np.searchsorted(other._centres, kink.time)
-            power = power_blossom(other.knots, self.degree, kink.time, kink.order)
-            found[other._spline_at[right:]] += power[right:, None] * kink.jump
-        if absorbed:
-            other.set_coefficients(found)
+        found[other._spline_at] += splines
+        other.set_coefficients(found)
         return other
 
     def _inside(self, t: Array) -> Array:
@@ -257,6 +231,8 @@ class ShallowKAN:
         places: set[tuple[float, int]] = set()
         for kink in kinks:
             if isinstance(kink, Kink):
+                if not np.array_equal(kink.knots, self.knots):
+                    raise errors.BadSetting(errors.kan_kink_elsewhere(kink.time))
                 places.add((kink.time, kink.order))
                 continue
             near = np.abs(self.knots - kink).min() <= _NEAR_KNOT * self._spacing
@@ -268,21 +244,19 @@ class ShallowKAN:
 
     def _place_kinks(self) -> None:
         n, k = self.n_splines, self.degree
-        self._centres = np.array([self.knots[i + 1 : i + k + 1].mean() for i in range(n)])
-        self._scale = np.array([self._spacing**order for _, order in self._kinks])
-        # The first spline right of the kink: those from there on carry the power function.
-        self._split = np.array(
-            [np.searchsorted(self._centres, time) for time, _ in self._kinks], np.int64
-        )
-        self._beside = np.zeros((len(self._kinks), n))
-        for number, (time, order) in enumerate(self._kinks):
-            right = slice(int(self._split[number]), None)
-            self._beside[number, right] = power_blossom(self.knots, k, time, order)[right]
-        before = np.searchsorted(self._split, np.arange(n), side="right")
+        self._table = KinkTable(self._kinks, self.knots, k)
+        self._scale = self._spacing ** self._table.orders.astype(float)
+        before = np.searchsorted(self._table.split, np.arange(n), side="right")
         self._spline_at = np.arange(n) + before
-        self._kink_at = self._split + np.arange(len(self._kinks))
+        self._kink_at = self._table.split + np.arange(len(self._kinks))
         starts = self._spline_at[: n - k]
         self._row_width = int((self._spline_at[k:] - starts).max()) + 1
         if self.has_base:
             self._row_width = self.n_basis
         self._row_start = np.minimum(starts, self.n_basis - self._row_width)
+
+
+def _beside(kink: Kink, knots: Array, centres: Array) -> Array:
+    """Coefficients (n,) of the spline that is subtracted from a kink's power, on any knots."""
+    power = power_blossom(knots, kink.degree, kink.time, kink.order)
+    return np.where(centres >= kink.time, power, 0.0)

@@ -15,8 +15,9 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.approximators.kan.build import blank_kan, plan_of, read, write
+from pikanid.approximators.kan.kinks import Kink
 from pikanid.approximators.kan.plan import Arity, Array, Base, KanPlan
-from pikanid.approximators.kan.shallow import Kink, ShallowKAN
+from pikanid.approximators.kan.shallow import ShallowKAN
 
 _FORMAT = "pikanid-kan"
 _VERSION = 1
@@ -198,7 +199,9 @@ def _state(header: dict[str, Any], arrays: dict[str, Array]) -> tuple[KanState, 
     state = KanState(width, k, base, factors, tuple(layers), batch)
     if header["kinks"] is None:
         return state, None
-    return state, [Kink(q["time"], q["order"], np.array(q["jump"])) for q in header["kinks"]]
+    knots = layers[0].grid[0]
+    return state, [
+        Kink(q["time"], q["order"], np.array(q["jump"]), knots, k) for q in header["kinks"]]
 
 
 def _places(kan: Any, number: int) -> dict[str, Any]:
