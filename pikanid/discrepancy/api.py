@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from pikanid import errors
 from pikanid.adequacy import judge
-from pikanid.discrepancy.bands import edge_test, holm, posterior
+from pikanid.discrepancy.bands import Posterior, holm, wald
 from pikanid.discrepancy.edges import OFFSET, plan_edges
 from pikanid.discrepancy.functional import relaxed_level
 from pikanid.discrepancy.gauge import Gauge, fix_gauges
-from pikanid.discrepancy.levels import Level, search
+from pikanid.discrepancy.level import Level
+from pikanid.discrepancy.levels import search
+from pikanid.discrepancy.mixture import View, mixed_edge, mixed_plans, views
 from pikanid.discrepancy.result import Discrepancy, Edge
 from pikanid.estimate import Estimate, total_cost
-from pikanid.model import Model
+from pikanid.model import Input, Model, Parameter, State
 from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.strategies.finish import evaluate
@@ -31,6 +32,7 @@ POINTS = 401
 
 def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], equation: str,
                     arguments: Sequence[str], *,
+                    nominal: Estimate | None = None,
                     method: Literal["shooting", "functional"] = "shooting",
                     grid: Sequence[int] = GRID, steps: bool = True, adaptive: bool = True,
                     alpha: float = 0.01) -> Discrepancy:
@@ -48,6 +50,7 @@ def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], e
     equation : the state whose equation gets the edges, as "theta_dot"
     arguments : formulas of states, inputs, parameters and t, one an edge: "theta",
         "theta*theta_dot"
+    nominal : the NLS estimate of the nominal model from these recordings, where it is known already
     method : "shooting", or "functional" for the relaxation of Eq. (2) on the coarsest grid, without
         steps
     grid : intervals of the edges' grids, refined one after the other until the evidence no longer
@@ -84,49 +87,60 @@ def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], e
     if method not in ("shooting", "functional"):
         raise errors.BadSetting(errors.bad_value("method", method, "'shooting' or 'functional'"))
     plans = plan_edges(model, arguments, grid[0])
-    nominal = NLS().fit(model, recordings)
+    nominal = nominal or NLS().fit(model, recordings)
     problem = Problem(nominal.fitted_model, recordings)
     if method == "functional":
         level = relaxed_level(nominal, problem, equation, plans, grid[0])
     else:
         level = search(nominal, problem, equation, plans, grid, steps, adaptive)
-    return _result(level, nominal, equation, alpha, method, begun)
+    return _result(level, nominal, equation, alpha, steps and method == "shooting", method, begun)
 
 
-def _result(level: Level, nominal: Estimate, equation: str, alpha: float, method: str,
-            begun: float) -> Discrepancy:
-    fit, model = level.fit, level.problem.model
-    known = posterior(fit)
+def _result(level: Level, nominal: Estimate, equation: str, alpha: float, steps: bool,
+            method: str, begun: float) -> Discrepancy:
+    seen = views(level, equation, steps)
+    known = seen[0].known
     gauges = fix_gauges(level.plans, level.visited)
-    unit = model.parameter(OFFSET).unit
-    edges = []
-    for k, (gauge, at) in enumerate(zip(gauges, level.places, strict=True)):
-        effective = max(float(known.freedom[at].sum()) - gauge.removed.shape[1], 0.0)
-        p_value, freedom = edge_test(fit, k, gauges, effective)
-        a = np.linspace(gauge.a.min(), gauge.a.max(), POINTS)
-        c = gauge.projection @ fit.theta[at]
-        V = gauge.projection @ known.covariance[np.ix_(at, at)] @ gauge.projection.T
-        basis = gauge.plan.basis(a)
-        std = np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", basis, V, basis), 0.0))
-        edges.append(Edge(gauge.plan.argument, gauge.plan.name, unit, a, basis @ c, std, c, V,
-                          p_value, freedom, False, effective, gauge))
-    verdicts = holm([e.p_value for e in edges], alpha)
-    edges = [replace(e, significant=v) for e, v in zip(edges, verdicts, strict=True)]
+    freedom = [max(float(known.freedom[at].sum()) - g.removed.shape[1], 0.0)
+               for g, at in zip(gauges, level.places, strict=True)]
+    tests = [wald(level.fit, [k], gauges, freedom) for k in range(len(gauges))]
+    verdicts = holm([p for p, _ in tests], alpha)
+    shown = fix_gauges(mixed_plans(seen), level.visited)
+    edges = tuple(
+        _edge(seen, k, gauge, level.problem.model, tests[k], verdicts[k], freedom[k])
+        for k, gauge in enumerate(shown))
     estimate = _estimate(level, known.covariance, method, begun)
+    together = wald(level.fit, range(len(gauges)), gauges, freedom)[0]
+    return Discrepancy(estimate.fitted_model, estimate, nominal, equation, edges,
+                       _offset(level, known), together, alpha, level.fit.evidence)
+
+
+def _edge(seen: Sequence[View], k: int, gauge: Gauge, model: Model, test: tuple[float, int],
+          significant: bool, freedom: float) -> Edge:
+    plan = gauge.plan
+    mean, spread = mixed_edge(seen, k, plan.step)
+    c, V = gauge.projection @ mean, gauge.projection @ spread @ gauge.projection.T
+    a = np.linspace(gauge.a.min(), gauge.a.max(), POINTS)
+    basis = plan.basis(a)
+    std = np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", basis, V, basis), 0.0))
+    jumps = float(sum(v.weight for v in seen if v.plans[k].step))
+    named: list[State | Input | Parameter] = [*model.states, *model.inputs, *model.parameters]
+    units = {q.name: q.unit for q in named}
+    return Edge(plan.argument, units.get(plan.argument, ""), plan.name,
+                model.parameter(OFFSET).unit, a, basis @ c, std, c, V, *test,
+                significant, jumps, freedom, gauge)
+
+
+def _offset(level: Level, known: Posterior) -> tuple[float, float]:
+    """Offset and all edges' means over the data, with the standard deviation of their sum."""
     labels = [f.label for f in level.problem.free]
-    mean = np.zeros(len(labels))
-    mean[labels.index(OFFSET)] = 1.0
-    for gauge, at in zip(gauges, level.places, strict=True):
-        mean[at] = _mean(gauge)
+    row = np.zeros(len(labels))
+    row[labels.index(OFFSET)] = 1.0
+    for plan, a, at in zip(level.plans, level.visited.arguments.T, level.places, strict=True):
+        row[at] = level.visited.weights @ plan.basis(a)
     inside = np.isfinite(np.diag(known.covariance))
-    spread = mean[inside] @ known.covariance[np.ix_(inside, inside)] @ mean[inside]
-    return Discrepancy(estimate.fitted_model, estimate, nominal, equation, tuple(edges),
-                       (float(mean @ fit.theta), float(np.sqrt(spread))), alpha, fit.evidence)
-
-
-def _mean(gauge: Gauge) -> np.ndarray:
-    """The mean over the data of every basis function (K,)."""
-    return gauge.weights @ gauge.plan.basis(gauge.a)
+    spread = row[inside] @ known.covariance[np.ix_(inside, inside)] @ row[inside]
+    return float(row @ level.fit.theta), float(np.sqrt(spread))
 
 
 def _estimate(level: Level, covariance: np.ndarray, method: str, begun: float) -> Estimate:

@@ -1,4 +1,4 @@
-"""What is known about each edge: its band and the test of whether it is there at all.
+"""What is known about the edges: their bands and the tests of whether they are there at all.
 
 Bands are Bayesian: the posterior covariance (A + Λ)⁻¹ of coefficients and parameters together,
 whose pointwise intervals cover as often as they say when coverage is averaged along the curve
@@ -53,28 +53,32 @@ def posterior(fit: PenalisedFit) -> Posterior:
     return Posterior(full, freedom)
 
 
-def edge_test(fit: PenalisedFit, k: int, gauges: Sequence[Gauge], freedom: float
-              ) -> tuple[float, int]:
-    """p-value and degrees of freedom of the Wald test that edge k is zero after gauge-fixing.
+def wald(fit: PenalisedFit, edges: Sequence[int], gauges: Sequence[Gauge],
+         freedom: Sequence[float]) -> tuple[float, int]:
+    """p-value and degrees of freedom of the Wald test that some edges are zero, gauge-fixed.
 
-    Tested are the coordinates along the smoothest gauge-fixed functions (and the step), as many as
-    the fit used up, without a penalty on them; what the gauge takes out of the edge is free, other
-    edges keep their smoothness.  Under the null the statistic is χ², or less.
+    Tested are the coordinates along the smoothest gauge-fixed functions (and the step) of each, as
+    many as the fit used up (`freedom`), without a penalty on them; what the gauge takes out of them
+    is free, other edges keep their smoothness.  Under the null the statistic is χ², or less.
     """
-    prior, gauge = fit.smoothness.priors[k], gauges[k]
-    count = int(np.clip(round(freedom), FEWEST, MOST))
-    tested = _smoothest(gauge, count)
     precision = fit.smoothness.precision(fit.rho)
-    precision[np.ix_(prior.at, prior.at)] = np.eye(len(prior.at)) / (
-        len(prior.at) * (LARGEST * prior.size) ** 2)
-    others = np.setdiff1d(np.flatnonzero(fit.inside), prior.at)
-    first = tested.shape[1]
-    columns = np.zeros((len(fit.theta), first + gauge.removed.shape[1] + len(others)))
-    columns[prior.at, :first] = tested
-    columns[prior.at, first:first + gauge.removed.shape[1]] = gauge.removed
-    columns[others, np.arange(columns.shape[1] - len(others), columns.shape[1])] = 1.0
-    H = columns.T @ (fit.information + precision) @ columns
-    V = np.linalg.inv(H)
+    tested: list[np.ndarray] = []
+    removed: list[np.ndarray] = []
+    taken = []
+    for k in edges:
+        prior, gauge = fit.smoothness.priors[k], gauges[k]
+        at = np.ix_(prior.at, prior.at)
+        precision[at] = np.eye(len(prior.at)) / (len(prior.at) * (LARGEST * prior.size) ** 2)
+        count = int(np.clip(round(freedom[k]), FEWEST, MOST))
+        for kept, functions in ((tested, _smoothest(gauge, count)), (removed, gauge.removed)):
+            full = np.zeros((len(fit.theta), functions.shape[1]))
+            full[prior.at] = functions
+            kept.append(full)
+        taken.append(prior.at)
+    others = np.setdiff1d(np.flatnonzero(fit.inside), np.concatenate(taken))
+    columns = np.hstack([*tested, *removed, np.eye(len(fit.theta))[:, others]])
+    first = sum(t.shape[1] for t in tested)
+    V = np.linalg.inv(columns.T @ (fit.information + precision) @ columns)
     held = np.where(fit.inside, 0.0, fit.theta)
     estimate = V @ (columns.T @ (fit.gain - fit.information @ held))
     statistic = float(estimate[:first] @ np.linalg.solve(V[:first, :first], estimate[:first]))

@@ -17,7 +17,7 @@ from pikanid.adequacy import difference_noise
 from pikanid.discrepancy.edges import EdgePlan, extend
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import visit
-from pikanid.discrepancy.levels import Level, smoothness_of, visited_by
+from pikanid.discrepancy.level import Level, smoothness_of
 from pikanid.discrepancy.smoothness import STIFF
 from pikanid.estimate import Estimate
 from pikanid.expressions import symbol
@@ -59,7 +59,7 @@ def relaxed_level(nominal: Estimate, problem: Problem, equation: str, plans: Seq
     shooting.choose_steps(theta, "fine")
     fit = PenalisedFit(theta, rho, A, H @ theta, np.ones(len(theta), bool), 1.0, smoothness, -cost,
                        relaxed.converged, tuple(history))
-    return visited_by(Level(bound, shooting, placed, fit, seen), problem, equation)
+    return Level(bound, shooting, placed, fit, seen).visiting(problem, equation)
 
 
 def _with_sigma(recording: Recording, model: Model) -> Recording:

@@ -27,6 +27,7 @@ class Edge:
     Attributes
     ----------
     argument : formula of the model's names
+    argument_unit : of a state, an input or a parameter; "" for other formulas
     name : of its spline in the model
     grid, values, std : argument (M,), edge (M,) and posterior standard deviation (M,), in the unit
         of the equation (`unit`)
@@ -34,11 +35,14 @@ class Edge:
         where there is a step
     p_value, freedom : of the Wald test that the edge is zero, and its degrees of freedom
     significant : at the discrepancy's α, with Holm's correction over all edges
+    jump_probability : of a step at zero; between 0 and 1 the band holds both, edges with a step
+        and without
     effective : effective degrees of freedom that the fit spent on the edge beyond its gauge part
     gauge : what was taken out of it
     """
 
     argument: str
+    argument_unit: str
     name: str
     unit: str
     grid: np.ndarray
@@ -49,6 +53,7 @@ class Edge:
     p_value: float
     freedom: int
     significant: bool
+    jump_probability: float
     effective: float
     gauge: Gauge = field(repr=False)
 
@@ -68,9 +73,36 @@ class Edge:
         factor = simultaneous_factor(self.gauge.plan.basis(self.grid), self.covariance)
         return self.values - factor * self.std, self.values + factor * self.std
 
+    def covariance_of_values(self, argument: np.ndarray) -> np.ndarray:
+        """Posterior covariance (M, M) of the edge's values at arguments (M,).
+
+        Values go together along an edge: what fits its shape has to know how.  `gauge_functions`
+        are what such a fit may add freely.
+        """
+        basis = self.gauge.plan.basis(np.asarray(argument, float))
+        return np.asarray(basis @ self.covariance @ basis.T)
+
+    def gauge_functions(self, argument: np.ndarray) -> np.ndarray:
+        """What the edge cannot show, at arguments (M,): columns (M, m), the constant among them."""
+        return np.asarray(self.gauge.plan.basis(np.asarray(argument, float)) @ self.gauge.removed)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        low, high = self.band
+        return {"argument": self.argument, "argument_unit": self.argument_unit, "unit": self.unit,
+                "range": list(self.range), "p_value": self.p_value, "freedom": self.freedom,
+                "significant": self.significant, "step": None if self.step is None else {
+                    "value": self.step[0], "std": self.step[1],
+                    "probability": self.jump_probability},
+                "argument_values": self.grid.tolist(), "values": self.values.tolist(),
+                "std": self.std.tolist(), "lower": low.tolist(), "upper": high.tolist()}
+
     @property
     def step(self) -> tuple[float, float] | None:
-        """Half the jump at zero and its standard deviation: J of J·sign(argument); None without."""
+        """J of J·sign(argument), half the jump at zero, and its standard deviation; None without.
+
+        Where the data leave a jump open (`jump_probability` below 1) J is a mean over both answers.
+        """
         if not self.gauge.plan.step:
             return None
         return float(self.coefficients[-1]), float(np.sqrt(self.covariance[-1, -1]))
@@ -98,7 +130,8 @@ class Edge:
         if not self.significant:
             return f"{self.argument}: nothing {where} (p = {self.p_value:.2g})"
         jump = "" if self.step is None else (
-            f", a step of {self.step[0]:.3g} ± {self.step[1]:.1g} at zero")
+            f", a step of {self.step[0]:.3g} ± {self.step[1]:.1g} at zero with probability "
+            f"{self.jump_probability:.2g}")
         size = float(np.max(np.abs(self.values)))
         return (f"{self.argument}: up to {size:.3g} {self.unit} {where} "
                 f"(p = {self.p_value:.2g}{jump})")
@@ -117,6 +150,8 @@ class Discrepancy:
     equation : the state in whose equation the edges stand
     edges : one an argument
     offset : constant part and its standard deviation, all edges' means included
+    p_value : of the test that all edges together are zero, gauge-fixed.  It can be small where no
+        edge is significant: then something is missing, but the data do not tell of what argument
     alpha : level of significance of the edges, together
     evidence : log marginal likelihood, up to a constant
     """
@@ -127,6 +162,7 @@ class Discrepancy:
     equation: str
     edges: tuple[Edge, ...]
     offset: tuple[float, float]
+    p_value: float
     alpha: float
     evidence: float
 
@@ -136,9 +172,13 @@ class Discrepancy:
         return tuple(e for e in self.edges if e.significant)
 
     @property
-    def p_value(self) -> float:
-        """Probability of an edge this clear where there is none (Bonferroni over the edges)."""
-        return min(1.0, len(self.edges) * min(e.p_value for e in self.edges))
+    def adequate(self) -> bool:
+        """Whether static laws of the arguments, added to the equation, explain the recording (χ²).
+
+        If not, what is missing depends on something else or on the past, or sits in a sensor or an
+        input: the edges then show what static laws would have to be, not what is there.
+        """
+        return self.estimate.adequacy.verdict != "misfit"
 
     @property
     def unit(self) -> str:
@@ -157,6 +197,14 @@ class Discrepancy:
             raise errors.BadModel(errors.not_in_model("edge", argument, list(named)))
         return named[argument]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON: verdict, edges over their ranges, parameters."""
+        return {"equation": self.equation, "unit": self.unit, "adequate": self.adequate,
+                "p_value": self.p_value, "alpha": self.alpha, "evidence": self.evidence,
+                "offset": {"value": self.offset[0], "std": self.offset[1]},
+                "edges": [e.to_dict() for e in self.edges],
+                "estimate": self.estimate.to_dict(), "nominal": self.nominal.to_dict()}
+
     def plot(self) -> Figure:
         """Every edge with its band over its visited range."""
         from pikanid.discrepancy.drawing import draw
@@ -164,10 +212,11 @@ class Discrepancy:
         return draw(self)
 
     def kan(self) -> Any:
-        """The gauge-fixed edges as a real pykan model of width [n, 1] in the arguments.
+        """The gauge-fixed edges as a real pykan model of `kan_inputs`.
 
-        Its grids are the edges' own; a step at zero is a symbolic edge (`sgn`) beside the spline.
-        The offset is the bias of its output.
+        Its width is [n, 1]; arguments that are products of names go through multiplication nodes,
+        [inputs, [sums, products], 1].  Grids are the edges' own; a step at zero is a symbolic edge
+        (`sgn`) beside the spline.  The offset is the bias of its output.
 
         Raises
         ------
@@ -175,12 +224,24 @@ class Discrepancy:
         """
         from pikanid.approximators.kan.additive import additive_kan
 
-        plans = [e.gauge.plan for e in self.edges]
+        inputs = self.kan_inputs
+        factors = {e.argument: [inputs.index(f) for f in _factors(e.argument)] for e in self.edges}
+        # sums come before products
+        edges = sorted(self.edges, key=lambda e: len(factors[e.argument]) > 1)
+        plans = [e.gauge.plan for e in edges]
         return additive_kan(
             limits=[p.limits for p in plans], intervals=plans[0].intervals,
             coefficients=[e.coefficients[: p.intervals + 3]
-                          for e, p in zip(self.edges, plans, strict=True)],
-            steps=[e.step[0] if e.step else 0.0 for e in self.edges], offset=self.offset[0])
+                          for e, p in zip(edges, plans, strict=True)],
+            steps=[e.step[0] if e.step else 0.0 for e in edges], offset=self.offset[0],
+            factors=[factors[e.argument] for e in edges])
+
+    @property
+    def kan_inputs(self) -> tuple[str, ...]:
+        """The formulas whose values the pykan model takes, column by column."""
+        return tuple(dict.fromkeys(f for e in sorted(
+            self.edges, key=lambda e: len(_factors(e.argument)) > 1)
+            for f in _factors(e.argument)))
 
     def __str__(self) -> str:
         lines = [f"Discrepancy of {self.nominal.model.name} in the equation of {self.equation}"]
@@ -195,3 +256,10 @@ class Discrepancy:
         from pikanid.discrepancy.drawing import page
 
         return page(self)
+
+
+def _factors(argument: str) -> list[str]:
+    """The names that an argument multiplies; the argument itself where it is no such product."""
+    parts = [part.strip() for part in argument.split("*")]
+    product = len(set(parts)) > 1 and all(part.isidentifier() for part in parts)
+    return parts if product else [argument]

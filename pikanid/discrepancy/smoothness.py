@@ -8,7 +8,7 @@ Statistical Science 11, 1996, p. 89; as a prior: Lang & Brezger, J. Comp. Graph.
 with D the second differences and s the size of the equation.  The second part says that a
 discrepancy is small beside the physics that it corrects; it is weak wherever the data speak, and
 makes the prior proper.  log λ = ρ(z) is constant, or a broken line along the edge: then it may be
-rough in one place and smooth elsewhere, as a law with a jump is.
+rough in one place and smooth elsewhere.  A step at zero has a ρ of its own, and precision e^ρ/s².
 
 ρ maximises the marginal likelihood of the linearised problem,
 
@@ -38,7 +38,8 @@ class EdgePrior:
     """The prior of the coefficients at positions `at` (K,) in θ.
 
     `size` is the root mean square of the equation's right-hand side, `pieces` the number of pieces
-    of log λ; `hats` (K', pieces) spreads them over the second differences `bends` (K', K).
+    of log λ; `hats` (K', pieces) spreads them over the second differences `bends` (K', K).  The ρ
+    of an edge holds its pieces, and the step's where there is a step.
     """
 
     plan: EdgePlan
@@ -59,22 +60,34 @@ class EdgePrior:
         place, nodes = np.linspace(0, 1, len(self.bends)), np.linspace(0, 1, self.pieces)
         return np.column_stack([np.interp(place, nodes, row) for row in np.eye(self.pieces)])
 
+    @property
+    def count(self) -> int:
+        """Length of the edge's ρ."""
+        return self.pieces + self.plan.step
+
     def precision(self, rho: np.ndarray) -> np.ndarray:
-        """Λ (K, K) at log λ pieces ρ (k,)."""
-        weight = np.exp(self.hats @ rho)
-        return self.bends.T @ (weight[:, None] * self.bends) + np.eye(
-            len(self.at)) / (len(self.at) * (LARGEST * self.size) ** 2)
+        """Λ (K, K) at ρ (count,)."""
+        weight = np.exp(self.hats @ rho[: self.pieces])
+        full = self.bends.T @ (weight[:, None] * self.bends)
+        full[np.diag_indices(len(full))] += 1.0 / (len(full) * (LARGEST * self.size) ** 2)
+        if self.plan.step:
+            full[-1, -1] += np.exp(rho[-1]) / self.size**2
+        return full
 
     def slopes(self, rho: np.ndarray) -> list[np.ndarray]:
-        """∂Λ/∂ρ (K, K), one a piece."""
-        weight = np.exp(self.hats @ rho)
+        """∂Λ/∂ρ (K, K), one an entry of ρ."""
+        weight = np.exp(self.hats @ rho[: self.pieces])
         D = self.bends
-        return [D.T @ ((weight * hat)[:, None] * D) for hat in self.hats.T]
+        found = [D.T @ ((weight * hat)[:, None] * D) for hat in self.hats.T]
+        if self.plan.step:
+            found.append(np.zeros((len(self.at), len(self.at))))
+            found[-1][-1, -1] = np.exp(rho[-1]) / self.size**2
+        return found
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothness:
-    """The priors of all edges together; ρ (k_1 + k_2 + ...,) holds their pieces one by one.
+    """The priors of all edges together; ρ (k_1 + k_2 + ...,) holds theirs one by one.
 
     `weak` (n,) are fixed precisions of the entries of θ that are not coefficients.
     """
@@ -85,11 +98,22 @@ class Smoothness:
     @property
     def stiff(self) -> np.ndarray:
         """ρ of edges that are nearly straight."""
-        return np.full(sum(p.pieces for p in self.priors), STIFF)
+        return np.full(sum(p.count for p in self.priors), STIFF)
 
     def split(self, rho: np.ndarray) -> list[np.ndarray]:
         """ρ edge by edge."""
-        return np.split(rho, np.cumsum([p.pieces for p in self.priors])[:-1])
+        return np.split(rho, np.cumsum([p.count for p in self.priors])[:-1])
+
+    def carry(self, rho: np.ndarray, other: Smoothness) -> np.ndarray:
+        """ρ as a start for other priors of the same edges."""
+        parts = []
+        for old, own, new in zip(self.priors, self.split(rho), other.priors, strict=True):
+            pieces = own[: old.pieces]
+            if new.pieces != old.pieces:
+                pieces = np.full(new.pieces, pieces.mean())
+            step = own[old.pieces:] if old.plan.step else np.array([STIFF])
+            parts.append(np.append(pieces, step if new.plan.step else []))
+        return np.concatenate(parts)
 
     def precision(self, rho: np.ndarray) -> np.ndarray:
         """Λ (n, n)."""
@@ -141,12 +165,12 @@ class Smoothness:
     def _steps(self, rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Differences of neighbouring pieces over STEP, and the gradient of half their square."""
         steps, back = [], []
-        for own in self.split(rho):
-            step = np.diff(own) / STEP
+        for prior, own in zip(self.priors, self.split(rho), strict=True):
+            step = np.diff(own[: prior.pieces]) / STEP
             steps.append(step)
             edge = np.zeros(len(own))
-            edge[1:] += step / STEP
-            edge[:-1] -= step / STEP
+            edge[1: prior.pieces] += step / STEP
+            edge[: prior.pieces - 1] -= step / STEP
             back.append(edge)
         return np.concatenate(steps), np.concatenate(back)
 
