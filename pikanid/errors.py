@@ -448,6 +448,13 @@ def foreign_symbols(names: Sequence[str], where: str) -> str:
     )
 
 
+def spline_at_start(state: str, spline: str) -> str:
+    return (
+        f"The initial value of '{state}' uses {spline}: a spline function belongs in an equation "
+        "or an output; write the initial value as a formula of parameters and inputs."
+    )
+
+
 def no_states() -> str:
     return "The model has no states: list at least one under [states]."
 
@@ -790,6 +797,10 @@ def network_without_inputs() -> str:
     return "The network has seen no inputs yet: give x, the inputs over which it is to be read."
 
 
+def nothing_to_push() -> str:
+    return "This reading is not that of a KAN: there is no pykan model to put it into."
+
+
 def nothing_read() -> str:
     return "No formula of the library is finite over the network's inputs: add forms that are."
 
@@ -950,6 +961,30 @@ def no_profile_simulated(candidates: int) -> str:
 
 def limits_not_kept(profile: str) -> str:
     return f"Profile '{_short(profile)}' exceeds the limits however small it is made."
+
+
+# --- diagnosis -----------------------------------------------------------------------------------
+
+
+def no_coordinate(model: str) -> str:
+    return (
+        f"'{model}' has no second-order coordinate that an output shows: a diagnosis needs a state "
+        "whose derivative is another state, such as theta' = theta_dot."
+    )
+
+
+def held_out_channels(name: str, missing: Sequence[str]) -> str:
+    return (
+        f"The held-out recording '{_short(name)}' lacks {_listed(missing)}, which the recording to "
+        "explain has: give one with the same columns."
+    )
+
+
+def held_out_same(train: str, name: str) -> str:
+    return (
+        f"'{_short(name)}' holds the same data as '{_short(train)}': nothing can be proved on what "
+        "was fitted; give another recording."
+    )
 
 
 # --- concealed effects ---------------------------------------------------------------------------

@@ -12,6 +12,14 @@ import sympy as sp
 from pikanid.expressions import symbol
 from pikanid.model import Input, Model, Output
 
+# what NumPy lacks of the formula language, where an initial value needs it
+_TOOLS = {
+    "abs_power": lambda x, n: 0.0 if x == 0 else abs(x) ** n,
+    "signed_power": lambda x, n: 0.0 if x == 0 else np.sign(x) * abs(x) ** n,
+    "log_abs": lambda x: 0.0 if x == 0 else np.log(abs(x)),
+    "DiracDelta": lambda x: 0.0,
+}
+
 
 def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
     """The delays [s] of inputs or outputs at parameters p (P,)."""
@@ -49,9 +57,9 @@ def initial_state(model: Model) -> InitialState:
         x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
         return InitialState(lambda p, u: x0, lambda p, u: zero)
     arguments = [p_symbols, [symbol(q) for q in model.input_names]]
-    value = sp.lambdify(arguments, start, "numpy", cse=True)
+    value = sp.lambdify(arguments, start, [_TOOLS, "numpy"], cse=True)
     table = [[e.diff(q) for q in p_symbols] for e in start]
-    jacobian = sp.lambdify(arguments, table, "numpy", cse=True)
+    jacobian = sp.lambdify(arguments, table, [_TOOLS, "numpy"], cse=True)
     return InitialState(
         lambda p, u: np.array(value(p, u), float),
         lambda p, u: np.array(jacobian(p, u), float).reshape(n, len(p_symbols)))

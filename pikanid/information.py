@@ -85,7 +85,13 @@ def information_partition(coefficients: np.ndarray, parameters: np.ndarray) -> P
     >>> part.shares
     array([0.5])
     """
+    from scipy.linalg import qr
+
     alone = parameters.T @ parameters
-    q, _ = np.linalg.qr(coefficients)
+    q, r, _ = qr(coefficients, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(r))
+    # a coefficient that repeats others, or that no residual sees, takes no information of its own
+    independent = sizes > max(coefficients.shape) * np.finfo(float).eps * sizes.max(initial=0.0)
+    q = q[:, :len(sizes)][:, independent]
     rest = parameters - q @ (q.T @ parameters)
     return Partition(alone, rest.T @ rest)

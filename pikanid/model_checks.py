@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from pikanid import errors
 from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
@@ -45,6 +46,8 @@ def validate(model: Model) -> None:
         _check_symbols(output.delay, constants, f"The delay of output '{output.name}'", model)
     for state in model.states:
         _check_symbols(state.initial, start, f"The initial value of '{state.name}'", model)
+        if splines := state.initial.atoms(AppliedUndef):
+            raise errors.BadModel(errors.spline_at_start(state.name, str(splines.pop())))
     for item in model.inputs:
         _check_symbols(item.delay, constants, f"The delay of input '{item.name}'", model)
         if item.hold not in ("zero", "first"):

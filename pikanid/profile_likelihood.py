@@ -83,7 +83,10 @@ class _Along:
         self.least = float(r @ r)
         known = self.shooting.adequacy(self.theta).source == "given"
         self.variance = 1.0 if known else self.least / max(len(r) - len(theta), 1)
-        everything = covariance(self.shooting.jacobian(self.theta), np.ones(len(theta), bool))
+        J = self.shooting.jacobian(self.theta)
+        # how the others follow at first order: far along a weak direction they must start near
+        self.slope = -np.linalg.lstsq(J[:, self.others], J[:, self.k], rcond=None)[0]
+        everything = covariance(J, np.ones(len(theta), bool))
         self.std = float(np.sqrt(everything[self.k, self.k] * self.variance))
 
     @property
@@ -104,8 +107,8 @@ class _Along:
         def jacobian(q: np.ndarray) -> np.ndarray:
             return self.shooting.jacobian(full(q))[:, self.others]
 
-        found = minimise(residual, jacobian, start, self.lower[self.others],
-                         self.upper[self.others])
+        lower, upper = self.lower[self.others], self.upper[self.others]
+        found = minimise(residual, jacobian, np.clip(start, lower, upper), lower, upper)
         return (2 * found.cost - self.least) / self.variance, found.theta
 
 
@@ -113,7 +116,8 @@ def _walk(along: _Along, side: float, quantile: float, points: int
           ) -> tuple[float, dict[float, float]]:
     """Where the profile crosses the quantile on one side, and what was met on the way."""
     bound = float(along.lower[along.k] if side < 0 else along.upper[along.k])
-    step = along.std * np.sqrt(quantile) / 2
+    # where the data leave the parameter open its standard error is no length to step by
+    step = min(along.std * np.sqrt(quantile) / 2, max(abs(along.best), 1e-3))
     others, found = along.theta[along.others], {}
     before_value, before = along.best, 0.0
     for count in range(1, points + 1):
@@ -121,7 +125,7 @@ def _walk(along: _Along, side: float, quantile: float, points: int
         distance = step * (count if count < 5 else 2.0 ** (count - 2))
         value = along.best + side * distance
         value = max(value, bound) if side < 0 else min(value, bound)
-        excess, others = along.excess(value, others)
+        excess, others = along.excess(value, others + along.slope * (value - before_value))
         found[value] = excess
         if excess >= quantile:
             roots = np.sqrt([max(before, 0.0), quantile, excess])

@@ -29,6 +29,13 @@ def _plain(*_: Any, **__: Any) -> Callable[[Any], Any]:
     return lambda function: function
 
 
+def _fields(record: np.dtype) -> types.SimpleNamespace:
+    """Zeros for the fields of a record, under their names."""
+    assert record.fields is not None and record.names is not None
+    return types.SimpleNamespace(
+        **{n: np.zeros(record[n].shape, record[n].base) for n in record.names})
+
+
 def module(model: Model, method: Method = "explicit") -> types.ModuleType:
     """The model's generated module with plain Python functions."""
     return _module(Structure(model), method)
@@ -39,11 +46,11 @@ def _module(structure: Structure, method: Method) -> types.ModuleType:
     model = structure.model
     source = compiler._source(model, method)
     source = source.replace("from numba import njit\n", "")
+    source = source.replace("np.zeros(1, WORK)[0]", "fields_of(WORK)")
     made = types.ModuleType("interpreted")
-    made.__dict__["njit"] = _plain
+    made.__dict__.update(njit=_plain, fields_of=_fields)
     exec(compile(source, f"<{model.name}>", "exec"), made.__dict__)
-    for name in ("make_work", "solve_small", "positive_power", "power_slope", "log_abs", "sgn",
-                 "spline_basis"):
+    for name in ("solve_small", "positive_power", "power_slope", "log_abs", "sgn", "spline_basis"):
         setattr(made, name, getattr(support, name).py_func)
     integrate = made.integrate
 

@@ -144,7 +144,6 @@ def test_delay_survives_the_model_file_as_the_text_it_is() -> None:
     assert Model.from_dict(model.to_dict()) == model
 
 
-@pytest.mark.xfail(reason="the simulator looks for moving delays at the model's guess only")
 def test_delay_that_does_not_move_yet_is_still_free() -> None:
     """A delay tau**2 has no slope at tau = 0; it must have one as soon as tau moves."""
     recording = excitation.two_pulse(1.0, 0.02)

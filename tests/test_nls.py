@@ -137,8 +137,6 @@ def test_misfit_is_reported_never_as_success() -> None:
     assert abs(right.value("mu") - 2.0) < 4 * right.std("mu")
 
 
-@pytest.mark.xfail(reason="the steps of the last start are kept, even if it had none",
-                   raises=IndexError)
 def test_starts_that_cannot_be_simulated_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     """x' = k x² explodes for k > 1/2; the fit starts there all the same."""
     monkeypatch.setattr("pikanid.simulation.simulator.FINEST", 8)  # give up sooner

@@ -142,18 +142,13 @@ STARTS = {
     "clipped": ("clip(u_x, -m, m)", lambda p, u: np.clip(u, -p["m"], p["m"])),
     "kinked": ("abs(max(u_x, m)) - sign(g)", lambda p, u: abs(max(u, p["m"])) - 1),
     "power": ("signed_power(u_x, m)", lambda p, u: np.sign(u) * abs(u) ** p["m"]),
-    "spline": ("law(m)", lambda p, u: p["m"] * p["law_1"] + (1 - p["m"]) * p["law_0"]),
 }
 
 
-@pytest.mark.parametrize("name", [
-    pytest.param(n, marks=pytest.mark.xfail(
-        reason="initial values know NumPy's smooth functions only"))
-    if n in ("kinked", "power", "spline") else n for n in STARTS])
+@pytest.mark.parametrize("name", STARTS)
 def test_initial_states_and_their_jacobians(name: str) -> None:
     text, meaning = STARTS[name]
-    model = systems.sloshing().with_spline(Spline("law", 1, (0.0, 0.0, 1.0, 1.0)), scale=0.4)
-    model = model.with_values(law_1=0.9).with_initial(theta=text)
+    model = systems.sloshing().with_initial(theta=text)
     e = bind(model, recording().with_channels(Channel("u_x", T, PUSH + 0.5)))
     p = np.array(list(model.values.values()))
 
@@ -166,6 +161,12 @@ def test_initial_states_and_their_jacobians(name: str) -> None:
     for k in range(len(p)):
         expected = oracle.derivative(lambda h, k=k: by_hand(p + h * np.eye(len(p))[k]), 0.0, 1e-4)
         assert jacobian[0, k] == pytest.approx(expected, rel=1e-7, abs=1e-9)
+
+
+def test_a_spline_is_no_initial_value() -> None:
+    model = systems.sloshing().with_spline(Spline("law", 1, (0.0, 0.0, 1.0, 1.0)), scale=0.4)
+    with pytest.raises(errors.BadModel, match="initial value of 'theta' uses law"):
+        model.with_initial(theta="law(m)")
 
 
 # --- units ---------------------------------------------------------------------------------------

@@ -25,11 +25,12 @@ import numpy as np
 from numba import njit
 
 from pikanid.simulation.support import (
-    Seen, log_abs, make_work, positive_power, power_slope, sgn, solve_small, spline_basis)
+    Seen, log_abs, positive_power, power_slope, sgn, solve_small, spline_basis, work_dtype)
 
 
 def called(function):
-    return njit(cache=True, error_model="numpy", _nrt=False)(function)
+    return njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True,
+                no_cfunc_wrapper=True)(function)
 
 
 def inlined(function):

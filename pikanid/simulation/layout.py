@@ -18,53 +18,28 @@ class Seen(NamedTuple):
     inside: np.ndarray
 
 
-class Work(NamedTuple):
-    """Scratch arrays of one integration; the kernels themselves allocate nothing."""
+def work_dtype(n: int, m: int, P: int, q: int, k: int, stages: int, rows: int,
+               width: int) -> np.dtype:
+    """One record of scratch for n states, m inputs, P parameters, q outputs and k switches.
 
-    kx: np.ndarray
-    kS: np.ndarray
-    xt: np.ndarray
-    St: np.ndarray
-    xn: np.ndarray
-    Sn: np.ndarray
-    x: np.ndarray
-    S: np.ndarray
-    u: np.ndarray
-    uc: np.ndarray
-    held: np.ndarray
-    slope: np.ndarray
-    ud: np.ndarray
-    f: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    start: np.ndarray
-    y: np.ndarray
-    J: np.ndarray
-    fp: np.ndarray
-    hp: np.ndarray
-    gp: np.ndarray
-    rp: np.ndarray
-    s: np.ndarray
-    g: np.ndarray
-    ge: np.ndarray
-    Ge: np.ndarray
-    phi: np.ndarray
-    G: np.ndarray
-    Gs: np.ndarray
-    Fs: np.ndarray
-    Hs: np.ndarray
-    gS: np.ndarray
-    GS: np.ndarray
-    ds: np.ndarray
-    held_at_zero: np.ndarray
-    eye: np.ndarray
-    fx: np.ndarray
-    matrix: np.ndarray
-    change: np.ndarray
-    right: np.ndarray
-    still: np.ndarray
-    constant: np.ndarray
-    none: np.ndarray
-    nud: np.ndarray
-    nact: np.ndarray
-    bs: np.ndarray
+    Kernels get it as one pointer: as a tuple of arrays each of its fields would travel as seven
+    arguments through every call, and most of the time to compile a model went there.  There is room
+    for sensitivities by every parameter and initial state; `act` says how many are in use.
+    """
+    A, big = P + n + 1, max(n, k)
+    shapes: dict[str, tuple[int, ...]] = {
+        "kx": (stages, n), "kS": (stages, A, n),
+        **dict.fromkeys(("xt", "xn", "x", "f", "before", "after", "start"), (n,)),
+        **dict.fromkeys(("St", "Sn", "S", "eye", "fx"), (A, n)),
+        **dict.fromkeys(("u", "uc", "held", "slope"), (m,)),
+        **dict.fromkeys(("ud", "still"), (m, A)),
+        "y": (q,), "J": (q, A), "fp": (n, P + 1), "hp": (q, P + 1),
+        **dict.fromkeys(("gp", "rp"), (k, P + 1)),
+        **dict.fromkeys(("s", "g", "ge", "Ge", "phi", "G"), (k,)),
+        "Gs": (k, k), "Fs": (n, k), "Hs": (q, k),
+        **dict.fromkeys(("gS", "GS", "ds"), (k, A)),
+        "matrix": (big, big), "change": (big, 1), "right": (n, A), "bs": (rows, width)}
+    integers = {"held_at_zero": k, "constant": n}
+    return np.dtype(
+        [(name, "f8", tuple(max(length, 1) for length in shape)) for name, shape in shapes.items()]
+        + [(name, "i8", (max(length, 1),)) for name, length in integers.items()])

@@ -73,10 +73,10 @@ class Simulator:
 
     @functools.cached_property
     def _delayed_by(self) -> np.ndarray:
-        """Parameters (P,) that any delay depends on."""
-        p = np.array(list(self.model.values.values()))
-        both: list[Input | Output] = [*self.model.inputs, *self.model.outputs]
-        return np.any(delay_jacobian(both, self.model, p) != 0, axis=0)
+        """Which parameters (P,) any delay depends on."""
+        channels: list[Input | Output] = [*self.model.inputs, *self.model.outputs]
+        names = {q.name for c in channels for q in c.delay.free_symbols}
+        return np.array([n in names for n in self.model.parameter_names])
 
     @functools.cached_property
     def _undelayed(self) -> bool:

@@ -9,9 +9,10 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numba import njit
 
-from pikanid.simulation.layout import STEEP, Seen, Work
+from pikanid.simulation.layout import STEEP, Seen, work_dtype
 
-__all__ = ["STEEP", "Seen", "Work"]  # generated models find everything they need in this module
+# generated models find everything they need in this module
+__all__ = ["STEEP", "Seen", "work_dtype"]
 
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -21,32 +22,6 @@ def kernel(function: _Function) -> _Function:
     """Compile a function that allocates nothing, without numba's reference counting."""
     options: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
     return cast(_Function, njit(**options)(function))
-
-
-def allocating(function: _Function) -> _Function:
-    """Compile a function that makes arrays."""
-    return cast(_Function, njit(cache=True)(function))
-
-
-@allocating
-def make_work(n: int, m: int, P: int, q: int, k: int, A: int, stages: int,
-              rows: int, width: int) -> Work:
-    """Scratch for n states, m inputs, P parameters, q outputs, k switches, A sensitivities."""
-    big = max(n, k)
-    wide = max(A, n)  # the implicit step differentiates by all states
-    return Work(
-        np.empty((stages, n)), np.empty((stages, A, n)), np.empty(n), np.empty((A, n)),
-        np.empty(n), np.empty((A, n)), np.empty(n), np.empty((A, n)),
-        np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.zeros((m, A)),
-        np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(q), np.empty((q, A)),
-        np.zeros((n, P + 1)), np.zeros((q, P + 1)), np.zeros((k, P + 1)), np.zeros((k, P + 1)),
-        np.empty(k), np.empty(k), np.empty(k), np.empty(k), np.empty(k), np.empty(k),
-        np.zeros((k, k)), np.zeros((n, k)), np.zeros((q, k)),
-        np.empty((k, A)), np.empty((k, wide)), np.empty((k, wide)), np.empty(k, np.int64),
-        np.eye(n), np.empty((n, n)), np.empty((big, big)), np.empty((big, 1)), np.empty((n, A)),
-        np.zeros((m, n)),
-        np.full(n, P, np.int64), np.empty((0, n)), np.empty((m, 0)), np.empty(0, np.int64),
-        np.empty((rows, width)))
 
 
 @kernel

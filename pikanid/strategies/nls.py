@@ -70,6 +70,7 @@ class NLS:
         shooting = Shooting(problem, self.method)
         history: list[dict[str, float]] = []
         best: Optimum | None = None
+        found: Optimum | None = None
         for k, start in enumerate(starting_points(problem, self.starts, self.protocol, self.seed)):
             if k == 1 and self.starts == "auto" and self.protocol == "default" and (
                     best is not None and shooting.explains(best.theta)):
@@ -85,7 +86,7 @@ class NLS:
                 best = found
         if best is None:
             raise errors.SimulationFailed(errors.bad_start())
-        if len(history) > 1:
+        if best is not found:
             shooting.choose_steps(best.theta, "fine")
         settings = {"starts": self.starts, "protocol": self.protocol, "tolerance": self.tolerance,
                     "method": shooting.steps[0].method, "segments": self.segments,

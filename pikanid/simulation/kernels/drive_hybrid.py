@@ -44,14 +44,14 @@ def leap(k, new, t, x, S, u, v, ud, p, mode, act, w):
     (saltation; Di Bernardo et al., Piecewise-smooth Dynamical Systems, 2008, sec. 2.5).
     """
     A = len(act)
-    field_value(t, x, u, v, p, mode, w, w.before)
+    field_value(t, x, u, v, p, mode, w, w.before[:])
     switching_rate(w.bs, t, x, u, v, p, w.s, w.G)
     rate = w.G[k]
     if A > 0:
         switching_sensitivity(w.bs, t, x, S, u, ud, p, w.s, act, w.gp, w.gS)
     mode[k] = new
     if A > 0 and rate != 0.0:
-        field_value(t, x, u, v, p, mode, w, w.after)
+        field_value(t, x, u, v, p, mode, w, w.after[:])
         for a in range(A):
             when = -w.gS[k, a] / rate
             for i in range(N):
@@ -147,14 +147,14 @@ def locate(t, h, x, ta, ua, v, p, mode, w, end):
             middle = low + (high - low) * f_low / (f_low - f_high)
             edge = 1e-3 * (high - low) if count % 3 == 0 else 0.0
             middle = min(max(middle, low + edge), high - edge)
-        step(t, middle, x, w.none, ta, ua, v, w.nud, p, mode, w.nact, w, w.xn, w.none)
+        step(t, middle, x, w.S, ta, ua, v, w.still, p, mode, w.constant[:0], w, w.xn, w.Sn)
         value, k = margins(t + middle, w.xn, ta, ua, v, p, mode, w, phi)
         if value < 0.0:
             high, f_high, which = middle, value, k
         else:
             low, f_low = middle, value
     if which < 0:
-        step(t, high, x, w.none, ta, ua, v, w.nud, p, mode, w.nact, w, w.xn, w.none)
+        step(t, high, x, w.S, ta, ua, v, w.still, p, mode, w.constant[:0], w, w.xn, w.Sn)
         _, which = margins(t + high, w.xn, ta, ua, v, p, mode, w, phi)
     return high, which
 
@@ -182,9 +182,9 @@ def roughness(t, h, x, xn, ta, ua, v, p, mode, w):
     Between two switches a phase can be far shorter than the sub-steps, such as the touch of a
     stiff wall: halving the sub-steps would not show that it is integrated badly.
     """
-    step(t, 0.5 * h, x, w.none, ta, ua, v, w.nud, p, mode, w.nact, w, w.before, w.none)
-    step(t + 0.5 * h, 0.5 * h, w.before, w.none, ta, ua, v, w.nud, p, mode, w.nact, w, w.after,
-         w.none)
+    step(t, 0.5 * h, x, w.S, ta, ua, v, w.still, p, mode, w.constant[:0], w, w.before, w.Sn)
+    step(t + 0.5 * h, 0.5 * h, w.before, w.S, ta, ua, v, w.still, p, mode, w.constant[:0], w,
+         w.after, w.Sn)
     largest, worst = 0.0, 0.0
     for i in range(N):
         largest = max(largest, abs(x[i]), abs(xn[i]))
@@ -206,7 +206,8 @@ def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
     while done < h:
         rest = min(h - done, limit)
         last = done + rest >= h
-        if not step(t + done, rest, x, w.none, ta, ua, v, w.nud, p, mode, w.nact, w, w.xn, w.none):
+        if not step(t + done, rest, x, w.S, ta, ua, v, w.still, p, mode, w.constant[:0], w, w.xn,
+                    w.Sn):
             return 1
         part, which, redo = rest, -1, careful or len(act) > 0
         end, _ = margins(t + h if last else t + done + rest, w.xn, ta, ua, v, p, mode, w, w.phi)
@@ -227,7 +228,7 @@ def advance(t, h, x, S, ta, ua, v, ud, p, mode, act, w):
                 return 1
         if share > 0.0:
             redo, part = True, share * rest
-            step(t + done, part, x, w.none, ta, ua, v, w.nud, p, mode, w.nact, w, w.xn, w.none)
+            step(t + done, part, x, w.S, ta, ua, v, w.still, p, mode, w.constant[:0], w, w.xn, w.Sn)
             end, _ = margins(t + done + part, w.xn, ta, ua, v, p, mode, w, w.phi)
         if end < -1e-14:
             part, which = locate(t + done, part, x, ta, ua, v, p, mode, w, end)

@@ -38,16 +38,16 @@ def switch_inputs(t, i, x, S, U, V, gap, dtau_in, delayed, p, mode, act, w):
             for a in range(A):
                 w.ud[j, a] = -V[i, j] * dtau_in[j, a]
     if not delayed or i == 0 or A == 0:
-        begin(t, i == 0, x, S, w.held, w.slope, w.ud, p, mode, act, w)
+        begin(t, i == 0, x, S, w.held, w.slope[:], w.ud, p, mode, act, w)
         return
     for j in range(M):
         w.held[j], w.slope[j] = w.uc[j], V[i - 1, j]
     for j in range(M):
-        field_value(t, x, w.held, w.slope, p, mode, w, w.start)
+        field_value(t, x, w.held, w.slope[:], p, mode, w, w.start[:])
         w.held[j], w.slope[j] = U[i, j], V[i, j]
-        begin(t, False, x, S, w.held, w.slope, w.ud, p, mode, act, w)
+        begin(t, False, x, S, w.held, w.slope[:], w.ud, p, mode, act, w)
         w.uc[j] = U[i, j]
-        field_value(t, x, w.held, w.slope, p, mode, w, w.f)
+        field_value(t, x, w.held, w.slope[:], p, mode, w, w.f[:])
         for a in range(A):
             for r in range(N):
                 S[a, r] += (w.start[r] - w.f[r]) * dtau_in[j, a]
@@ -95,10 +95,16 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
     return 0, L - 1
 
 
+WORK = work_dtype(N, M, P, Q, K, STAGES, *BUFFERS)
+
+
 @njit(cache=True, error_model="numpy")
 def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first, output,
               row, inside, X, Y, J):
     """`run` with its scratch; the only function of a model that Python calls."""
-    w = make_work(N, M, P, Q, K, len(act), STAGES, BUFFERS[0], BUFFERS[1])
+    w = np.zeros(1, WORK)[0]
+    for i in range(N):
+        w.eye[i, i] = 1.0
+        w.constant[i] = P
     return run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, np.ones(K), w,
                Seen(first, output, row, inside), X, Y, J)

@@ -33,7 +33,7 @@ def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
             size, move = 0.0, 0.0
             for i in range(n):
                 xt[i] = start[i] + 0.25 * h * kx[stage, i]
-            field(ts, xt, w.eye, u, v, w.still, p, mode, w.constant, w, w.f, fx)
+            field(ts, xt, w.eye, u, v, w.still, p, mode, w.constant[:], w, w.f[:], fx[:])
             for i in range(n):
                 for j in range(n):
                     matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * h * fx[j, i]
@@ -60,7 +60,7 @@ def step(t, h, x, S, ta, ua, v, ud, p, mode, act, w, xn, Sn):
                     St[a, i] = S[a, i]
                     for j in range(stage):
                         St[a, i] += h * SDIRK[stage, j] * kS[j, a, i]
-            field(ts, xt, St, u, v, ud, p, mode, act, w, w.f, kS[stage])
+            field(ts, xt, St, u, v, ud, p, mode, act, w, w.f[:], kS[stage])
             for i in range(n):
                 for j in range(n):
                     matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * h * fx[j, i]
