@@ -19,22 +19,22 @@ NULLS = 200
 
 @dataclass(frozen=True)
 class Truth:
-    """A law with the names that say exactly it, ours and pykan's ("" where pykan has none)."""
+    """A law with the names that say exactly it, ours and pykan's (none where it has none)."""
 
     label: str
     law: Callable[[np.ndarray], np.ndarray]
     ours: str
-    pykan: str
+    pykan: tuple[str, ...]
 
 
 TRUTHS = (
-    Truth("x³", lambda x: x**3, "cubic", "x^3"),
-    Truth("x·|x|", lambda x: x * np.abs(x), "signed square", ""),
-    Truth("tanh 20x", lambda x: np.tanh(20 * x), "tanh", "tanh"),
-    Truth("sin 3x", lambda x: np.sin(3 * x), "sine", "sin"),
-    Truth("sgn x", np.sign, "sign", "sgn"),
-    Truth("dead zone 0.3", lambda x: x - np.clip(x, -0.3, 0.3), "dead zone", ""),
-    Truth("|x|^1.5 sgn x", lambda x: np.sign(x) * np.abs(x) ** 1.5, "signed power", ""),
+    Truth("x³", lambda x: x**3, "cubic", ("x^3",)),
+    Truth("x·|x|", lambda x: x * np.abs(x), "signed square", ()),
+    Truth("tanh 20x", lambda x: np.tanh(20 * x), "tanh", ("tanh",)),
+    Truth("sin 3x", lambda x: np.sin(3 * x), "sine", ("sin", "cos")),
+    Truth("sgn x", np.sign, "sign", ("sgn",)),
+    Truth("dead zone 0.3", lambda x: x - np.clip(x, -0.3, 0.3), "dead zone", ()),
+    Truth("|x|^1.5 sgn x", lambda x: np.sign(x) * np.abs(x) ** 1.5, "signed power", ()),
 )
 
 
@@ -94,6 +94,6 @@ def run_pykan(label: str, noise: float, seed: int) -> dict[str, Any]:
     middle = time.process_time()
     kan.auto_symbolic(verbose=0)
     auto = kan.symbolic_fun[0].funs_name[0][0]
-    return {"auto": auto, "suggest": by_fit, "auto_exact": auto == truth.pykan,
-            "suggest_exact": by_fit == truth.pykan, "suggest_seconds": middle - begun,
+    return {"auto": auto, "suggest": by_fit, "auto_exact": auto in truth.pykan,
+            "suggest_exact": by_fit in truth.pykan, "suggest_seconds": middle - begun,
             "auto_seconds": time.process_time() - middle}

@@ -34,8 +34,8 @@ class Smoother:
     def of(curve: Curve) -> Smoother:
         """Splines on quantiles of x, fewer than a quarter of the samples."""
         bases: list[Array] = []
-        if curve.weight.ndim == 2:
-            return Smoother(curve, (np.eye(curve.rows) - curve.fixed @ curve.fixed.T,))
+        if curve.weight.ndim == 2:  # it is a spline already
+            return Smoother(curve, ())
         for pieces in PIECES:
             if pieces + 3 > len(curve.x) // 4:
                 break
@@ -65,7 +65,7 @@ class Smoother:
         """Probability of a residual as smooth as this if the form were right."""
         curve = self.curve
         if curve.weight.ndim == 2:
-            dof = curve.rows - curve.fixed.shape[1] - fit.form.count + 1
+            dof = curve.rows - fit.form.count + 1
             return float(chi2.sf(fit.rss, dof)) if dof > 0 else 1.0
         left = curve.centred - fit.shape
         found = []

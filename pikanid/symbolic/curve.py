@@ -33,6 +33,9 @@ class Curve:
     free : further columns (n, m) that every candidate may use
     samples : number of observations behind the curve, for BIC
     argument, unit, x_unit : what x and y are
+    target : y as it is compared (r,)
+    std : standard deviation of y (n,), where it is known
+    exact : share of the spread of y below which nothing is told apart
     """
 
     x: Array
@@ -45,10 +48,13 @@ class Curve:
     unit: str = ""
     x_unit: str = ""
     target: Array = field(default_factory=lambda: np.empty(0))
+    std: Array | None = None
+    exact: float = EXACT
 
     @staticmethod
     def of_points(x: Array, y: Array, sigma: float | Array | None = None, *,
-                  argument: str = "x", unit: str = "", x_unit: str = "") -> Curve:
+                  argument: str = "x", unit: str = "", x_unit: str = "",
+                  exact: float = EXACT) -> Curve:
         """Points with independent noise of standard deviation sigma; None: equal and unknown.
 
         Raises
@@ -67,26 +73,47 @@ class Curve:
                 raise errors.BadSetting(errors.bad_value("sigma", sigma, "a positive number"))
         weight = 1.0 / spread
         return Curve(x[order], y[order], weight, sigma is not None, np.empty((len(x), 0)), len(x),
-                     argument, unit, x_unit, weight * y[order])
+                     argument, unit, x_unit, weight * y[order],
+                     None if sigma is None else spread, exact)
+
+    @staticmethod
+    def of_spline(x: Array, basis: Array, coefficients: Array, covariance: Array, *,
+                  samples: int | None = None, free: Array | None = None, argument: str = "x",
+                  unit: str = "", x_unit: str = "") -> Curve:
+        """basis (n, K) @ coefficients (K,) of covariance (K, K), at x (n,).
+
+        Candidates are compared after projection on the spline: it is not blamed for what it cannot
+        follow.  The constant and the `free` columns (n, m) may have any variance: they are taken
+        out before anything is compared.
+        """
+        x = np.asarray(x, float)
+        order = np.argsort(x, kind="stable")
+        B = np.asarray(basis, float)[order]
+        extra = np.empty((len(x), 0)) if free is None else np.asarray(free, float)[order]
+        values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        u, s, _ = np.linalg.svd(np.column_stack([np.ones(len(x)), extra]), full_matrices=False)
+        u = u[:, s > 1e-10 * s[0]]
+        spread = B @ root
+        spread = spread - u @ (u.T @ spread)
+        left, sizes, _ = np.linalg.svd(spread, full_matrices=False)
+        good = sizes > 1e-6 * sizes[0]
+        weight = (left[:, good] / sizes[good]).T
+        y = B @ coefficients
+        return Curve(x[order], y, weight, True, extra, samples or int(good.sum()), argument,
+                     unit, x_unit, weight @ y, np.linalg.norm(spread, axis=1))
 
     @staticmethod
     def of_covariance(x: Array, y: Array, covariance: Array, *, samples: int | None = None,
                       free: Array | None = None, argument: str = "x", unit: str = "",
                       x_unit: str = "") -> Curve:
-        """Values (n,) with a full covariance (n, n), which may be singular.
-
-        Directions of y that have no variance at all are left out of the comparison: a spline is
-        not blamed for what it cannot follow.
-        """
-        x, y = np.asarray(x, float), np.asarray(y, float)
-        order = np.argsort(x, kind="stable")
-        V = 0.5 * (covariance + covariance.T)[np.ix_(order, order)]
-        values, vectors = np.linalg.eigh(V)
+        """Values (n,) with a full covariance (n, n), which may be singular."""
+        values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
         good = values > 1e-9 * values[-1]
-        weight = (vectors[:, good] / np.sqrt(values[good])).T
-        extra = np.empty((len(x), 0)) if free is None else np.asarray(free, float)[order]
-        return Curve(x[order], y[order], weight, True, extra, samples or int(good.sum()), argument,
-                     unit, x_unit, weight @ y[order])
+        root = vectors[:, good]
+        return Curve.of_spline(x, root, root.T @ np.asarray(y, float), np.diag(values[good]),
+                               samples=samples, free=free, argument=argument, unit=unit,
+                               x_unit=x_unit)
 
     @property
     def low(self) -> float:
@@ -112,6 +139,8 @@ class Curve:
     @cached_property
     def fixed(self) -> Array:
         """Orthonormal basis (r, m) of the whitened constant and free columns."""
+        if self.weight.ndim == 2:  # they have been taken out already
+            return np.empty((self.rows, 0))
         columns = np.vstack([np.ones(len(self.x)), self.free.T])
         u, s, _ = np.linalg.svd(self.whiten(columns).T, full_matrices=False)
         return np.asarray(u[:, s > 1e-10 * s[0]])
@@ -133,7 +162,7 @@ class Curve:
     @cached_property
     def floor(self) -> float:
         """Mean square that counts as none: rounding, and iterations that stop."""
-        return EXACT**2 * self.total / self.rows
+        return self.exact**2 * self.total / self.rows
 
     def score(self, rss: float, parameters: int) -> float:
         """BIC of a fit with this residual sum of squares, up to a constant of the curve."""

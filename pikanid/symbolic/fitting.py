@@ -223,6 +223,10 @@ def _finish(form: Form, curve: Curve, p: Array) -> FormFit | None:
 
 def _offset(curve: Curve, values: Array) -> tuple[float, Array]:
     """The constant d beside given values, and the whitened constant and free columns (r, m)."""
+    if curve.weight.ndim == 2:
+        columns = np.column_stack([np.ones(len(curve.x)), curve.free])
+        found = np.linalg.lstsq(columns, curve.y - values, rcond=1e-10)[0]
+        return float(found[0]), np.zeros((curve.rows, columns.shape[1]))
     base = curve.whiten(np.vstack([np.ones(len(curve.x)), curve.free.T])).T
     found = np.linalg.lstsq(base, curve.target - curve.whiten(values), rcond=1e-10)[0]
     return float(found[0]), base

@@ -125,6 +125,11 @@ class Form:
         """(x, *p) -> ∂f_k/∂p_j, column by column."""
         return compiled(self.symbols, slopes(self.columns, self.symbols[1:]))
 
+    @cached_property
+    def rates(self) -> Compiled:
+        """(x, *p) -> ∂f_k/∂x."""
+        return compiled(self.symbols, slopes(self.columns, (X,)))
+
     @property
     def amplitudes(self) -> tuple[str, ...]:
         """Names of the a_k: "a", or "a1", "a2", ..."""
@@ -136,6 +141,10 @@ class Form:
         """Σ a_k f_k(x; p) + d."""
         terms = [symbol(a) * f for a, f in zip(self.amplitudes, self.columns, strict=True)]
         return sp.Add(*terms, symbol("d"))
+
+    def typical(self, low: float, high: float) -> list[float]:
+        """Parameters inside that make all of the form show over [low, high]."""
+        return [float(g[len(g) // 3]) for g in (k.grid(low, high, 100) for k in self.knobs)]
 
     def fits_range(self, low: float, high: float) -> bool:
         """Whether the form is finite over [low, high] for some parameters."""

@@ -128,6 +128,13 @@ class NamedEdge:
         return tuple(c for c in self.candidates[1:] if c.agrees and c.probability >= CHANCE)
 
     @property
+    def std(self) -> np.ndarray | None:
+        """Standard deviation of the edge (n,): given, or that of the noise around it."""
+        if self.curve.std is not None:
+            return self.curve.std
+        return np.full(len(self.curve.x), self.noise)
+
+    @property
     def range(self) -> tuple[float, float]:
         """Where the name holds."""
         return self.curve.low, self.curve.high

@@ -1,7 +1,8 @@
 """Names an edge: every form fitted, ranked by probability, tested for what it leaves behind.
 
-With prior probabilities π (half for "nothing", half shared by the families) and the Bayesian
-information criterion as -2 log of the marginal likelihood (Schwarz, Ann. Stat. 6, 1978, p. 461),
+With prior probabilities π (half for "nothing", the other half to forms, simple ones first) and the
+Bayesian information criterion as -2 log of the marginal likelihood (Schwarz, Ann. Stat. 6, 1978,
+p. 461),
 
     P(form | edge) ∝ π(form) exp(-BIC/2).
 
@@ -19,12 +20,13 @@ import numpy as np
 
 from pikanid.symbolic.adequacy import ALPHA, Smoother
 from pikanid.symbolic.curve import Curve
-from pikanid.symbolic.fitting import FormFit, fit_form
+from pikanid.symbolic.fitting import fit_form
 from pikanid.symbolic.library import LIBRARY, NOTHING, Form
 from pikanid.symbolic.named import Candidate, NamedEdge
 
 PRIOR_NOTHING = 0.5
 PRIOR_FREE = 0.02  # of the other half: what no library holds is rare, but there
+SIMPLER = 4.0  # how much less probable a form is for every further constant, before any data
 AGREES = 9.0  # squared distance of two fits, in units of the noise, that data cannot tell apart
 
 
@@ -66,9 +68,11 @@ def name_curve(curve: Curve, library: Sequence[Form] = LIBRARY) -> NamedEdge:
     forms = [NOTHING, *(f for f in library if f.columns)]
     fits = [f for f in (fit_form(form, curve) for form in forms) if f is not None and f.finite]
     smoother = Smoother.of(curve)
-    sizes = Counter(f.family for f in forms)
-    families = len(sizes) - 1
-    scores = np.array([_score(fit, curve, sizes, families) for fit in fits])
+    share_of = {n: (1.0 - PRIOR_NOTHING) * (1.0 - PRIOR_FREE) * w
+                for n, w in priors(forms).items()} | {NOTHING.name: PRIOR_NOTHING}
+    scores = np.array([
+        curve.score(fit.rss, fit.form.count + curve.free.shape[1])
+        - 2.0 * np.log(share_of[fit.form.name]) for fit in fits])
     p_values = np.array([smoother.p_value(fit) for fit in fits])
     free, free_rss, free_count = smoother.free()
     free -= 2.0 * np.log((1.0 - PRIOR_NOTHING) * PRIOR_FREE)
@@ -85,12 +89,17 @@ def name_curve(curve: Curve, library: Sequence[Form] = LIBRARY) -> NamedEdge:
                      float(np.sqrt(variance)))
 
 
-def _score(fit: FormFit, curve: Curve, sizes: Counter[str], families: int) -> float:
-    form = fit.form
-    prior = PRIOR_NOTHING
-    if form is not NOTHING:
-        prior = (1.0 - PRIOR_NOTHING) * (1.0 - PRIOR_FREE) / families / sizes[form.family]
-    return curve.score(fit.rss, form.count + curve.free.shape[1]) - 2.0 * float(np.log(prior))
+def priors(library: Sequence[Form]) -> dict[str, float]:
+    """Of every form but "nothing", by name: families alike, simpler forms first.
+
+    Every constant beyond the amplitude and the offset makes a form SIMPLER times less probable;
+    forms of one family with the same number of constants share.
+    """
+    forms = [f for f in library if f is not NOTHING]
+    alike = Counter((f.family, f.count) for f in forms)
+    weight = {f.name: SIMPLER ** (2.0 - f.count) / alike[f.family, f.count] for f in forms}
+    total = sum(weight.values())
+    return {name: w / total for name, w in weight.items()}
 
 
 def _ranked(candidates: list[Candidate], curve: Curve, variance: float) -> tuple[Candidate, ...]:

@@ -1,0 +1,145 @@
+"""All constants of a composed formula fitted together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pikanid.symbolic.composed import Composition
+from pikanid.symbolic.curve import EXACT
+from pikanid.symbolic.numeric import Array
+
+REFUSED = 1e10
+EVALUATIONS = 200
+RANK = 1e-7  # of column-scaled Jacobians
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A composition at the least squares of data (x, y).
+
+    `theta` (count,) with `held` (count,) marking those fixed at their values; the columns of
+    `generic` depend on each other as the Jacobian's do at a typical place; `floor` is the mean
+    square that counts as none.
+    """
+
+    composition: Composition
+    theta: Array
+    held: Array
+    rss: float
+    generic: Array
+    samples: int
+    floor: float
+
+    @cached_property
+    def rank(self) -> int:
+        """Parameters that data can see at all: scales and offsets that trade count once."""
+        return _rank(self.generic[:, ~self.held])
+
+    @property
+    def score(self) -> float:
+        """BIC up to a constant."""
+        n = self.samples
+        noise = self.rss / n + self.floor + 1e-300
+        return n * float(np.log(noise)) + self.rank * float(np.log(n))
+
+
+def refit(composition: Composition, theta: Array, x: Array, y: Array, generic: Array,
+          held: Array | None = None, exact: float = EXACT,
+          evaluations: int = EVALUATIONS) -> Refit | None:
+    """Least squares from θ with some parameters held; None where the formula is not finite."""
+    from scipy.optimize import least_squares
+
+    fixed = np.zeros(composition.count, bool) if held is None else held
+    full = np.array(theta, float)
+    value, J = composition.evaluate(full, x)
+    if not (np.isfinite(value).all() and np.isfinite(J).all()):
+        return None
+    free = ~fixed
+    spread = float(np.std(y))
+    scale = 1.0 / np.maximum(np.linalg.norm(J[:, free], axis=0), 1e-12 * max(spread, 1e-300))
+    scale = np.minimum(scale, 1e6 * np.maximum(np.abs(full[free]), 1.0))
+    memory: dict[bytes, tuple[Array, Array]] = {}
+
+    def both(z: Array) -> tuple[Array, Array]:
+        key = z.tobytes()
+        if key not in memory:
+            memory.clear()
+            full[free] = z
+            memory[key] = composition.evaluate(full, x)
+        return memory[key]
+
+    def residual(z: Array) -> Array:
+        r = both(z)[0] - y
+        return r if np.isfinite(r).all() else np.full(len(y), REFUSED * max(spread, 1.0))
+
+    def slopes(z: Array) -> Array:
+        return np.nan_to_num(both(z)[1][:, free], posinf=0.0, neginf=0.0)
+
+    if free.any() and len(y) >= free.sum():
+        found = least_squares(residual, full[free].copy(), slopes, method="lm", x_scale=scale,
+                              ftol=1e-10, xtol=1e-10, gtol=1e-12, max_nfev=evaluations)
+        full[free] = found.x
+    value, J = composition.evaluate(full, x)
+    if not (np.isfinite(value).all() and np.isfinite(J).all()):
+        return None
+    return Refit(composition, full.copy(), fixed, float(np.sum((y - value) ** 2)),
+                 generic, len(y), (exact * spread) ** 2)
+
+
+def generic_jacobian(composition: Composition, x: Array, theta: Array | None = None,
+                     held: Array | None = None) -> Array:
+    """The Jacobian at a typical place, as a square matrix of the same dependencies.
+
+    Parameters `held` (count,) are at their θ.
+
+    At the solution its rank may be lower, where a form has degenerated to a simpler one: those
+    parameters were there to be fitted all the same, and BIC must count them.
+    """
+    generator = np.random.default_rng(0)
+    place = generator.uniform(0.5, 1.5, composition.count)
+    if theta is not None and held is not None:
+        place = np.where(held, theta, place)
+    fixed = np.zeros(composition.count, bool) if held is None else held
+    with np.errstate(all="ignore"):
+        for layer in range(len(composition.groups)):
+            u = composition.stages(place, x)[layer][0]
+            for (depth, i, _), form, at in composition.edges:
+                if depth != layer:
+                    continue
+                seen = u[np.isfinite(u[:, i]), i]
+                if len(seen) and np.ptp(seen) > 0.0:
+                    inside = slice(at.start + len(form.columns), at.stop)
+                    usual = form.typical(float(seen.min()), float(seen.max()))
+                    place[inside] = np.where(fixed[inside], place[inside], usual)
+    J = composition.evaluate(place, x)[1]
+    J = J[np.isfinite(J).all(axis=1)]
+    if len(J) <= composition.count:
+        return np.eye(composition.count)
+    size = np.linalg.norm(J, axis=0)
+    return np.asarray(np.linalg.qr(J / np.where(size > 0.0, size, 1.0), mode="r"))
+
+
+def _rank(J: Array) -> int:
+    size = np.linalg.norm(J, axis=0)
+    good = size > 0.0
+    if not good.any():
+        return 0
+    s = np.linalg.svd(J[:, good] / size[good], compute_uv=False)
+    return int(np.sum(s > RANK * s[0]))
+
+
+def covariance(fit: Refit, x: Array, y: Array) -> Array:
+    """Of all parameters (count, count) by Gauss-Newton; zero for those held."""
+    _, J = fit.composition.evaluate(fit.theta, x)
+    free = ~fit.held
+    size = np.linalg.norm(J[:, free], axis=0)
+    size[size == 0.0] = 1.0
+    scaled = J[:, free] / size
+    variance = fit.rss / max(fit.samples - fit.rank, 1)
+    inverse = np.linalg.pinv(scaled.T @ scaled, 1e-13, True) / np.outer(size, size)
+    full = np.zeros((len(free), len(free)))
+    full[np.ix_(free, free)] = variance * inverse
+    return full

@@ -1,0 +1,143 @@
+"""Which form on which edge: chosen for the whole network, by BIC on its data.
+
+Every edge brings its most probable forms.  Starting from the best of each, one edge at a time tries
+its others, all constants refitted, until nothing improves; several starts differ in the outer
+edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from pikanid.symbolic.composed import Composition, Groups, Place
+from pikanid.symbolic.fitting import FormFit
+from pikanid.symbolic.library import NOTHING, Form
+from pikanid.symbolic.named import NamedEdge
+from pikanid.symbolic.numeric import Array
+from pikanid.symbolic.refit import Refit, generic_jacobian, refit
+
+TRIED = 7  # forms an edge
+OUTER = 3  # starts
+SEARCHED = 400  # data that a first choice is made on
+POLISHED = 8  # compositions that all data then rank
+QUICK = 40  # evaluations of a first try
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """A refit and its score with the prior of its forms."""
+
+    fit: Refit
+    score: float
+
+
+def shortlist(edge: NamedEdge) -> list[FormFit]:
+    """The best form of each of the best families, whatever they leave behind.
+
+    A line and nothing at all are always among them, but never the first.
+    """
+    best: dict[str, FormFit] = {}
+    for c in sorted(edge.candidates, key=lambda c: c.score):
+        best.setdefault(c.form.family, c.fit)
+    plain = [best.pop(name) for name in (NOTHING.family, "linear") if name in best]
+    ranked = list(best.values())
+    straight = [f for f in plain if f.form is not NOTHING]
+    first = sorted([*ranked[:1], *straight], key=lambda f: f.rss)
+    return [*first, *ranked[1:TRIED], *(f for f in plain if f.form is NOTHING)]
+
+
+def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, NamedEdge],
+           offsets: Sequence[Array], x: Array, y: Array, priors: Mapping[str, float],
+           exact: float) -> list[Ranked]:
+    """Compositions that were tried to the end, best first.
+
+    Parameters
+    ----------
+    named : the edges that are there
+    offsets : constants of every layer's subnodes beside the edges' own
+    priors : prior probability of every form, by name
+    exact : share of the spread of y below which nothing is told apart
+    """
+    lists = {place: shortlist(edge) for place, edge in named.items()}
+    step = max(1, len(x) // SEARCHED)
+    few, target = x[::step], y[::step]
+    made: dict[tuple[str, ...], Ranked | None] = {}
+    generic: dict[tuple[str, ...], Array] = {}
+
+    def ranked(it: Composition, theta: Array, all_data: bool = False) -> Ranked | None:
+        if _key(it) not in generic:
+            generic[_key(it)] = generic_jacobian(it, few)
+        shape = generic[_key(it)]
+        fit = (refit(it, theta, x, y, shape, exact=exact) if all_data else
+               refit(it, theta, few, target, shape, exact=exact, evaluations=QUICK))
+        if fit is None or not np.isfinite(fit.score):
+            return None
+        prior = sum(np.log(priors[form.name]) for _, form, _ in it.edges)
+        return Ranked(fit, fit.score - 2.0 * float(prior))
+
+    def changed(best: Ranked | None, now: Composition, other: Composition, place: Place,
+                fit: FormFit) -> Ranked | None:
+        """Another form in one place: from the constants of the others as they are, or as named."""
+        fits = {p: _of(lists[p], other.forms[p]) for p in lists}
+        fresh = ranked(other, _start(other, fits, offsets))
+        if best is None or (place[0] < len(groups) - 1 and fresh and fresh.score < best.score):
+            return fresh
+        own = np.concatenate([fit.amplitudes, fit.inside])
+        return _best(fresh, ranked(other, now.carried(best.fit.theta, other, place, own)))
+
+    for first in _starts(lists, len(groups)):
+        now = Composition(groups, {p: f.form for p, f in first.items()}, inputs)
+        best = made[_key(now)] = made.get(_key(now)) or ranked(now, _start(now, first, offsets))
+        improved = True
+        while improved:
+            improved = False
+            for place in sorted(lists, reverse=True):
+                for fit in lists[place]:
+                    other = now.swapped(place, fit.form)
+                    if _key(other) not in made:
+                        made[_key(other)] = changed(best, now, other, place, fit)
+                    trial = made[_key(other)]
+                    if trial and (best is None or trial.score < best.score - 1e-6):
+                        best, now, improved = trial, trial.fit.composition, True
+    found = sorted((r for r in made.values() if r is not None), key=lambda r: r.score)
+    full = [ranked(r.fit.composition, r.fit.theta, True) for r in found[:POLISHED]]
+    return sorted((r for r in full if r is not None), key=lambda r: r.score)
+
+
+def _key(made: Composition) -> tuple[str, ...]:
+    return tuple(f"{place} {form.name}" for place, form, _ in made.edges)
+
+
+def _best(*tried: Ranked | None) -> Ranked | None:
+    return min((r for r in tried if r is not None), key=lambda r: r.score, default=None)
+
+
+def _of(fits: list[FormFit], form: Form) -> FormFit:
+    return next(f for f in fits if f.form is form)
+
+
+def _starts(lists: Mapping[Place, list[FormFit]], layers: int) -> list[dict[Place, FormFit]]:
+    """The best of every edge; where there are layers, with other forms in the last one too."""
+    first = {place: fits[0] for place, fits in lists.items()}
+    starts = [first]
+    if layers > 1:
+        for place in lists:
+            if place[0] == layers - 1:
+                starts += [{**first, place: f} for f in lists[place][1:OUTER]]
+    return starts
+
+
+def _start(made: Composition, fits: Mapping[Place, FormFit], offsets: Sequence[Array]) -> Array:
+    """Constants of every edge as named on its own."""
+    theta = np.zeros(made.count)
+    for layer, first in enumerate(made.offsets):
+        theta[first:first + made.subnodes(layer)] = offsets[layer]
+    for (layer, i, s), _, at in made.edges:
+        fit = fits[layer, i, s]
+        theta[at] = np.concatenate([fit.amplitudes, fit.inside])
+        theta[made.offsets[layer] + s] += fit.offset
+    return theta
