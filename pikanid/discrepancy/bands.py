@@ -3,8 +3,8 @@
 Bands are Bayesian: the posterior covariance (A + Λ)⁻¹ of coefficients and parameters together,
 whose pointwise intervals cover as often as they say when coverage is averaged along the curve
 (Wahba, J. R. Stat. Soc. B 45, 1983, p. 133; Nychka, J. Am. Stat. Assoc. 83, 1988, p. 1134).  The
-uncertainty of the smoothness ρ is passed on through ∂θ/∂ρ = -(A + Λ)⁻¹ (∂Λ/∂ρ) θ (Wood, Pya &
-Säfken, J. Am. Stat. Assoc. 111, 2016, p. 1548).
+smoothness ρ is uncertain itself, most of all where an edge is faint: mean and covariance are taken
+over all plausible ρ, weighed by their evidence.
 """
 
 from __future__ import annotations
@@ -26,31 +26,31 @@ DRAWS = 2000
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Covariance V (n, n) of θ and effective degrees of freedom of every entry (n,)."""
+    """Mean (n,) and covariance (n, n) of θ; effective degrees of freedom of its entries (n,)."""
 
+    mean: np.ndarray
     covariance: np.ndarray
     freedom: np.ndarray
 
 
 def posterior(fit: PenalisedFit) -> Posterior:
-    """The posterior at the fit; NaN for parameters at a bound."""
-    A, inside = fit.information, fit.inside
+    """The posterior of the linear problem at the fit; NaN variance for parameters at a bound."""
+    A, inside, smooth = fit.information, fit.inside, fit.smoothness
     keep = np.ix_(inside, inside)
-    factor = cho_factor((A + fit.smoothness.precision(fit.rho))[keep])
-    V = cho_solve(factor, np.eye(int(inside.sum())))
-    slopes = []
-    for prior, own in zip(fit.smoothness.priors, fit.smoothness.split(fit.rho), strict=True):
-        for change in prior.slopes(own):
-            push = np.zeros(len(A))
-            push[prior.at] = change @ fit.theta[prior.at]
-            slopes.append(-V @ push[inside])
-    moved = np.column_stack(slopes)
-    spread = fit.smoothness.spread(A, fit.gain, fit.rho)
-    full = np.full(A.shape, np.nan)
-    full[keep] = V + moved @ spread @ moved.T
-    freedom = np.zeros(len(A))
-    freedom[inside] = np.diag(V @ A[keep])
-    return Posterior(full, freedom)
+    gain = (fit.gain - A @ np.where(inside, 0.0, fit.theta))[inside]
+    mean, second, freedom = np.zeros(len(gain)), np.zeros((len(gain),) * 2), np.zeros(len(A))
+    for rho, weight in smooth.plausible(A, fit.gain, fit.rho):
+        V = cho_solve(cho_factor((A + smooth.precision(rho))[keep]), np.eye(len(gain)))
+        theta = V @ gain
+        # around the fit itself, so that squares of large numbers do not cancel
+        off = theta - fit.theta[inside]
+        mean += weight * off
+        second += weight * (V + np.outer(off, off))
+        freedom[inside] += weight * np.diag(V @ A[keep])
+    whole, full = np.array(fit.theta), np.full(A.shape, np.nan)
+    whole[inside] += mean
+    full[keep] = second - np.outer(mean, mean)
+    return Posterior(whole, full, freedom)
 
 
 def wald(fit: PenalisedFit, edges: Sequence[int], gauges: Sequence[Gauge],

@@ -33,7 +33,7 @@ class View:
     def edge(self, k: int, step: bool) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients (K,) of edge k, covariance (K, K); with `step` a missing step is a zero."""
         at = self.fit.smoothness.priors[k].at
-        c, V = self.fit.theta[at], self.known.covariance[np.ix_(at, at)]
+        c, V = self.known.mean[at], self.known.covariance[np.ix_(at, at)]
         more = int(step and not self.plans[k].step)
         return np.pad(c, (0, more)), np.pad(V, ((0, more), (0, more)))
 

@@ -14,7 +14,7 @@ rough in one place and smooth elsewhere.  A step at zero has a ρ of its own, an
 
     log p(y|ρ) = ½ bᵀ(A + Λ)⁻¹b - ½ log|A + Λ| + ½ log|Λ| + const,   A = JᵀJ, b = Jᵀ(Jθ - r),
 
-(MacKay, Neural Computation 4, 1992, p. 415), whose gradient is exact.
+(MacKay, Neural Computation 4, 1992, p. 415), whose gradient is exact, times a weak prior of ρ.
 """
 
 from __future__ import annotations
@@ -29,6 +29,11 @@ from pikanid.discrepancy.edges import EdgePlan
 STIFF = 8.0  # log λ of an edge that is nearly straight
 SMOOTHEST, ROUGHEST = 18.0, -12.0  # limits of log λ: beyond them nothing changes any more
 LARGEST = 0.1  # prior size of a discrepancy, in units of the equation's size
+DRAWS = 32  # of ρ, a power of two
+WIDER = 1.3  # how much wider than the evidence they are drawn
+FLAT = 0.1  # curvature of the evidence where it says nothing: ρ is known to a few units, its limits
+# Weak prior of every ρ: where an edge is nearly straight the evidence alone says nothing.
+USUAL, SPREAD = 5.0, 5.0
 # Prior of the steps between neighbouring pieces of log λ: e^±3 from one to the next is usual.
 STEP = 3.0
 
@@ -123,7 +128,7 @@ class Smoothness:
         return full
 
     def choose(self, A: np.ndarray, b: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, float]:
-        """The ρ of largest evidence (times the prior of its steps), and -log evidence there.
+        """The ρ of largest evidence (times its prior), and -log evidence there.
 
         The evidence has several maxima: it is climbed from `start` and from stiff edges.
 
@@ -144,7 +149,7 @@ class Smoothness:
         return np.asarray(best.x), float(best.fun)
 
     def cost(self, A: np.ndarray, b: np.ndarray, rho: np.ndarray) -> tuple[float, np.ndarray]:
-        """-log evidence and its gradient in ρ."""
+        """-log evidence, with the prior of ρ, and its gradient in ρ."""
         from scipy.linalg import cho_factor, cho_solve
 
         factor = cho_factor(A + self.precision(rho))
@@ -160,7 +165,9 @@ class Smoothness:
             gradient += [0.5 * float(np.sum(spread * slope) + c @ slope @ c)
                          for slope in prior.slopes(own)]
         steps, back = self._steps(rho)
-        return cost + 0.5 * float(steps @ steps), np.array(gradient) + back
+        off = (rho - USUAL) / SPREAD
+        cost += 0.5 * float(steps @ steps) + 0.5 * float(off @ off)
+        return cost, np.array(gradient) + back + off / SPREAD
 
     def _steps(self, rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Differences of neighbouring pieces over STEP, and the gradient of half their square."""
@@ -174,15 +181,31 @@ class Smoothness:
             back.append(edge)
         return np.concatenate(steps), np.concatenate(back)
 
-    def spread(self, A: np.ndarray, b: np.ndarray, rho: np.ndarray) -> np.ndarray:
-        """Covariance of ρ (k, k): inverse curvature of the cost, by differences of its gradient."""
+    def plausible(self, A: np.ndarray, b: np.ndarray, rho: np.ndarray
+                  ) -> list[tuple[np.ndarray, float]]:
+        """Smoothnesses around the best ρ and their weights: importance sampling of the evidence.
+
+        Drawn are quasi-random points of a normal distribution that is wider than the evidence.
+        """
+        from scipy.stats import norm, qmc
+
+        values, vectors = np.linalg.eigh(np.linalg.inv(self.curvature(A, b, rho)))
+        unit = norm.ppf(qmc.Sobol(len(rho), seed=0).random(DRAWS))
+        drawn = rho + WIDER * unit @ (vectors * np.sqrt(values)).T
+        drawn = np.clip(drawn, ROUGHEST, SMOOTHEST)
+        log = np.array([-self.cost(A, b, r)[0] for r in drawn]) + 0.5 * np.sum(unit**2, axis=1)
+        weight = np.exp(log - log.max())
+        weight /= weight.sum()
+        return [(r, float(w)) for r, w in zip(drawn, weight, strict=True) if w > 1e-4]
+
+    def curvature(self, A: np.ndarray, b: np.ndarray, rho: np.ndarray) -> np.ndarray:
+        """Curvature (k, k) of the cost in ρ by differences of its gradient, at least FLAT."""
         k = len(rho)
-        curvature = np.zeros((k, k))
+        found = np.zeros((k, k))
         for i in range(k):
             move = np.zeros(k)
             move[i] = 0.1
             ahead, behind = (self.cost(A, b, rho + s * move)[1] for s in (1.0, -1.0))
-            curvature[i] = (ahead - behind) / 0.2
-        values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
-        # where the evidence is flat ρ is still known to a few units: its limits
-        return (vectors / np.maximum(values, 0.1)) @ vectors.T
+            found[i] = (ahead - behind) / 0.2
+        values, vectors = np.linalg.eigh(0.5 * (found + found.T))
+        return np.asarray((vectors * np.maximum(values, FLAT)) @ vectors.T)
