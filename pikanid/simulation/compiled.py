@@ -74,7 +74,21 @@ def _source(model: Model, method: Method) -> str:
     kind = "hybrid" if lowered.n_dynamic else "smooth"
     step = "rk4" if method == "explicit" else "sdirk"
     pieces = [f"field_{kind}", step, f"drive_{kind}", "integrate"]
-    return source + "\n\n".join((_HERE / "kernels" / f"{p}.py").read_text() for p in pieces)
+    return source + "\n\n".join(kernel_text(p) for p in pieces)
+
+
+def kernel_text(name: str) -> str:
+    """The source of a kernel, to be pasted behind the functions that it calls."""
+    return (_HERE / "kernels" / f"{name}.py").read_text()
+
+
+def written(title: str, source: str) -> Path:
+    """The file in the cache folder that holds `source`, under a name made from its content."""
+    digest = hashlib.sha256((source + _generator_version()).encode()).hexdigest()[:24]
+    path = cache_folder() / f"{title}_{digest}.py"
+    if not path.exists():
+        _write(path, source)
+    return path
 
 
 def _key(model: Model, method: Method) -> str:
@@ -89,7 +103,9 @@ def _key(model: Model, method: Method) -> str:
 def _generator_version() -> str:
     import numba
 
-    files = [*sorted((_HERE / "kernels").glob("*.py")),
+    kernels = sorted(k for k in (_HERE / "kernels").glob("*.py")
+                     if not k.name.startswith("interpreter"))
+    files = [*kernels,
              *(_HERE / f"{n}.py" for n in ("codegen", "printing", "lowering", "support", "layout"))]
     digest = hashlib.sha256("".join(f.read_text() for f in files).encode()).hexdigest()
     return f"{digest} {numba.__version__} {platform.python_version()} {platform.machine()}"

@@ -1,0 +1,230 @@
+"""`diagnose`: detect, locate, name, model and prove what a model leaves out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.estimate import Estimate
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.catalogue import candidates as catalogue_of
+from pikanid.mismatch.detect import Detection
+from pikanid.mismatch.estimating import as_estimate
+from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
+from pikanid.mismatch.locate import locate
+from pikanid.mismatch.preparation import prepared, with_refined_noise
+from pikanid.mismatch.result import Diagnosis, Proof
+from pikanid.mismatch.search import Search
+from pikanid.mismatch.site import Site, sites
+from pikanid.mismatch.verdict import Answer, explanations, settle
+from pikanid.mismatch.whitened import Records
+from pikanid.model import Model
+from pikanid.recording import Recording
+from pikanid.strategies.nls import NLS
+
+SET_ASIDE = 0.3  # share of a lone recording's end that is kept for confirmation
+Recordings = Recording | Sequence[Recording]
+
+
+def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
+             alpha: float = 0.01, quiet: tuple[float, float] | None = None,
+             tell: Callable[[str], None] = lambda text: None) -> Diagnosis:
+    """What is missing in a model, according to recordings?
+
+    The model is refitted, its residual whitened by the noise and tested against all that the
+    catalogue could have left there; entries, and pairs of them, are added inside the equations and
+    refitted; what explains the recording must then predict `held_out`.
+
+    Args:
+        model: Nominal model with a second-order coordinate (a state that is the rate of another).
+        train: Recording, or several, to explain.
+        held_out: Recording, or several, with another excitation, to prove it on.  Without one the
+            end of the recording is set aside, and the verdict is at most "unconfirmed".
+        alpha: Rate of false alarms.
+        quiet: Start and stop [s] of a stretch known to show noise only.
+        tell: Called with what is being done.
+
+    Returns:
+        The diagnosis; `model` is the extended model, `to_dict()` the content of diagnosis.json.
+
+    Raises:
+        BadModel: No coordinate is found, or nothing is free.
+        BadRecording: A channel is missing or unusable; train and held-out are the same.
+        BadSetting: alpha is no probability.
+        SimulationFailed: The model cannot be simulated.
+
+    >>> import pikanid as pk
+    >>> truth = pk.systems.sloshing().with_term(
+    ...     "theta_dot", "-k3*theta**3", [pk.Parameter("k3", 200.0)])
+    >>> noisy = lambda seed: pk.simulate(truth, pk.excitation.planar_moves(6, 10.0, seed=seed),
+    ...                                  sigma=0.002, seed=seed)
+    >>> dx = diagnose(pk.systems.sloshing(), noisy(1), held_out=noisy(2))
+    >>> dx.verdict, dx.hypotheses[0].effects[0].ids
+    ('named', ('cubic_stiffness',))
+    """
+    begun = time.perf_counter()
+    if not 0 < alpha < 1:
+        raise errors.BadSetting(errors.bad_value("alpha", alpha, "between 0 and 1"))
+    if not model.free_names:
+        raise errors.BadModel(errors.nothing_free(model.name))
+    case = _opened(model, _several(train), None if held_out is None else _several(held_out),
+                   quiet, tell)
+    tell("noise and detection")
+    detection = case.test(case.base)
+    search = case.search
+    if detection.p_value >= alpha:
+        answer = Answer("none", (), ())
+    else:
+        ranked = search.run(lambda h: case.test(h).p_value > 0.05)
+        if case.relevelled(ranked[0], quiet):
+            # the first level was read through the mismatch itself: now it is out of the way
+            tell("noise again")
+            search = case.search
+            ranked = search.run(lambda h: case.test(h).p_value > 0.05)
+        tell("confirmation")
+        answer = settle(ranked, search.scale(), case.test, case.predicted, case.proves)
+    return _diagnosis(case, detection, answer, alpha, begun)
+
+
+@dataclass
+class Case:
+    """A model with the recordings to explain and those to prove it on, ready for tests."""
+
+    model: Model
+    records: Records
+    later: Records | None
+    proves: bool
+    sites: tuple[Site, ...]
+    candidates: tuple[Candidate, ...]
+    search: Search
+    base: Hypothesis
+    before: Estimate
+    notes: list[str]
+    tests: dict[frozenset[str], Detection]
+    predictions: dict[frozenset[str], HeldOut | None]
+
+    @property
+    def rate(self) -> float:
+        """Natural frequency of the first coordinate [rad/s]."""
+        return self.sites[0].rate
+
+    def relevelled(self, best: Hypothesis, quiet: tuple[float, float] | None) -> bool:
+        """Read the noise from what the best explanation leaves; whether that made a difference."""
+        fit = as_estimate(best, self.before)
+        new = with_refined_noise(self.records, fit, self.rate, quiet)
+        if all(abs(np.log(a[o].sigma / b[o].sigma)) < 0.05 and abs(a[o].rho - b[o].rho) < 0.06
+               for a, b in zip(self.records.levels, new.levels, strict=True) for o in a):
+            return False
+        self.records = new
+        self.search = replace(self.search, records=new, fits={})
+        self.base = self.search.base()
+        if self.later is not None:
+            self.later = Records(self.later.recordings,
+                                 tuple(new.levels[0] for _ in self.later.recordings))
+        self.tests.clear()
+        self.predictions.clear()
+        return True
+
+    def test(self, h: Hypothesis) -> Detection:
+        """What is left in the train recordings."""
+        if h.key not in self.tests:
+            self.tests[h.key] = residual_tests(
+                h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, self.candidates, self.rate)
+        return self.tests[h.key]
+
+    def predicted(self, h: Hypothesis) -> HeldOut | None:
+        """What is left in the held-out recordings."""
+        if self.later is None:
+            return None
+        if h.key not in self.predictions:
+            self.predictions[h.key] = held_out(h, self.model, self.later, self.candidates,
+                                               self.rate)
+        return self.predictions[h.key]
+
+
+def _several(recordings: Recordings) -> tuple[Recording, ...]:
+    return (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+
+
+def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
+            quiet: tuple[float, float] | None, tell: Callable[[str], None]) -> Case:
+    notes: list[str] = []
+    proves = later is not None
+    if later is not None:
+        _check_pair(train, later)
+    elif len(train) == 1:
+        cut = train[0].start + (1 - SET_ASIDE) * (train[0].stop - train[0].start)
+        notes.append(f"No held-out recording: what was recorded after {cut:.3g} s is set aside.")
+    model = _held_as_recorded(model, train)
+    tell("nominal fit")
+    records = prepared(model, train, quiet, notes)
+    before = NLS().fit(model, _with_sigma(records, model))
+    nominal = before.fitted_model
+    rate = sites(nominal, records.recordings)[0].rate
+    records = with_refined_noise(records, before, rate, quiet)
+    held = None
+    if later is not None:
+        held = prepared(model, later, None, notes)
+        held = Records(held.recordings, tuple(records.levels[0] for _ in held.recordings))
+    found = sites(nominal, records.recordings)
+    listed = catalogue_of(found)
+    search = Search(nominal, records, listed, tell)
+    base = search.base()
+    return Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
+
+
+def _check_pair(train: tuple[Recording, ...], later: tuple[Recording, ...]) -> None:
+    for a in train:
+        for b in later:
+            missing = [n for n in a.names if n not in b]
+            if missing:
+                raise errors.BadRecording(errors.held_out_channels(b.name, missing))
+            if all(np.array_equal(a[n].values, b[n].values, equal_nan=True) for n in a.names):
+                raise errors.BadRecording(errors.held_out_same(a.name, b.name))
+
+
+def _held_as_recorded(model: Model, train: tuple[Recording, ...]) -> Model:
+    """A recording that declares how an input is held overrides the model."""
+    return model.replace(inputs=tuple(
+        replace(i, hold=train[0][i.name].hold or i.hold) if i.name in train[0] else i
+        for i in model.inputs))
+
+
+def _with_sigma(records: Records, model: Model) -> list[Recording]:
+    return [r.with_sigma({o: levels[o].sigma for o in model.output_names})
+            for r, levels in zip(records.recordings, records.levels, strict=True)]
+
+
+def _diagnosis(case: Case, detection: Detection, answer: Answer, alpha: float, begun: float
+               ) -> Diagnosis:
+    best = answer.given[0] if answer.given else case.base
+    after = case.before
+    if answer.given:
+        after = as_estimate(best, case.before)
+    proof = _proof(case, best)
+    given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
+    levels = [f"Noise of '{o}': sigma = {level.sigma:.3g}"
+              + (f", correlation {level.rho:.2f} between neighbours" if level.rho else ", white")
+              + f", from {level.source}."
+              for levels in case.records.levels[:1] for o, level in levels.items()]
+    return Diagnosis(
+        answer.verdict, detection.p_value, alpha, locate(case.base, best, answer, case.sites),
+        given, rejected, case.before, after, proof, tuple(levels), tuple(case.notes),
+        seconds=time.perf_counter() - begun)
+
+
+def _proof(case: Case, best: Hypothesis) -> Proof | None:
+    if case.later is None:
+        return None
+    before, after = case.predicted(case.base), case.predicted(best)
+    if before is None or after is None:
+        return None
+    output = case.model.outputs[0]
+    sigma = next(iter(case.later.levels[0].values())).sigma
+    return Proof(before.rmse, after.rmse, sigma, output.unit, after.detection.p_value, after.t,
+                 after.measured, before.predicted, after.predicted)

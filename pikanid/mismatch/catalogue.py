@@ -1,0 +1,41 @@
+"""The catalogue as data: which physics can be missing, and what must not be mistaken for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from pikanid.mismatch import channels, forces, guards
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.site import Site
+
+ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
+    forces.coulomb_friction, forces.quadratic_drag, forces.power_drag, forces.amplitude_damping,
+    forces.cubic_stiffness, forces.static_bias, forces.parameter_drift, channels.second_mode,
+    forces.wall_impact, channels.cross_axis, forces.disturbance, forces.boundary_layer,
+    forces.hysteresis, channels.delay, channels.lags, channels.input_gain, channels.sensor_gain,
+    channels.input_limits, channels.sensor_offset, channels.sensor_drift,
+    channels.sensor_saturation, channels.sensor_nonlinearity, forces.initial_state,
+    channels.input_hold)
+GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
+    guards.even_stiffness, guards.quintic_stiffness, guards.one_way_friction,
+    guards.stribeck_friction, guards.velocity_coupled_drive, guards.soft_saturation,
+    guards.clock_error, guards.wobble, guards.rate_limit)
+
+
+def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
+    """Everything that can be missing in a model, entries first; equal keys once.
+
+    >>> from pikanid import excitation, systems
+    >>> from pikanid.mismatch.site import sites
+    >>> model, rec = systems.sloshing(), excitation.two_pulse()
+    >>> found = candidates(sites(model, (rec,)))
+    >>> sum(c.known for c in found), found[0].key
+    (28, 'coulomb_friction')
+    """
+    made: dict[str, Candidate] = {}
+    for table in (ENTRIES, GUARDS):
+        for site in sites:
+            for entry in table:
+                for candidate in entry(site):
+                    made.setdefault(candidate.key, candidate)
+    return tuple(made.values())

@@ -1,0 +1,57 @@
+"""Figures of a diagnosis: where in time, and the proof on the held-out recording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+    from pikanid.mismatch.result import Diagnosis
+
+BEFORE, AFTER, DATA, LOUD = "#c2410c", "#1d4ed8", "#9ca3af", "#fde68a"
+
+
+def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
+    """Residual of the nominal and of the extended model over time, loud stretches shaded; below,
+    with a held-out recording, its prediction before and after and what each leaves.
+    """
+    from matplotlib.figure import Figure
+
+    rows = 1 if dx.held_out is None else 3
+    figure = Figure(figsize=(9.0, 2.6 * rows), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(rows, 1))
+    _train(axes[0], dx)
+    if dx.held_out is not None:
+        proof = dx.held_out
+        axes[1].plot(proof.t, proof.measured, ".", color=DATA, ms=2, label="measured")
+        axes[1].plot(proof.t, proof.before, color=BEFORE, lw=1, label="nominal model")
+        axes[1].set(ylabel=proof.unit or "output", title="Held-out recording: prediction")
+        axes[2].plot(proof.t, proof.measured - proof.before, color=BEFORE, lw=0.8,
+                     label=f"nominal, RMSE {proof.rmse_before:.3g}")
+        if dx.hypotheses:
+            axes[1].plot(proof.t, proof.after, color=AFTER, lw=1, label="extended model")
+            axes[2].plot(proof.t, proof.measured - proof.after, color=AFTER, lw=0.8,
+                         label=f"extended, RMSE {proof.rmse_after:.3g}")
+        axes[2].axhspan(-2 * proof.noise, 2 * proof.noise, color=DATA, alpha=0.3, lw=0,
+                        label="±2σ of the noise")
+        axes[2].set(ylabel=proof.unit or "residual", title="Held-out recording: what is left")
+    for axis in axes:
+        axis.legend(loc="upper right", fontsize=8, ncols=3)
+        axis.grid(alpha=0.2)
+    axes[-1].set_xlabel("t [s]")
+    return figure
+
+
+def _train(axis: matplotlib.axes.Axes, dx: Diagnosis) -> None:
+    fit = dx.before.fits[0]
+    axis.plot(fit.t, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
+    if dx.hypotheses:
+        after = dx.after.fits[0]
+        axis.plot(after.t, after.residual, color=AFTER, lw=0.8, label="extended model")
+    for k, (start, stop) in enumerate(dx.where.time):
+        axis.axvspan(start, stop, color=LOUD, alpha=0.6, lw=0,
+                     label="louder than noise" if k == 0 else None)
+    axis.set(ylabel=fit.unit or "residual", title="What the model leaves of the recording")

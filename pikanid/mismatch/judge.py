@@ -1,0 +1,140 @@
+"""Is a hypothesis adequate: on what it was fitted to, and on a recording that it never saw?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.detect import Detection, detect, frequency_bands, past_inputs, unit_columns
+from pikanid.mismatch.hypothesis import Hypothesis, extended
+from pikanid.mismatch.least_squares import minimise
+from pikanid.mismatch.tangent import directions
+from pikanid.mismatch.whitened import Records, Whitened
+from pikanid.model import Model
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What a hypothesis makes of a recording that it was not fitted to.
+
+    Attributes:
+        rmse: Of the residual, in the output's unit.
+        detection: Tests of what is left, with the parameters' uncertainty forgiven.
+        chi2: Of the residual with that forgiveness.
+        evidence: -2 ln of the probability density of the recording, given the fit (up to a
+            constant that all hypotheses share).
+        predicted, measured, t: First output.
+    """
+
+    rmse: float
+    detection: Detection
+    chi2: float
+    evidence: float
+    t: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+
+
+def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
+                   candidates: tuple[Candidate, ...], rate: float, seed: int = 0) -> Detection:
+    """Test the residual of a fit against everything that the catalogue and its guards would show.
+
+    r and J may have more rows than there are samples: those of a prior.
+    """
+    found = directions(whitened, theta, candidates)
+    more = len(r) - whitened.rows
+    D = np.vstack([found.D, np.zeros((more, found.D.shape[1]))])
+    units, _ = unit_columns(D, J)
+    bands, inputs = lines(whitened, rate, more)
+    spread = max(level.spread for levels in whitened.records.levels for level in levels.values())
+    return detect(-r, J, units, found.one_sided, bands, inputs, spread, seed)
+
+
+def lines(whitened: Whitened, rate: float, more: int) -> tuple[list[np.ndarray], np.ndarray]:
+    """Bands of frequency and the inputs' past, for all rows (and `more` rows of zeros)."""
+    blocks: list[list[np.ndarray]] = []
+    pasts: list[np.ndarray] = []
+    for experiment in whitened.problem.experiments:
+        held = [(h.time, h.values) for h in experiment.held if len(h.time) > 1]
+        for s in experiment.samples:
+            blocks.append(frequency_bands(s.t, rate))
+            pasts.append(past_inputs(s.t, held, rate))
+    count = min(len(b) for b in blocks)
+    bands = [_stacked([b[k] for b in blocks], more) for k in range(count)]
+    return bands, _stacked(pasts, more)
+
+
+def _stacked(blocks: list[np.ndarray], more: int) -> np.ndarray:
+    from scipy.linalg import block_diag
+
+    whole = block_diag(*blocks)
+    return np.vstack([whole, np.zeros((more, whole.shape[1]))])
+
+
+def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
+             candidates: tuple[Candidate, ...], rate: float) -> HeldOut | None:
+    """Predict records that the hypothesis was not fitted to, and test what is left.
+
+    Shared parameters keep their estimates, with the fit's uncertainty as prior: the residual is
+    whitened by I + J_h (JᵀJ)⁻¹ J_hᵀ.  What each recording has for itself is estimated anew; what
+    happens once (a disturbance) is left out.
+    """
+    effects = [e for e in hypothesis.effects if not e.absent]
+    model = extended(nominal, effects).with_values(
+        {n: v for n, v in hypothesis.values.items()
+         if n in extended(nominal, effects).parameter_names})
+    whitened = Whitened(model, records)
+    free = whitened.problem.free
+    guess = whitened.problem.guess.copy()
+    names = [f.name for f in hypothesis.whitened.problem.free]
+    shared = [k for k, f in enumerate(free) if f.recording is None and f.name in names]
+    theta_hat = np.array([hypothesis.values[free[k].name] for k in shared])
+    guess[shared] = theta_hat
+    root = _information_root(hypothesis, [free[k].name for k in shared])
+    if not whitened.choose_steps(guess):
+        return None
+
+    def evaluate(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        at = whitened.residual(theta)
+        if at is None:
+            return None
+        prior = np.zeros((len(root), len(theta)))
+        prior[:, shared] = root
+        return (np.concatenate([at[0], root @ (theta[shared] - theta_hat)]),
+                np.vstack([at[1], prior]))
+
+    own = [k for k in range(len(free)) if k not in shared]
+    if own:
+        fixed = np.array([k in own for k in range(len(free))])
+        first = minimise(whitened.residual, guess, np.where(fixed, whitened.problem.lower, guess),
+                         np.where(fixed, whitened.problem.upper, guess), 40)
+        if first is not None:
+            guess = first.theta
+    found = minimise(evaluate, guess, whitened.problem.lower, whitened.problem.upper, 25)
+    if found is None:
+        return None
+    tests = residual_tests(whitened, found.theta, found.r, found.J, candidates, rate)
+    plain = guess
+    responses = whitened.responses(plain)
+    gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
+    rmse = float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
+    _, big = np.linalg.slogdet(found.J.T @ found.J)
+    _, small = np.linalg.slogdet(root.T @ root) if len(shared) else (1.0, 0.0)
+    samples = whitened.problem.experiments[0].samples[0]
+    return HeldOut(rmse, tests, found.chi2, found.chi2 + float(big - small), samples.t, samples.y,
+                   responses[0].y[: len(samples.t)])
+
+
+def _information_root(hypothesis: Hypothesis, names: list[str]) -> np.ndarray:
+    """R (n, n) with RᵀR the information on the named parameters, all others estimated too."""
+    free = [f.name for f in hypothesis.whitened.problem.free]
+    inside = [free.index(n) for n in names]
+    others = [k for k in range(len(free)) if k not in inside]
+    J = hypothesis.minimum.J
+    rest = J[:, inside]
+    if others:
+        q, _ = np.linalg.qr(J[:, others])
+        rest = rest - q @ (q.T @ rest)
+    return np.asarray(np.linalg.qr(rest, mode="r")) if inside else np.empty((0, 0))

@@ -1,0 +1,73 @@
+"""Levenberg-Marquardt within bounds, that stops where statistics do: at a hundredth of χ²."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray] | None]
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """θ (n,), residual r (rows,) and Jacobian (rows, n) there; |r|² is χ²."""
+
+    theta: np.ndarray
+    r: np.ndarray
+    J: np.ndarray
+    converged: bool
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares."""
+        return float(self.r @ self.r)
+
+
+def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np.ndarray,
+             limit: int = 30, tolerance: float = 0.02) -> Minimum | None:
+    """Minimise |r(θ)|² within bounds; None where the start cannot be evaluated.
+
+    A parameter at a bound that the gradient pushes outwards stays there for the step.
+
+    >>> line = lambda q: (np.array([q[0] - 3.0]), np.ones((1, 1)))
+    >>> found = minimise(line, np.array([1.0]), np.array([0.0]), np.array([2.0]))
+    >>> float(found.theta[0])
+    2.0
+    """
+    theta = np.clip(start, lower, upper)
+    at = evaluate(theta)
+    if at is None:
+        return None
+    r, J = at
+    best, damping = float(r @ r), 1e-3
+    for _ in range(limit):
+        if len(theta) == 0:
+            break
+        g = J.T @ r
+        moving = ~(((theta <= lower) & (g > 0)) | ((theta >= upper) & (g < 0)))
+        A = J[:, moving]
+        norms = np.sqrt(np.maximum(np.einsum("ij,ij->j", A, A), 1e-300))
+        B, b = (A / norms).T @ (A / norms), -g[moving] / norms
+        accepted = False
+        for _ in range(8):
+            step = np.zeros(len(theta))
+            try:
+                step[moving] = np.linalg.solve(B + damping * np.eye(len(b)), b) / norms
+            except np.linalg.LinAlgError:
+                break
+            new = np.clip(theta + step, lower, upper)
+            expected = float(best - np.sum((r + J @ (new - theta)) ** 2))
+            if expected < tolerance:
+                return Minimum(theta, r, J, True)
+            at = evaluate(new)
+            if at is not None and float(at[0] @ at[0]) < best:
+                gain = best - float(at[0] @ at[0])
+                theta, (r, J), best, accepted = new, at, best - gain, True
+                damping = max(damping * (0.1 if gain > 0.5 * expected else 1.0), 1e-9)
+                break
+            damping = max(damping * 8, 1e-4)
+        if not accepted:
+            return Minimum(theta, r, J, False)
+    return Minimum(theta, r, J, len(theta) == 0)

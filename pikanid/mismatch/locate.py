@@ -1,0 +1,59 @@
+"""Where a mismatch is: channel, equation, states, seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from pikanid.mismatch.candidate import Channel
+from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.result import Where
+from pikanid.mismatch.site import Site
+from pikanid.mismatch.verdict import Answer
+
+WINDOWS = 40
+
+
+def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[Site]) -> Where:
+    """The place of a mismatch, as far as the answer and the nominal residual tell."""
+    site = sites[0]
+    channels: set[Channel] = {e.channel for h in answer.given for e in h.effects}
+    ambiguous = any(len(ids) > 1 for table in answer.twins.values() for ids in table.values())
+    channel: Channel | Literal["undecided"] = "undecided"
+    if len(channels) == 1 and not ambiguous:
+        channel = next(iter(channels))
+    # what the new terms are made of
+    states = tuple(n for n in site.model.state_names
+                   if any(n in e.expression for e in best.effects)) if answer.given else ()
+    static = None
+    if answer.given:
+        static = all(e.channel == "dynamics" and e.ids[0] in STATIC for e in best.effects)
+    spans = () if answer.verdict == "none" else loud_windows(base)
+    return Where(channel, site.v, states, spans, static)
+
+
+STATIC = frozenset({"coulomb_friction", "quadratic_drag", "power_drag", "amplitude_damping",
+                    "cubic_stiffness", "static_bias", "wall_impact"})
+
+
+def loud_windows(base: Hypothesis) -> tuple[tuple[float, float], ...]:
+    """Seconds in which the whitened nominal residual is louder than noise can be."""
+    samples = base.whitened.problem.experiments[0].samples[0]
+    r = base.minimum.r[: len(samples.t)]
+    edges = np.linspace(samples.t[0], samples.t[-1], WINDOWS + 1)
+    loud = []
+    for a, b in pairwise(edges):
+        inside = (samples.t >= a) & (samples.t < b)
+        n = int(inside.sum())
+        if n > 3 and np.sum(r[inside] ** 2) > n + 4 * np.sqrt(2 * n):
+            loud.append((float(a), float(b)))
+    joined: list[tuple[float, float]] = []
+    for a, b in loud:
+        if joined and abs(joined[-1][1] - a) < 1e-9:
+            joined[-1] = (joined[-1][0], b)
+        else:
+            joined.append((a, b))
+    return tuple((round(a, 3), round(b, 3)) for a, b in joined)

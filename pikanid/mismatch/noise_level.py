@@ -1,0 +1,172 @@
+"""The noise that a diagnosis is judged against, and how well it is known.
+
+Noise is seen where nothing else is: in a quiet stretch at all frequencies, and in the residual of a
+fit far above the natural frequency, where missing physics hardly reaches.  Both together give an
+AR(1) model by Whittle's likelihood (P. Whittle, Ark. Mat. 2, 1953).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pikanid import errors, noise
+from pikanid.channel import Channel
+from pikanid.recording import Recording
+
+SPIKE = 5.0  # σ by which a sample must leave its neighbours to count as an outlier
+QUIET = 100  # samples of a quiet stretch that say something about low frequencies
+
+
+@dataclass(frozen=True)
+class Level:
+    """Noise of one output: ε_t = ρ ε_{t-1} + e_t.
+
+    Attributes:
+        sigma: Standard deviation of ε.
+        rho: Correlation of neighbours.
+        spread: Relative standard error of its power at low frequencies.
+        interval: Between samples [s].
+        source: In words.
+    """
+
+    sigma: float
+    rho: float
+    spread: float
+    interval: float
+    source: str
+
+    def whiten(self, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Rows (N,) or (N, k) at times t as white noise of unit variance.
+
+        Exact over gaps: the correlation over m intervals is ρ^m.
+        """
+        if self.rho == 0:
+            return rows / self.sigma
+        steps = np.maximum(np.rint(np.diff(t) / self.interval), 1.0)
+        keep = self.rho ** steps
+        left = np.sqrt(1 - keep**2)
+        if rows.ndim == 2:
+            keep, left = keep[:, None], left[:, None]
+        rest = (rows[1:] - keep * rows[:-1]) / left
+        return np.concatenate([rows[:1], rest]) / self.sigma
+
+
+def without_outliers(recording: Recording, output: str) -> tuple[Recording, int]:
+    """The recording without samples that leave both neighbours far behind, and their number."""
+    from scipy.ndimage import median_filter
+
+    channel = recording[output]
+    seen = np.flatnonzero(np.isfinite(channel.values))
+    y = channel.values[seen]
+    if len(y) < 20:
+        return recording, 0
+    try:
+        sigma, _ = noise.high_band_sigma(channel)
+    except errors.BadRecording:
+        return recording, 0
+    gap = np.abs(y - median_filter(y, 5, mode="nearest"))
+    # where the signal itself is fast its neighbours differ, and nothing is an outlier
+    usual = median_filter(gap, 41, mode="nearest")
+    bad = gap > SPIKE * np.maximum(sigma, 3.0 * usual)
+    if not bad.any() or bad.mean() > 0.1:
+        return recording, 0
+    values = channel.values.copy()
+    values[seen[bad]] = np.nan
+    return recording.with_channels(replace(channel, values=values)), int(bad.sum())
+
+
+def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None) -> Level:
+    """What the recording alone says, before any fit.
+
+    Raises:
+        BadRecording: If nothing varies.
+    """
+    channel = recording[output]
+    if channel.sigma is not None:
+        sigma = float(np.median(channel.sigma))
+        return Level(sigma, 0.0, 0.0, channel.interval, "given")
+    model = noise.estimate(channel, quiet)
+    rho = float(np.clip(model.autocovariance(2)[1] / model.sigma**2, 0.0, 0.98))
+    return Level(model.sigma, rho if model.n >= QUIET and not model.white else 0.0,
+                 2 * model.sigma_std / model.sigma, channel.interval,
+                 f"the {model.source} ({model.start:g} s to {model.stop:g} s)")
+
+
+def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
+            quiet: tuple[float, float] | None) -> Level:
+    """The level again, now that a fit has taken the motion away.
+
+    Args:
+        level: So far.
+        channel: Of the output.
+        t, residual: (N,) of the fit at the samples that are there.
+        rate: Natural frequency [rad/s]: the residual counts from six times that on.
+        quiet: Stretch in which nothing moves; looked for if None.
+    """
+    h = level.interval
+    grid = np.round((t - t[0]) / h).astype(int)
+    if np.max(np.abs((t - t[0]) / h - grid)) > 0.2 or len(t) < 200:
+        return level
+    even = np.interp(np.arange(grid[-1] + 1), grid, residual)
+    share = len(t) / len(even)
+    window = np.hanning(len(even))
+    power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)
+    omega = np.linspace(0, np.pi, len(power))
+    # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
+    high = (omega > np.clip(6 * rate * h, 0.25 * np.pi, 0.6 * np.pi)) & (omega < 0.97 * np.pi)
+    spectra = [(omega[high], power[high], 0.5 * share)]
+    source = "the residual's highest frequencies"
+    found = quiet or noise_stretch(channel)
+    if found is not None:
+        inside = (channel.time >= found[0]) & (channel.time <= found[1]) & np.isfinite(
+            channel.values)
+        values = channel.values[inside]
+        if len(values) >= QUIET:
+            p = np.abs(np.fft.rfft(values - values.mean())) ** 2 / len(values)
+            spectra.append((np.linspace(0, np.pi, len(p))[1:], p[1:], 1.0))
+            source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
+    sigma, rho, spread = _whittle(spectra)
+    if level.source == "given":
+        return replace(level, rho=rho, spread=spread if rho else 0.0)
+    return Level(sigma, rho, spread, h, source)
+
+
+def noise_stretch(channel: Channel) -> tuple[float, float] | None:
+    """A quiet stretch of at least `QUIET` samples."""
+    model = noise.estimate(channel)
+    if model.source != "quiet stretch" or model.n < QUIET:
+        return None
+    return model.start, model.stop
+
+
+def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]]) -> tuple[float, float, float]:
+    """(σ, ρ, relative standard error of the power at low frequencies)."""
+    grid = np.linspace(0.0, 0.95, 191)
+    costs, scales = [], []
+    total = sum(w * len(p) for _, p, w in spectra)
+    for rho in grid:
+        shapes = [1.0 / (1 - 2 * rho * np.cos(o) + rho**2) for o, _, _ in spectra]
+        scale = sum(w * np.sum(_calm(p / s)) for (_, p, w), s in zip(
+            spectra, shapes, strict=True)) / total
+        costs.append(total * np.log(scale) + sum(
+            w * np.sum(np.log(s)) for (_, _, w), s in zip(spectra, shapes, strict=True)))
+        scales.append(scale)
+    best = int(np.argmin(costs))
+    if costs[0] - costs[best] < 0.5 * np.log(total):
+        best = 0
+    rho, scale = float(grid[best]), float(scales[best])
+    curve = 0.0
+    if 0 < best < len(grid) - 1:
+        step = grid[1] - grid[0]
+        curve = (costs[best + 1] - 2 * costs[best] + costs[best - 1]) / step**2
+    rho_std = 1.0 / np.sqrt(curve) if curve > 0 else 0.0
+    spread = float(np.hypot(1.0 / np.sqrt(total), 2 * rho_std / (1 - rho) if rho else 0.0))
+    return float(np.sqrt(scale / (1 - rho**2))), rho, spread
+
+
+def _calm(ratio: np.ndarray) -> np.ndarray:
+    """Ordinates limited to seven times their median's mean: a line in the band is no noise."""
+    return np.minimum(ratio, 7 * float(np.median(ratio)) / np.log(2))
+

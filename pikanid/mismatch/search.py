@@ -1,0 +1,185 @@
+"""Which effects explain a recording: screened to first order, then refitted one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.detect import unit_columns
+from pikanid.mismatch.hypothesis import Hypothesis, fitted, start_from
+from pikanid.mismatch.tangent import Directions, directions
+from pikanid.mismatch.whitened import Records
+from pikanid.model import Model
+
+SINGLES, PAIRS, MORE = 14, 8, 6  # refits of one effect, of two at once, of one more
+MOST = 4  # effects in a hypothesis
+Adequate = Callable[[Hypothesis], bool]
+
+
+@dataclass
+class Search:
+    """Finds hypotheses about records; keeps every fit it has made.
+
+    Attributes:
+        nominal: Model, at its refitted parameters.
+        records: To explain.
+        candidates: Entries of the catalogue and guards.
+        tell: Called with what is being done.
+    """
+
+    nominal: Model
+    records: Records
+    candidates: tuple[Candidate, ...]
+    tell: Callable[[str], None] = lambda text: None
+    fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
+
+    @property
+    def choices(self) -> int:
+        """Number of entries to choose from."""
+        return sum(c.known for c in self.candidates)
+
+    def base(self) -> Hypothesis:
+        """The nominal model without effects, refitted."""
+        return self._fit((), [{}])
+
+    def run(self, adequate: Adequate) -> list[Hypothesis]:
+        """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
+        base = self.fits.get(frozenset()) or self._fit((), [{}])
+        screen = Screen(base, [c for c in self.candidates if c.fits])
+        self.tell("single effects")
+        for candidate, starts in screen.singles(SINGLES):
+            self._fit((candidate,), starts)
+        best = self.ranked()[0]
+        if not adequate(best):
+            self.tell("pairs of effects")
+            for pair, starts in screen.pairs(PAIRS):
+                self._fit(pair, starts)
+        for count in range(1, MOST):
+            best = self.ranked()[0]
+            if adequate(best):
+                break
+            self.tell(f"{count + 1} effects together")
+            leading = [h for h in self.ranked() if len(h.effects) >= 1][:3]
+            before = best.score()
+            for hypothesis in leading:
+                if len(hypothesis.effects) < MOST:
+                    self._extend(hypothesis, MORE)
+            if self.ranked()[0].score() > before - 1e-9:
+                break
+        return self.ranked()
+
+    def ranked(self) -> list[Hypothesis]:
+        """Best first; the noise counts as what the best explanation leaves."""
+        every = list(self.fits.values())
+        scale = self.scale()
+        return sorted(every, key=lambda h: h.score(scale))
+
+    def scale(self) -> float:
+        """χ² per degree of freedom of the closest fit, at least one."""
+        closest = min(self.fits.values(), key=lambda h: h.minimum.chi2)
+        freedom = max(closest.whitened.rows - len(closest.minimum.theta), 1)
+        return max(1.0, closest.minimum.chi2 / freedom)
+
+    def _extend(self, hypothesis: Hypothesis, count: int) -> None:
+        present = {e.key for e in hypothesis.effects}
+        groups = {e.twin for e in hypothesis.effects if e.twin}
+        others = [c for c in self.candidates if c.fits and c.key not in present
+                  and (not c.twin or c.twin not in groups)]
+        screen = Screen(hypothesis, others)
+        for candidate, starts in screen.singles(count):
+            self._fit((*hypothesis.effects, candidate), starts)
+
+    def _fit(self, effects: Sequence[Candidate], starts: Sequence[Mapping[str, float]]
+             ) -> Hypothesis:
+        key = frozenset(e.key for e in effects)
+        if key in self.fits:
+            return self.fits[key]
+        order = {c.key: k for k, c in enumerate(self.candidates)}
+        ordered = sorted(effects, key=lambda e: order[e.key])
+        found = fitted(self.nominal, ordered, self.records, starts, self.choices)
+        if found is not None:
+            self.fits[key] = found
+            return found
+        return self.fits[frozenset()]
+
+
+class Screen:
+    """What each candidate would take away from a residual, to first order."""
+
+    def __init__(self, about: Hypothesis, candidates: Sequence[Candidate]):
+        self.about = about
+        self.found: Directions = directions(about.whitened, about.minimum.theta, candidates)
+        self.units, self.lengths = unit_columns(self.found.D, about.minimum.J)
+        # r = ŷ - y: a sign that is present in y shows as its negative
+        self.z = -(self.units.T @ about.minimum.r)
+        good = self.lengths > 0
+        allowed = good & ((self.z > 0) | ~self.found.one_sided)
+        self.gain = np.where(allowed, self.z**2, 0.0)
+
+    def best(self, candidate: int, count: int = 1) -> list[int]:
+        """A candidate's most telling signs, no two neighbours."""
+        own = np.flatnonzero(self.found.owner == candidate)
+        chosen: list[int] = []
+        for k in own[np.argsort(-self.gain[own], kind="stable")]:
+            if self.gain[k] > 0 and all(abs(int(k) - c) > 1 for c in chosen):
+                chosen.append(int(k))
+            if len(chosen) == count:
+                break
+        return chosen
+
+    def singles(self, count: int) -> list[tuple[Candidate, list[dict[str, float]]]]:
+        """The most promising candidates, with the starts of their fits."""
+        several = [self.best(c, 3) for c in range(len(self.found.candidates))]
+        order = sorted((k for k, s in enumerate(several) if s),
+                       key=lambda k: -self.gain[several[k][0]])
+        listed: list[tuple[Candidate, list[dict[str, float]]]] = []
+        for k in order:
+            if self.gain[several[k][0]] < 3.0 and listed:
+                break
+            candidate = self.found.candidates[k]
+            signs = several[k] if len(candidate.parameters) > 1 or not self.found.signs[
+                several[k][0]].scales else several[k][:1]
+            listed.append((candidate, [self._start(candidate, s, self.z[s]) for s in signs]))
+        # guards beside the entries, not in their place
+        known = [entry for entry in listed if entry[0].known][:count]
+        return known + [entry for entry in listed if not entry[0].known][:max(count // 3, 1)]
+
+    def _start(self, candidate: Candidate, sign: int, amplitude: float) -> dict[str, float]:
+        length = self.lengths[sign]
+        return start_from(candidate, self.found.signs[sign], float(amplitude / length),
+                          self.about.values)
+
+    def pairs(self, count: int
+              ) -> list[tuple[tuple[Candidate, Candidate], list[dict[str, float]]]]:
+        """The pairs that take most away together, also where neither does alone."""
+        known = np.array([c.known for c in self.found.candidates])
+        good = np.flatnonzero((self.lengths > 0) & known[self.found.owner])
+        C = self.units[:, good].T @ self.units[:, good]
+        z, owner = self.z[good], self.found.owner[good]
+        rest = 1 - C**2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = (z[:, None] - C * z[None, :]) / rest
+            gain = first * z[:, None] + first.T * z[None, :]
+        sided = self.found.one_sided[good]
+        bad = (rest < 1e-4) | (owner[:, None] == owner[None, :]) | (
+            sided[:, None] & (first <= 0)) | (sided[None, :] & (first.T <= 0))
+        gain = np.triu(np.where(bad, 0.0, gain), 1)
+        listed: list[tuple[tuple[Candidate, Candidate], list[dict[str, float]]]] = []
+        taken: set[tuple[int, int]] = set()
+        for flat in np.argsort(-gain, axis=None, kind="stable")[:4000]:
+            i, j = divmod(int(flat), len(z))
+            pair = (int(owner[i]), int(owner[j]))
+            a, b = (self.found.candidates[k] for k in pair)
+            if gain[i, j] < 6.0 or len(listed) == count:
+                break
+            if pair in taken or (a.twin and a.twin == b.twin):
+                continue
+            taken.add(pair)
+            start = self._start(a, int(good[i]), first[i, j])
+            other = self._start(b, int(good[j]), first[j, i])
+            own = {p.name for p in b.parameters}
+            listed.append(((a, b), [{**start, **{n: v for n, v in other.items() if n in own}}]))
+        return listed

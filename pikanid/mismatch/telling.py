@@ -1,0 +1,32 @@
+"""A diagnosis in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pikanid.estimate import rounded
+
+if TYPE_CHECKING:
+    from pikanid.mismatch.result import Diagnosis
+
+
+def lines_of(dx: Diagnosis) -> list[str]:
+    """Verdict, where, what, proof and notes, line by line."""
+    lines = [dx.sentence()]
+    if dx.mismatch:
+        place = dx.where.channel if dx.where.channel != "undecided" else "channel undecided"
+        spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time[:6])
+        lines.append(f"Where: {place}" + (f"; loudest at {spans}" if spans else ""))
+    for h in dx.hypotheses:
+        lines.append(f"What: {h.title} (probability {h.probability:.2f})")
+        for e in h.effects:
+            lines.append(f"  {e.expression}   [{', '.join(e.ids)}]")
+            for name, v in e.parameters.items():
+                lines.append(f"    {name} = {rounded(v.value, v.std)} {v.unit}".rstrip())
+    for h in dx.rejected[:4]:
+        lines.append(f"Not: {h.title}: {h.why_not}")
+    if dx.held_out is not None and dx.hypotheses:
+        p = dx.held_out
+        lines.append(f"Proof: held-out RMSE {p.rmse_before:.3g} -> {p.rmse_after:.3g} {p.unit} "
+                     f"(noise {p.noise:.3g}), p = {p.p_value:.2g}")
+    return [*lines, *dx.noise, *dx.notes]

@@ -1,0 +1,168 @@
+"""From ranked hypotheses to an answer: which are given, and how sure one may be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.detect import Detection
+from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.judge import HeldOut
+from pikanid.mismatch.result import Explanation, NamedEffect, Verdict, values_of
+
+WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
+GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
+ADEQUATE = 0.01  # p-value below which a hypothesis leaves something unexplained
+Test = Callable[[Hypothesis], Detection]
+Predict = Callable[[Hypothesis], HeldOut | None]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Verdict, hypotheses given (most probable first) and the closest ones not given.
+
+    `twins` lists, for a hypothesis given, the effects that stand for each other in it.
+    """
+
+    verdict: Verdict
+    given: tuple[Hypothesis, ...]
+    others: tuple[Hypothesis, ...]
+    twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = field(default_factory=dict)
+    reasons: dict[frozenset[str], str] = field(default_factory=dict)
+
+
+def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
+           proves: bool) -> Answer:
+    """Choose what is given.
+
+    Args:
+        ranked: All hypotheses, best first.
+        scale: That divides χ².
+        test, predict: Adequacy on the train and on the held-out recordings.
+        proves: Whether there are held-out recordings.
+    """
+    reasons: dict[frozenset[str], str] = {}
+    tried = [h for h in ranked if h.effects]
+    if not tried or tried[0].score(scale) >= next(
+            h.score(scale) for h in ranked if not h.effects):
+        return Answer("unnamed", (), tuple(tried[:3]))
+    lowest = min(_handicapped(h, scale) for h in tried)
+    near = [h for h in tried if _handicapped(h, scale) < lowest + WITHIN]
+    near = _parsimonious(_integer_laws(near), scale)
+    given = []
+    for h in near:
+        if test(h).p_value < ADEQUATE:
+            reasons[h.key] = "leaves something unexplained in the recording"
+        elif proves and ((prediction := predict(h)) is None
+                         or prediction.detection.p_value < ADEQUATE):
+            reasons[h.key] = "does not predict the held-out recording"
+        else:
+            given.append(h)
+    if proves and len(given) > 1:
+        given = _by_evidence(given, predict, scale, reasons)
+    outside = [h for h in given if not h.known]
+    known = [h for h in given if h.known]
+    if not known or (outside and _handicapped(outside[0], scale) < _handicapped(known[0], scale)
+                     + 2.0):
+        rest = tuple(h for h in near if h not in given) + tuple(given)
+        return Answer("unnamed", (), rest[:5], {}, reasons)
+    merged, twins = _merged(known)
+    verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
+    others = [h for h in tried if h not in merged][:5]
+    return Answer(verdict, tuple(merged), tuple(others), twins, reasons)
+
+
+def _handicapped(h: Hypothesis, scale: float) -> float:
+    return h.score(scale) + GUARD * sum(not e.known for e in h.effects)
+
+
+def _parsimonious(near: list[Hypothesis], scale: float) -> list[Hypothesis]:
+    """Without those that only add effects to a better one."""
+    return [h for h in near if not any(
+        o.key < h.key and _handicapped(o, scale) <= _handicapped(h, scale) for o in near)]
+
+
+def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
+    """A power law whose exponent may be 0, 1 or 2 is left to the integer law, and the other way.
+
+    Where the exponent is known so badly that both a whole and a broken one are well inside its
+    interval, both stay.
+    """
+    kept = []
+    for h in near:
+        power = [e for e in h.effects if e.ids[0] == "power_drag"]
+        if power:
+            n = power[0].parameters[1].name
+            value, std = h.values[n], h.std[n]
+            if std < 0.12 and min(abs(value - k) for k in (0, 1, 2)) < 2 * std:
+                continue
+        kept.append(h)
+    return kept or near
+
+
+def _by_evidence(given: list[Hypothesis], predict: Predict, scale: float,
+                 reasons: dict[frozenset[str], str]) -> list[Hypothesis]:
+    """Without those that predict the held-out recording clearly worse than another does."""
+    found = {h.key: p.evidence / scale + _handicapped(h, scale) for h in given
+             if (p := predict(h)) is not None}
+    best = min(found.values())
+    kept = [h for h in given if found.get(h.key, np.inf) < best + WITHIN]
+    for h in given:
+        if h not in kept:
+            reasons[h.key] = "predicts the held-out recording worse"
+    return sorted(kept, key=lambda h: found[h.key])
+
+
+def _merged(known: list[Hypothesis]
+            ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
+    """Hypotheses that differ in twins only become one; what stands for what is noted."""
+    def group(e: Candidate) -> str:
+        return e.twin + e.site.suffix if e.twin else e.key
+
+    first: dict[frozenset[str], Hypothesis] = {}
+    twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = {}
+    for h in known:
+        signature = frozenset(group(e) for e in h.effects)
+        leader = first.setdefault(signature, h)
+        table = twins.setdefault(leader.key, {e.key: e.ids for e in leader.effects})
+        for e in leader.effects:
+            for o in h.effects:
+                if group(o) == group(e):
+                    table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.ids)))
+    return list(first.values()), twins
+
+
+def explanations(answer: Answer, scale: float, test: Test, predict: Predict
+                 ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
+    """Given and rejected hypotheses, for reports."""
+    pool = [*answer.given, *answer.others]
+    if not pool:
+        return (), ()
+
+    def total(h: Hypothesis) -> float:
+        p = predict(h) if h in answer.given else None
+        return _handicapped(h, scale) + (p.evidence / scale if p is not None else 0.0)
+
+    scores = np.array([total(h) for h in answer.given] or [0.0])
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    weights = weights / weights.sum()
+
+    def one(h: Hypothesis, probability: float, why: str) -> Explanation:
+        table = answer.twins.get(h.key, {})
+        effects = tuple(NamedEffect(
+            table.get(e.key, e.ids), e.name, e.expression,
+            values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
+        p = predict(h) if h in answer.given else None
+        return Explanation(effects, probability, h.model.with_values(
+            {n: v for n, v in h.values.items()}), h.score(scale),
+            test(h).p_value if h in answer.given else None,
+            None if p is None else p.detection.p_value, why)
+
+    given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
+    best = answer.given[0].score(scale) if answer.given else pool[0].score(scale)
+    others = tuple(one(h, 0.0, answer.reasons.get(
+        h.key, f"fits worse by {h.score(scale) - best:.0f}")) for h in answer.others)
+    return given, others

@@ -1,0 +1,95 @@
+"""Residuals of a model against recordings, whitened by the noise, with exact derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.noise_level import Level
+from pikanid.model import Model
+from pikanid.problem import Problem
+from pikanid.recording import Recording
+from pikanid.simulation.interpreted import Interpreted
+from pikanid.simulation.simulator import Response, Steps
+
+
+@dataclass(frozen=True)
+class Records:
+    """Recordings as they are judged: without outliers, each output with its noise level."""
+
+    recordings: tuple[Recording, ...]
+    levels: tuple[dict[str, Level], ...]
+
+
+class Whitened:
+    """(ŷ - y) of a model, whitened to unit variance, as a function of θ (n_free,).
+
+    >>> from pikanid import systems
+    >>> systems.sloshing().free_names                       # what θ holds
+    ('l_theta', 'd_theta')
+    """
+
+    def __init__(self, model: Model, records: Records):
+        held = [r.with_hold(**{i.name: i.hold for i in model.inputs if i.name in r})
+                for r in records.recordings]
+        self.problem = Problem(model, held)
+        self.records = records
+        self.simulators = [Interpreted(model, e) for e in self.problem.experiments]
+        self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
+        self.steps: list[Steps] = []
+        self.rows = self.problem.n_samples
+
+    def choose_steps(self, theta: np.ndarray, share: float = 0.05) -> bool:
+        """Steps whose error stays below a share of the noise; False where nothing can be run."""
+        found = []
+        for r, simulator in enumerate(self.simulators):
+            sigma = min(level.sigma for level in self.records.levels[r].values())
+            try:
+                steps = simulator.choose_steps(
+                    self.problem.parameters(theta, r), share * sigma, "explicit",
+                    finest=self._spacing(r) / 64)
+            except errors.SimulationFailed:
+                return False
+            if steps.error > 20 * share * sigma:
+                return False
+            found.append(steps)
+        self.steps = found
+        return True
+
+    def _spacing(self, r: int) -> float:
+        samples = self.problem.experiments[r].samples[0]
+        return float(np.median(np.diff(samples.t)))
+
+    def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
+        """Simulate every recording, with derivatives by its own parameters."""
+        return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
+                for r, s in enumerate(self.simulators)]
+
+    def residual(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run."""
+        responses = self.responses(theta)
+        if not all(r.finished for r in responses):
+            return None
+        parts, jacobians = [], []
+        for r, response in enumerate(responses):
+            J = np.zeros((len(response.y), len(theta)))
+            J[:, self.columns[r][1]] = response.sensitivity
+            parts.append(self.whiten(r, response.y - self.measured(r)))
+            jacobians.append(self.whiten(r, J))
+        return np.concatenate(parts), np.concatenate(jacobians)
+
+    def measured(self, r: int) -> np.ndarray:
+        """All samples of recording r (rows,)."""
+        return np.concatenate([s.y for s in self.problem.experiments[r].samples])
+
+    def whiten(self, r: int, rows: np.ndarray) -> np.ndarray:
+        """Rows (rows,) or (rows, k) of recording r as white noise of unit variance."""
+        out, first = np.empty_like(rows), 0
+        for s in self.problem.experiments[r].samples:
+            level = self.records.levels[r][self.problem.model.outputs[s.output].name]
+            part = slice(first, first + len(s.t))
+            out[part] = level.whiten(rows[part], s.t)
+            first += len(s.t)
+        return out

@@ -1,0 +1,47 @@
+"""How a tape travels to the compiled interpreter, with its registers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pikanid.simulation.tape import GROUPS, Tape
+
+
+class BoundTape(NamedTuple):
+    """One tape with registers for so many derivatives.
+
+    `code` (ops, 4) of all groups, `span` (groups, 3) first and last operation and number of results
+    of each, `out` (groups, results) their registers; values `r` (R,), derivatives `d` (R, lanes)
+    and `ds` (R, switches) by the signs, which of them are not all zero (`live`, `signed`);
+    `sizes` states, inputs, parameters, outputs, switching functions.
+    """
+
+    code: np.ndarray
+    span: np.ndarray
+    out: np.ndarray
+    r: np.ndarray
+    d: np.ndarray
+    ds: np.ndarray
+    live: np.ndarray
+    signed: np.ndarray
+    sizes: np.ndarray
+
+
+def bound(tape: Tape, lanes: int) -> BoundTape:
+    """A tape with registers for `lanes` derivatives."""
+    R, K = tape.registers, tape.sizes[4]
+    ends = np.cumsum([0, *(len(tape.code[g]) for g in GROUPS)])
+    results = [tape.outputs.get(g, np.empty(0, np.int64)) for g in GROUPS]
+    out = np.zeros((len(GROUPS), max(map(len, results))), np.int64)
+    for k, found in enumerate(results):
+        out[k, :len(found)] = found
+    span = np.array([[a, b, len(f)] for a, b, f in zip(ends[:-1], ends[1:], results, strict=True)])
+    r = np.zeros(R)
+    places, numbers = tape.constants
+    r[places] = numbers
+    return BoundTape(
+        np.concatenate([tape.code[g] for g in GROUPS]), span.astype(np.int64), out, r,
+        np.zeros((R, lanes)), np.zeros((R, K)), np.zeros(R, np.bool_), np.zeros(R, np.bool_),
+        np.array(tape.sizes, np.int64))

@@ -1,0 +1,109 @@
+"""`Interpreted`: a simulator that runs a model from its tape, without compiling the model.
+
+Two kernels, one for models whose right-hand side jumps and one for all others, are compiled once
+and serve every model.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from pikanid.simulation.bound_tape import bound
+from pikanid.simulation.compiled import Method, kernel_text, written
+from pikanid.simulation.simulator import Simulator
+from pikanid.simulation.structure import Structure
+from pikanid.simulation.tape import Tape, can_run, tape
+
+_HEADER = '''"""The interpreter of tapes; generated from the kernels."""
+import math
+
+import numpy as np
+from numba import njit
+
+from pikanid.simulation.support import (
+    log_abs, positive_power, power_slope, sgn, solve_small)
+from pikanid.simulation.tape import (
+    ACOS, ADD, ASIN, ATAN, ATAN2, COS, COSH, DIV, EXP, LOG, LOG_ABS, MUL, NEGATE, POSITIVE_POWER,
+    POWER, SGN, SIN, SINH, SQRT, SQUARE, TAN, TANH)
+
+
+def called(function):
+    return njit(cache=True, error_model="numpy", _nrt=False)(function)
+
+
+PRELUDE, F, H, H_RATE, G, G_RATE = range(6)
+
+
+'''
+
+
+@dataclass(frozen=True)
+class Interpreted(Simulator):
+    """A `Simulator` that interprets: for models that are simulated a few dozen times only.
+
+    Models with spline functions are compiled as usual.
+
+    >>> import numpy as np
+    >>> from pikanid import excitation, systems
+    >>> from pikanid.problem import bind
+    >>> model = systems.sloshing()
+    >>> simulator = Interpreted(model, bind(model, excitation.two_pulse(), need_outputs=False))
+    >>> simulator.run(np.array([0.045, 0.15, 0.3, 9.81]), states=True).states.shape[1]
+    2
+    """
+
+    def module(self, method: Method) -> Any:
+        """The interpreter, bound to the model's tape."""
+        if method != "explicit" or not can_run(self.model):
+            return super().module(method)
+        if method not in self._kept:
+            self._kept[method] = _Machine(tape(Structure(self.model)))
+        return self._kept[method]
+
+
+class _Machine:
+    """What `Simulator` asks of a compiled module: `integrate`."""
+
+    def __init__(self, program: Tape):
+        self.program = program
+        self.kernel = _kernel(program.sizes[4] > 0)
+        self.bound = bound(program, 0)
+
+    def integrate(self, T: np.ndarray, pieces: np.ndarray, U: np.ndarray, V: np.ndarray,
+                  jumps: np.ndarray, dtau_in: np.ndarray, dtau_out: np.ndarray, delayed: bool,
+                  x0: np.ndarray, S0: np.ndarray, p: np.ndarray, act: np.ndarray,
+                  *rest: np.ndarray) -> tuple[int, int]:
+        """As that of a compiled model."""
+        lanes = len(act)
+        if self.bound.d.shape[1] != lanes:
+            self.bound = bound(self.program, lanes)
+        status, stop = self.kernel.integrate_tape(
+            self.bound, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed,
+            x0, S0, p, act, *rest)
+        return int(status), int(stop)
+
+
+@functools.cache
+def _kernel(hybrid: bool) -> ModuleType:
+    import importlib.util
+
+    kind = "hybrid" if hybrid else "smooth"
+    name = f"pikanid_interpreter_{kind}"
+    spec = importlib.util.spec_from_file_location(name, written(f"interpreter_{kind}",
+                                                                _source(kind)))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _source(kind: str) -> str:
+    return "\n\n".join([_HEADER.rstrip("\n") + "\n", kernel_text("interpreter"),
+                        kernel_text(f"interpreter_{kind}")])
