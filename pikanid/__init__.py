@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pikanid import datasets, excitation, symbolic, systems, uncertainty
     from pikanid.discrepancy import kan_discrepancy
     from pikanid.estimate import Estimate
+    from pikanid.mismatch import Diagnosis, diagnose
     from pikanid.model import Input, Model, Output, Parameter, State
     from pikanid.recording import Channel, Recording
     from pikanid.simulation import simulate
@@ -41,6 +42,8 @@ _HOMES: dict[str, str | None] = {
     "PINN": "pikanid.strategies",
     "PIKAN": "pikanid.strategies",
     "kan_discrepancy": "pikanid.discrepancy",
+    "diagnose": "pikanid.mismatch",
+    "Diagnosis": "pikanid.mismatch",
     "simulate": "pikanid.simulation",
     "symbolic": None,
     "systems": None,
@@ -64,6 +67,8 @@ __all__ = [
     "PINN",
     "PIKAN",
     "kan_discrepancy",
+    "diagnose",
+    "Diagnosis",
     "simulate",
     "symbolic",
     "systems",

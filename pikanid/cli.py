@@ -16,6 +16,8 @@ import typer
 from pikanid import errors
 from pikanid.commands.conceal import EXAMPLES as CONCEAL
 from pikanid.commands.conceal import conceal
+from pikanid.commands.diagnose import EXAMPLES as DIAGNOSE
+from pikanid.commands.diagnose import diagnose
 from pikanid.commands.equivalence import EXAMPLES as EQUIVALENCE
 from pikanid.commands.equivalence import equivalence
 from pikanid.commands.identify import EXAMPLES as IDENTIFY
@@ -46,6 +48,7 @@ app = typer.Typer(
     name="pikanid", add_completion=False, rich_markup_mode="rich",
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
 app.command(epilog=IDENTIFY)(identify)
+app.command(epilog=DIAGNOSE)(diagnose)
 app.command(epilog=SIMULATE)(simulate)
 app.command(epilog=MODELS)(models)
 app.command(epilog=STUDY)(study)

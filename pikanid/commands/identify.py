@@ -97,7 +97,7 @@ def identify(
         raise errors.BadModel(errors.nothing_free(chosen.name))
     columns = assignments("--column", column, "theta=angle")
     units = assignments("--unit", unit, "theta=deg")
-    given = [_prepared(path, chosen, columns, units, rate, sheet, start, stop, decimate, sigma)
+    given = [prepared(path, chosen, columns, units, rate, sheet, start, stop, decimate, sigma)
              for path in recordings]
     return _fit_and_tell(chosen, given, names, protocol, seed, json_, plot, save, quiet)
 
@@ -107,9 +107,10 @@ def _check_choice(option: str, value: str, known: Sequence[str]) -> None:
         raise errors.BadSetting(errors.bad_value(option, value, f"one of {', '.join(known)}"))
 
 
-def _prepared(path: str, model: Model, columns: dict[str, str], units: dict[str, str],
+def prepared(path: str, model: Model, columns: dict[str, str], units: dict[str, str],
               rate: float | None, sheet: str | None, start: float | None, stop: float | None,
               decimate: int, sigma: Sequence[str]) -> Recording:
+    """The recording in a file as the options want it: channels, units, window, noise."""
     from pikanid.recording import Recording
     from pikanid.units import is_unit
 

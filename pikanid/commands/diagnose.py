@@ -1,0 +1,101 @@
+"""`pikanid diagnose`: which physics does a model leave out?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pikanid.commands.identify import prepared
+from pikanid.commands.options import adjusted, assignments, check_outputs, quantity
+
+if TYPE_CHECKING:
+    from pikanid.mismatch import Diagnosis
+
+EXAMPLES = """Examples:
+
+  pikanid diagnose run1.csv --held-out run2.csv --model sloshing
+
+  pikanid diagnose run1.csv --held-out run2.csv --model my.toml --report why.html --json why.json
+
+  pikanid diagnose run1.csv --model pendulum --quiet-until 2s
+
+Exit codes: 0 diagnosed, whatever was found; 2 bad input."""
+
+
+def diagnose(
+    train: Annotated[list[str], typer.Argument(
+        metavar="TRAIN...", help="recordings to explain: CSV, Excel, Parquet, MAT or NPZ",
+        show_default=False)],
+    model: Annotated[str, typer.Option(
+        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
+        show_default=False)],
+    held_out: Annotated[list[str], typer.Option(
+        metavar="OTHER", show_default=False,
+        help="recording of another experiment, to prove it on")] = [],  # noqa: B006
+    json_: Annotated[str | None, typer.Option(
+        "--json", metavar="FILE", help="write diagnosis.json (- for standard output)")] = None,
+    report: Annotated[str | None, typer.Option(
+        metavar="FILE.html", help="write a page for people")] = None,
+    sigma: Annotated[list[str], typer.Option(
+        metavar="[NAME=]VALUE", show_default=False,
+        help="standard deviation of the noise; found out by default")] = [],  # noqa: B006
+    quiet_until: Annotated[str | None, typer.Option(
+        metavar="TIME", help="nothing moves before, as 2s")] = None,
+    alpha: Annotated[float, typer.Option(help="rate of false alarms")] = 0.01,
+    set_: Annotated[list[str], typer.Option(
+        "--set", metavar="NAME=VALUE", show_default=False,
+        help="guess of a free parameter, or value of a fixed one")] = [],  # noqa: B006
+    column: Annotated[list[str], typer.Option(
+        metavar="NAME=COLUMN", show_default=False,
+        help="column of the file that holds a signal; t=COLUMN for time")] = [],  # noqa: B006
+    unit: Annotated[list[str], typer.Option(
+        metavar="NAME=UNIT", show_default=False,
+        help="unit of a signal, where the file does not say")] = [],  # noqa: B006
+    decimate: Annotated[int, typer.Option(
+        metavar="N", min=1, help="use every N-th sample of the outputs")] = 1,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+) -> int:
+    """Find out which physics a model leaves out, and prove it on another recording."""
+    check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),
+                   "--report": (report, [".html"])}, [*train, *held_out, model])
+    from pikanid import systems
+    from pikanid.mismatch import diagnose as run
+    from pikanid.reporting.console import working
+
+    chosen = adjusted(systems.find(model), set_)
+    columns, units = assignments("--column", column, "theta=angle"), assignments(
+        "--unit", unit, "theta=deg")
+
+    def read(paths: list[str]) -> list[object]:
+        return [prepared(p, chosen, columns, units, None, None, None, None, decimate, sigma)
+                for p in paths]
+
+    records, others = read(train), read(held_out)
+    stretch = None
+    if quiet_until is not None:
+        start = min(r.start for r in records)  # type: ignore[attr-defined]
+        stretch = (start, start + quantity(quiet_until, "s", "--quiet-until"))
+    with working("diagnosing", 8, quiet) as step:
+        dx = run(chosen, records, others or None,  # type: ignore[arg-type]
+                 alpha=alpha, quiet=stretch, tell=step)
+    _write(dx, train[0], json_, report)
+    if not quiet and json_ != "-":
+        print(dx)
+    return 0
+
+
+def _write(dx: Diagnosis, title: str, json_: str | None, report: str | None) -> None:
+    from pathlib import Path
+
+    from pikanid.reporting import strict_json
+    from pikanid.writing import atomically
+
+    if json_ == "-":
+        print(strict_json.text(dx.to_dict()), end="")
+    elif json_ is not None:
+        atomically(Path(json_), strict_json.text(dx.to_dict()).encode())
+    if report is not None:
+        from pikanid.reporting.diagnosis_page import page
+
+        atomically(Path(report), page(dx, Path(title).stem).encode())

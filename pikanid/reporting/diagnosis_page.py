@@ -1,0 +1,115 @@
+"""A diagnosis as one self-contained page of HTML."""
+
+from __future__ import annotations
+
+import base64
+import io
+from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pikanid.mismatch.result import Diagnosis, Explanation
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 60rem; margin: 2rem auto;
+       padding: 0 1rem; }
+h1 { font-size: 1.5rem; }
+h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
+.verdict { font-size: 1.15rem; background: #f3f4f6; border-left: 6px solid #1d4ed8;
+           padding: .8rem 1rem; }
+.named, .none { border-color: #15803d; }
+.unnamed { border-color: #c2410c; }
+.unconfirmed { border-color: #b45309; }
+table { border-collapse: collapse; margin: .5rem 0; } td, th { padding: .2rem .8rem .2rem 0;
+        text-align: left; } th { font-weight: 600; border-bottom: 1px solid #ddd; }
+code { background: #f3f4f6; padding: .1rem .3rem; } img { max-width: 100%; }
+.small { color: #6b7280; font-size: .9rem; }
+"""
+
+
+def page(dx: Diagnosis, title: str) -> str:
+    """The page: verdict, where, what, proof, what next; figures inside.
+
+    Args:
+        dx: To show.
+        title: Such as the name of the recording.
+    """
+    parts = [
+        f"<h1>What is missing? {escape(title)}</h1>",
+        f'<p class="verdict {dx.verdict}">{escape(dx.sentence())}</p>',
+        _where(dx) if dx.mismatch else "",
+        _what(dx), _figure(dx), _proof(dx), _next(dx),
+        "<h2>Noise and notes</h2><ul>" + "".join(
+            f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes)) + "</ul>",
+        f'<p class="small">p = {dx.p_value:.2g} at a false-alarm rate of {dx.alpha:g}; '
+        f"{dx.seconds:.1f} s.</p>"]
+    return ('<!doctype html><html lang="en"><head><meta charset="utf-8">'
+            f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>"
+            + "".join(parts) + "</body></html>\n")
+
+
+def _where(dx: Diagnosis) -> str:
+    spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time) or "spread over the recording"
+    channel = {"dynamics": "the dynamics", "input": "the input", "sensor": "the sensor"}.get(
+        dx.where.channel, "undecided between input, sensor and dynamics")
+    depends = f"; depends on {', '.join(dx.where.depends_on)}" if dx.where.depends_on else ""
+    return (f"<h2>Where</h2><p>Channel: {escape(channel)}{escape(depends)}. "
+            f"Louder than noise: {escape(spans)}.</p>")
+
+
+def _what(dx: Diagnosis) -> str:
+    if not dx.hypotheses and not dx.rejected:
+        return ""
+    text = "<h2>What</h2>" + "".join(_explanation(h) for h in dx.hypotheses)
+    if dx.hypotheses:
+        text += _parameters(dx)
+    if dx.rejected:
+        rows = "".join(f"<tr><td>{escape(h.title)}</td><td>{escape(h.why_not)}</td></tr>"
+                       for h in dx.rejected)
+        text += f"<p>Tried and not given:</p><table>{rows}</table>"
+    return text
+
+
+def _explanation(h: Explanation) -> str:
+    rows = "".join(
+        f"<tr><td>{escape(n)}</td><td>{v.value:.5g} ± {v.std:.2g}</td>"
+        f"<td>{escape(v.unit)}</td></tr>"
+        for e in h.effects for n, v in e.parameters.items())
+    formulas = "".join(f"<li>{escape(e.name)} ({escape(' or '.join(e.ids))}): "
+                       f"<code>{escape(e.expression)}</code></li>" for e in h.effects)
+    return (f"<p><b>{escape(h.title)}</b>, probability {h.probability:.2f}</p><ul>{formulas}</ul>"
+            f"<table>{rows}</table>")
+
+
+def _parameters(dx: Diagnosis) -> str:
+    before = {f.label: (float(v), dx.before.covariance[k, k] ** 0.5)
+              for k, (f, v) in enumerate(zip(dx.before.free, dx.before.theta, strict=True))}
+    rows = "".join(
+        f"<tr><td>{escape(f.label)}</td>"
+        f"<td>{before[f.label][0]:.6g} ± {before[f.label][1]:.2g}</td>"
+        f"<td>{v:.6g} ± {dx.after.covariance[k, k] ** 0.5:.2g}</td><td>{escape(f.unit)}</td></tr>"
+        for k, (f, v) in enumerate(zip(dx.after.free, dx.after.theta, strict=True))
+        if f.label in before)
+    return ("<table><tr><th>parameter</th><th>before</th><th>after</th><th></th></tr>"
+            f"{rows}</table>")
+
+
+def _figure(dx: Diagnosis) -> str:
+    image = io.BytesIO()
+    dx.plot().savefig(image, format="png", dpi=110)
+    data = base64.b64encode(image.getvalue()).decode()
+    return ('<h2>Proof</h2><img alt="residuals before and after" '
+            f'src="data:image/png;base64,{data}">')
+
+
+def _proof(dx: Diagnosis) -> str:
+    proof = dx.held_out
+    if proof is None:
+        return "<p>There is no held-out recording: nothing can be proved.</p>"
+    return (f"<p>Held-out RMSE: {proof.rmse_before:.3g} before, {proof.rmse_after:.3g} after, "
+            f"noise {proof.noise:.3g} {escape(proof.unit)}; p = {proof.p_value:.2g}.</p>")
+
+
+def _next(dx: Diagnosis) -> str:
+    return f"<h2>What to do next</h2><p>{escape(dx.next_experiment)}</p>" if (
+        dx.next_experiment) else ""
