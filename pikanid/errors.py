@@ -642,7 +642,15 @@ def smoothing_undetermined(names: Sequence[str]) -> str:
 def relaxation_locked(lam: float, kept: float) -> str:
     return (
         f"λ stays at {kept:.3g}: at {lam:.3g} these splines could no longer follow the physics. "
-        "For less bias use more intervals or knots='collocation'."
+        "For less bias use more intervals (or IPDA, whose default knots do not lock)."
+    )
+
+
+def curve_follows_data(effective: float, count: int, lam: float) -> str:
+    return (
+        f"The curve uses {effective:.0f} degrees of freedom for {count} parameters, even at λ = "
+        f"{lam:.3g}: it follows the data rather than the equations, which do not fit them. "
+        "Estimates differ from those of NLS, and standard errors are too small; compare with NLS."
     )
 
 
@@ -795,6 +803,10 @@ def reading_inputs(given: int, names: Sequence[str]) -> str:
 
 def network_without_inputs() -> str:
     return "The network has seen no inputs yet: give x, the inputs over which it is to be read."
+
+
+def no_law_simulated() -> str:
+    return "None of the laws tried can be simulated along the recording: read without recordings."
 
 
 def nothing_to_push() -> str:
@@ -950,6 +962,13 @@ def nothing_to_learn(model: str) -> str:
 
 def nothing_to_drive(models: str) -> str:
     return f"{_short(models, 200)}: no input that an experiment could drive."
+
+
+def too_rough_to_plan(model: str, excitation: str) -> str:
+    return (
+        f"'{_short(model)}' moves too wildly under '{_short(excitation)}' to be planned with: make "
+        "the excitation smaller, or its samples denser."
+    )
 
 
 def no_profile_simulated(candidates: int) -> str:

@@ -156,6 +156,20 @@ def test_several_recordings_a_parameter_each_and_a_free_start(width: tuple[int, 
     assert np.allclose(std(pikan), std(nls), rtol=0.02)
 
 
+def test_switches_that_come_close_and_inputs_that_are_held_linearly() -> None:
+    """Two switches a sample apart in 20 s: the first grid that counts tells them apart."""
+    t = np.arange(0.0, 20.0, 0.01)
+    smooth = np.sin(3.0 * t) + 0.5 * np.cos(11.0 * t)
+    linear = pk.Recording.from_arrays(t, {"u_x": smooth}, units={"u_x": "m/s^2"},
+                                      hold={"u_x": "first"})
+    for drive in (pk.excitation.planar_moves(seed=0), linear):
+        rec = pk.simulate(pk.systems.sloshing(), drive, sigma=0.1 * DEGREE, seed=0)
+        nls, pikan = pk.NLS().fit(guessed(), rec), PIKAN().fit(guessed(), rec)
+        assert np.all(np.abs(nls.theta - pikan.theta) < 0.1 * std(nls))
+        assert np.allclose(std(pikan), std(nls), rtol=0.02)
+        assert pikan.ok and not pikan.warnings
+
+
 def rich(seconds: float) -> pk.Recording:
     """An input that is held between samples and changes at every one of them."""
     t = np.arange(0, seconds, 0.01)
@@ -242,7 +256,18 @@ def test_missing_physics_is_a_misfit() -> None:
     rec = pk.simulate(
         pk.systems.sloshing().with_term("theta_dot", "-80*theta**3"), pk.excitation.two_pulse(),
         sigma=0.1 * DEGREE, seed=0)
-    assert PIKAN().fit(guessed(), rec).adequacy.verdict == "misfit"
+    est, nls = PIKAN().fit(guessed(), rec), pk.NLS().fit(guessed(), rec)
+    assert est.adequacy.verdict == "misfit"
+    assert np.all(np.abs(est.theta - nls.theta) < 0.2 * std(nls))
+
+
+def test_a_curve_that_follows_the_data_of_a_wrong_model_is_owned_up_to() -> None:
+    rec = pk.simulate(
+        pk.systems.sloshing().with_term("theta_dot", "-80*theta**3"), pk.excitation.two_pulse(),
+        sigma=0.01 * DEGREE, seed=0)
+    est = PIKAN(lam=1.0, grid=160).fit(guessed(), rec)
+    assert est.adequacy.verdict == "misfit"
+    assert any("follows the data" in note for note in est.warnings)
 
 
 def test_device() -> None:

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.kan
 
 @pytest.mark.parametrize("degrees", [0.1, 1.0])
 def test_as_good_as_nls(degrees: float) -> None:
-    ratio, _ = versus_nls(PIKAN(width=(1, 5, 1)), 1, degrees, range(3))
+    ratio, _ = versus_nls(PIKAN(width=(1, 5, 1)), 1, degrees, range(2))
     assert np.all(ratio <= 1.05)
 
 
@@ -41,6 +41,7 @@ def test_as_good_as_nls_over_many_seeds(degrees: float, grid: int | None) -> Non
     assert np.all((coverage > 0.87) & (coverage < 0.995))
 
 
+@pytest.mark.slow
 def test_a_coarse_network_learns_what_its_shallow_start_cannot() -> None:
     """At 80 cells the shallow curve is more than a standard error off; training repairs that."""
     rec = slosh(0.1)
@@ -51,7 +52,7 @@ def test_a_coarse_network_learns_what_its_shallow_start_cannot() -> None:
 
 
 def test_the_network_is_pykans_and_is_the_fitted_curve() -> None:
-    est = PIKAN(width=(1, 3, 1), grid=80).fit(guessed(), slosh(1.0))
+    est = PIKAN(width=(1, 3, 1), grid=80, lam=1e5).fit(guessed(), slosh(1.0))
     curves, t = est.approximator, np.linspace(0.0, 5.0, 601)
     assert [sum(layer) for layer in curves.kan.width] == [1, 3, 1]
     curve = curves.networks[0][0]
@@ -64,9 +65,11 @@ def test_the_network_is_pykans_and_is_the_fitted_curve() -> None:
 
 
 @pytest.mark.parametrize("options", [
-    {"width": (1, [2, 1], 1)}, {"width": (1, [0, 2], 1)}, {"width": (1, 3, 2, 1)},
-    {"width": (1, 3, 1), "base": "silu"}, {"width": (1, 3, 1), "form": "state"},
-    {"width": (1, 3, 1), "degree": 4}, {"width": (1, 3, 1), "hidden_grid": 3}])
+    {"width": (1, [2, 1], 1)}, {"width": (1, [0, 2], 1)}, {"width": (1, 3, 1), "base": "silu"},
+    {"width": (1, 3, 1), "hidden_grid": 3},
+    pytest.param({"width": (1, 3, 2, 1)}, marks=pytest.mark.slow),
+    pytest.param({"width": (1, 3, 1), "form": "state"}, marks=pytest.mark.slow),
+    pytest.param({"width": (1, 3, 1), "degree": 4}, marks=pytest.mark.slow)])
 def test_other_shapes(options: dict[str, object]) -> None:
     rec = slosh(0.1, seed=1)
     nls = pk.NLS().fit(guessed(), rec)

@@ -204,6 +204,7 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     return np.clip(change, lower, upper)
 
 
+MAX_ITERATIONS = 100  # at one λ
 # A stop without decrease counts as converged up to this many times one datum's share of the cost:
 # the estimate is then within a tenth of a standard error.
 ROUNDING = 1e-2

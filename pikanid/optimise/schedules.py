@@ -13,10 +13,16 @@ import numpy as np
 
 from pikanid.approximators import Array
 
+NOTHING = 1e-8  # of the noise's cost: a physics cost without any influence
+
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One λ fitted: estimate and standard errors (b,), cost parts, effort."""
+    """One λ fitted: estimate and standard errors (b,), cost parts, effort.
+
+    `free` says that the splines were seen to follow the physics at this λ: whatever rose there is
+    the model's misfit, and no lock.
+    """
 
     lam: float
     theta: Array
@@ -25,6 +31,7 @@ class Stage:
     physics_cost: float
     iterations: int
     converged: bool
+    free: bool = False
 
 
 class Schedule(Protocol):
@@ -39,6 +46,9 @@ class Schedule(Protocol):
 
     def keep(self, past: Sequence[Stage]) -> int:
         """Index of the stage that is the result."""
+
+    def locked(self, past: Sequence[Stage]) -> bool:
+        """Whether the last stage looks as if the splines could not follow the physics."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,10 @@ class Fixed:
     def keep(self, past: Sequence[Stage]) -> int:
         """The only stage."""
         return len(past) - 1
+
+    def locked(self, past: Sequence[Stage]) -> bool:
+        """There is nothing to compare with."""
+        return False
 
 
 @dataclass(frozen=True)
@@ -87,20 +101,29 @@ class Continuation:
         if not past:
             return self.start
         last = past[-1]
-        if self._locked(past) or last.lam >= self.limit or (
+        if self.locked(past) or last.lam >= self.limit or (
                 len(past) > 1 and not last.converged):
             return None
-        settled = len(past) >= 3 and (
+        settled = len(past) >= 3 and self._eased(past[-2], last) and (
             moved(past[-2].theta, last.theta, past[-2].std, self.relative) <= self.settled)
         return None if settled else last.lam * self.factor
 
     def keep(self, past: Sequence[Stage]) -> int:
         """The last stage before a lock or a failure to converge."""
-        bad = self._locked(past) or (len(past) > 1 and not past[-1].converged)
+        bad = self.locked(past) or (len(past) > 1 and not past[-1].converged)
         return len(past) - (2 if bad else 1)
 
-    def _locked(self, past: Sequence[Stage]) -> bool:
-        if not self.lockable or len(past) < 2:
+    def _eased(self, before: Stage, last: Stage) -> bool:
+        """Whether the physics has begun to win: λP falls (or there is nothing to win).
+
+        While λ is too weak to matter, P stays and λP rises as λ: there θ rests as well, at what a
+        regression on the smoothed data gives, and of a model that misfits that is another θ.
+        """
+        return last.physics_cost <= max(before.physics_cost, NOTHING * self.noise_cost)
+
+    def locked(self, past: Sequence[Stage]) -> bool:
+        """Whether a cost rose as it does in a lock, and the splines were not seen to be free."""
+        if not self.lockable or len(past) < 2 or past[-1].free:
             return False
         last, before = past[-1], past[-2]
         floor = last.physics_cost > 0.5 * self.factor * before.physics_cost

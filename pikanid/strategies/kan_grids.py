@@ -20,6 +20,8 @@ from pikanid.chains import Chains
 from pikanid.problem import Experiment, Problem
 
 MOST_CELLS = 20_000  # of a grid whose cells follow the switches
+MOST_TO_RESOLVE = 5_000  # cells of a first grid that tells every two switches apart
+APART = 1.0  # cells between two switches that both get kinks: nearer ones are hard to tell apart
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,6 @@ class KanGrid:
     base : "zero" (w_b = 0) or "silu"
     seed : of pykan's initial coefficients, which a fit overwrites
     points : Gauss nodes in a cell
-    apart : cells between two switches that both get kinks, at least
     """
 
     intervals: int
@@ -46,7 +47,6 @@ class KanGrid:
     base: Literal["zero", "silu"] = "zero"
     seed: int = 0
     points: int = 3
-    apart: float = 2.0
 
     knots = "kan"
     locks = True
@@ -79,8 +79,8 @@ class KanGrid:
     def _switches(self, times: Array, start: float, stop: float) -> list[float]:
         if not self.exact_switches:
             return []
-        # more than a few kinks a cell would make the basis dependent: the grid must resolve them
-        least = (self.apart - 1e-6) * (stop - start) / self.intervals
+        # nearer kinks would make the basis all but dependent: the grid must resolve them
+        least = (APART - 1e-6) * (stop - start) / self.intervals
         if len(times) > 1 and np.min(np.diff(times)) < least:
             times = times[np.concatenate([[True], np.diff(times) >= least])]
         return [float(t) for t in times]
@@ -110,18 +110,24 @@ class KanGrid:
         kinks of the equation's order there beside splines of one degree more, the space is that of
         collocation at two Gauss points: as many coefficients as conditions.
         """
-        count = 0.0
-        for e in problem.experiments:
-            times, duration = e.breakpoints(), e.t1 - e.t0
-            if 4 * times.size <= cells:
-                return None
-            gaps = np.diff(np.concatenate([[e.t0], times, [e.t1]]))
-            count = max(count, duration / float(gaps.min()))
-        intervals = int(np.ceil(max(count, cells) - 1e-6))
-        if intervals > MOST_CELLS:
+        if any(4 * e.breakpoints().size <= cells for e in problem.experiments):
             return None
-        return KanGrid(intervals, order + 1, points=2, apart=1.0)
+        intervals = int(np.ceil(max(_between(problem), cells) - 1e-6))
+        return None if intervals > MOST_CELLS else KanGrid(intervals, order + 1, points=2)
+
+    @staticmethod
+    def resolving(problem: Problem) -> float:
+        """Cells that tell every two switches apart; 0 where that takes too many."""
+        cells = APART * _between(problem)
+        return cells if cells <= MOST_TO_RESOLVE else 0.0
 
     def refined(self) -> KanGrid:
         """Every cell halved."""
         return replace(self, intervals=2 * self.intervals)
+
+
+def _between(problem: Problem) -> float:
+    """Times that the shortest stretch without a switch fits into its recording."""
+    shortest = [np.diff([e.t0, *e.breakpoints(), e.t1]).min() / (e.t1 - e.t0)
+                for e in problem.experiments]
+    return 1.0 / float(min(shortest))

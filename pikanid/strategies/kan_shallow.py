@@ -33,15 +33,16 @@ FACTOR, LARGEST = 10.0, 1e8  # of the λ-continuation
 Tell = Callable[[int, Sequence[Stage]], None]
 
 
-def shallow_fit(setup: Setup, grid: KanGrid, *, refine: bool, max_grid: int, lam: float | None,
-                tell: Tell) -> RelaxedFit:
+def shallow_fit(setup: Setup, grid: KanGrid, *, cells: float | None, max_grid: int,
+                lam: float | None, tell: Tell) -> RelaxedFit:
     """The fit on one grid, or on finer and finer ones until the parameters stay where they are.
 
+    The first of these has at least `cells` cells; None stands for one grid alone.
     On every grid λ rises tenfold until no parameter moves by more than 0.05 of its standard error;
     the next, finer grid starts from the last one's curve at a tenth of its λ.
     """
-    if refine:
-        cells = cells_of(setup)
+    refine = cells is not None
+    if cells is not None:
         while grid.intervals < cells and 2 * grid.intervals <= max_grid:
             grid = grid.refined()
     functional = setup.functional(grid)
@@ -69,13 +70,14 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, refine: bool, max_grid: int, lam
             stages[-1].theta, found[-1].theta, found[-1].std, RELATIVE)
         stages += found
         best = grid, system, outcome
-        if gap <= GRID_SETTLED or not refine or 2 * grid.intervals > max_grid:
+        # where a lock ended the path, a finer grid may take λ further, however little it moved
+        if (gap <= GRID_SETTLED and not remarks) or not refine or 2 * grid.intervals > max_grid:
             break
         grid = grid.refined()
         finer = setup.functional(grid)
         point = _carried(functional, finer, outcome.at.point)
         start, functional = max(1.0, found[-1].lam / FACTOR), finer
-    notes = [] if refine else list(remarks)
+    notes = list(remarks) if gap <= GRID_SETTLED or not refine else []
     if refine and gap > GRID_SETTLED:
         notes.append(errors.grid_not_settled(gap, grid.intervals))
     if not outcome.converged:

@@ -25,7 +25,7 @@ from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.kan_deep import Shape, deep_fit
-from pikanid.strategies.kan_grids import KanGrid
+from pikanid.strategies.kan_grids import MOST_CELLS, MOST_TO_RESOLVE, KanGrid
 from pikanid.strategies.kan_paper import paper_fit
 from pikanid.strategies.kan_shallow import cells_of, shallow_fit
 from pikanid.strategies.kan_trajectories import KanTrajectories
@@ -33,6 +33,7 @@ from pikanid.strategies.relaxation import RelaxedFit, Setup, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
 
 FIRST_GRID = 10
+LEAST_FINEST, FINER = 640, 10
 SHALLOW = (1, 1)
 LAMBDA_RULE = "x10 from the weakest until no parameter moves by 0.05 standard errors"
 Progress = Callable[[dict[str, float]], None]
@@ -59,7 +60,8 @@ class PIKAN:
         meet the physics would lock the fit
     exact_switches : add the known kinks of the trajectory at the input switches
     form : "second_order" or "state", as in `IPDA`
-    max_grid : finest grid tried
+    max_grid : finest grid tried; by default ten times the cells that the fastest linearised motion
+        (a radian a cell) or the switches ask for, between 640 and 20000
     seed : of the starting coefficients of a deeper network
     device : "cpu", or "cuda" for a pykan model that lives on a GPU.  The fit itself is NumPy and
         runs on the CPU either way: at these sizes a GPU has nothing to gain
@@ -82,7 +84,7 @@ class PIKAN:
     lam: float | None = None
     exact_switches: bool = True
     form: Form = "second_order"
-    max_grid: int = 640
+    max_grid: int | None = None
     seed: int = 0
     device: str = "cpu"
     progress: Progress | None = None
@@ -114,21 +116,30 @@ class PIKAN:
             else:
                 fit = self._default(problem)
                 settings["lam_rule"] = "given" if self.lam else LAMBDA_RULE
-            return relaxed_estimate("pikan", fit, settings, begun,
-                                    KanTrajectories.of(fit, self.device))
+            found = relaxed_estimate("pikan", fit, settings, begun,
+                                     KanTrajectories.of(fit, self.device))
+        if found.adequacy.verdict == "misfit" and fit.effective > 2 * fit.theta.size + 2:
+            note = errors.curve_follows_data(fit.effective, fit.theta.size, fit.lam)
+            found = replace(found, warnings=(*found.warnings, note))
+        return found
 
     def _default(self, problem: Problem) -> RelaxedFit:
-        setup, deep = self._setup(problem), len(self.width) > 2
+        setup = self._setup(problem)
+        # w_b's column is full, as those of later layers are: both are trained beside the band
+        deep = len(self.width) > 2 or self.base != "zero"
         longest = max(setup.chains.lengths)
         grid = KanGrid(self.grid or FIRST_GRID, self.degree or max(5, longest + 3),
-                       self.exact_switches, base="zero" if deep else self.base, seed=self.seed)
-        most = self.max_grid
-        if self.grid is None and self.exact_switches and self.degree is None:
-            found = KanGrid.crowded(problem, longest, cells_of(setup))
-            if found is not None:
-                grid, most = found, max(most, 2 * found.intervals)
-        fit = shallow_fit(setup, grid, refine=self.grid is None, max_grid=most, lam=self.lam,
-                          tell=self._tell)
+                       self.exact_switches, seed=self.seed)
+        cells = min(cells_of(setup), MOST_TO_RESOLVE)
+        crowded = (KanGrid.crowded(problem, longest, cells)
+                   if self.grid is None and self.exact_switches and self.degree is None else None)
+        if crowded is not None:
+            grid, cells = crowded, float(crowded.intervals)
+        elif self.exact_switches:
+            cells = max(cells, KanGrid.resolving(problem))
+        finest = self.max_grid or max(LEAST_FINEST, min(int(FINER * cells), MOST_CELLS))
+        fit = shallow_fit(setup, grid, cells=cells if self.grid is None else None, max_grid=finest,
+                          lam=self.lam, tell=self._tell)
         if not deep or not fit.stages:
             return fit
         if self.grid is not None:  # what the shallow one lacks on this grid, this one may have

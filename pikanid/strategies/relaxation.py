@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from pikanid.chains import Chains
 from pikanid.functional import Functional, Sites, bind
 from pikanid.optimise.covariance import effective_parameters, theta_covariance
 from pikanid.optimise.gauss_newton import (
+    MAX_ITERATIONS,
     BandedSystem,
     Linearisation,
     Outcome,
@@ -31,13 +32,13 @@ from pikanid.simulation.lowering import lower_model
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.first_points import from_simulation, transfer
 from pikanid.strategies.grids import Discretisation, Grid
+from pikanid.strategies.locks import follows_physics
 
 # The grid is fine enough once halving it moves no parameter by more than this many standard errors.
 GRID_SETTLED = 0.05
 MAX_REFINEMENTS = 6
 # A move this large says that the coarser grid misled the fit: it starts anew on the finer one.
 GRID_MISLED = 10.0
-MAX_ITERATIONS = 100  # at one λ
 # A data cost up to this multiple of what noise explains ends the search for a better path.
 EXPLAINED = 1.5
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
@@ -233,6 +234,8 @@ def follow(system: BandedSystem, point: Point,
                                      iterations=MAX_ITERATIONS))
         point = outcomes[-1].at.point
         stages.append(_stage(system, lam, outcomes[-1]))
+        if plan.locked(stages) and follows_physics(system, point, lam):
+            stages[-1] = replace(stages[-1], free=True)
         lam = plan.next(stages)
     kept = plan.keep(stages)
     notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
