@@ -1,0 +1,36 @@
+"""The figure of a next experiment: what to run, and what each hypothesis foretells."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pikanid.plots import COLOURS, DASHES, DPI
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pikanid.mismatch.experiments import NextExperiment
+
+
+def design_figure(chosen: NextExperiment) -> Figure:
+    """Inputs above, the foretold outputs of every hypothesis below."""
+    from matplotlib.figure import Figure
+
+    inputs = list(chosen.profile.channels.values())
+    outputs = list(next(iter(chosen.responses.values())))
+    rows = len(inputs) + len(outputs)
+    figure = Figure(figsize=(8.0, 1.2 + 1.7 * rows), dpi=DPI, layout="constrained")
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    for axis, channel in zip(axes, inputs, strict=False):
+        axis.step(channel.time, channel.values, where="post", color="0.2", linewidth=1.0)
+        axis.set_ylabel(f"{channel.name} [{channel.unit}]" if channel.unit else channel.name)
+    for axis, output in zip(axes[len(inputs):], outputs, strict=True):
+        for k, (name, response) in enumerate(chosen.responses.items()):
+            axis.plot(*response[output], color=COLOURS[k % len(COLOURS)],
+                      linestyle=DASHES[k % len(DASHES)], linewidth=1.0, label=name)
+        axis.set_ylabel(output)
+        if len(chosen.responses) > 1:
+            axis.legend(loc="upper right", ncols=2)
+    axes[-1].set_xlabel("t [s]")
+    figure.suptitle(chosen.profile.name)
+    return figure

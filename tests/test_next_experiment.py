@@ -1,0 +1,276 @@
+"""Feasible profiles, distances between models, and the experiment that tells most."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares, minimize
+
+import pikanid as pk
+from pikanid import errors, excitation, systems
+from pikanid.mismatch.experiments import d_optimal, next_experiment
+from pikanid.mismatch.profiles import Bounds, motion, profiles, scaled
+from pikanid.mismatch.seen import Watched, joined, natural_frequency, seen
+from pikanid.mismatch.separation import distance, mean_precision, refitted, unexplained
+from pikanid.model import Model, Parameter
+
+SIGMA = 0.1 * np.pi / 180
+POSITIVE = (0.0, np.inf)
+
+
+def friction(c: float) -> Model:
+    return systems.sloshing().with_term(
+        "theta_dot", "-c*sign(theta_dot)", [Parameter("c", c, bounds=POSITIVE)])
+
+
+def drag(q: float) -> Model:
+    return systems.sloshing().with_term(
+        "theta_dot", "-q*abs(theta_dot)*theta_dot", [Parameter("q", q, bounds=POSITIVE)])
+
+
+# --- profiles ----------------------------------------------------------------------------------
+
+
+def test_motion_is_that_of_piecewise_constant_acceleration() -> None:
+    u, dt = np.array([2.0, 2.0, -1.0, 0.0, 0.0]), 0.5
+    velocity, position = motion(u, dt)
+    assert velocity == pytest.approx([0.0, 1.0, 2.0, 1.5, 1.5])
+    # x = v t + a t²/2 over each step
+    assert position == pytest.approx([0.0, 0.25, 1.0, 1.875, 2.625])
+
+
+@pytest.mark.parametrize("bounds", [Bounds(), Bounds(4.0, 1.0, 0.5), Bounds(0.3, np.inf, np.inf)])
+def test_profiles_keep_to_the_drive_s_bounds(bounds: Bounds) -> None:
+    kinds = set()
+    for profile in profiles(2.35, bounds, seed=1):
+        u, t = profile["u_x"].values, profile.t
+        velocity, position = motion(u, 0.01)
+        assert np.all(u[t < 2.0] == 0)
+        assert np.max(np.abs(u)) <= bounds.acceleration
+        assert np.max(np.abs(velocity)) <= bounds.velocity
+        assert np.ptp(position) <= bounds.stroke
+        assert abs(velocity[-1]) < 2e-3
+        kinds.add(profile.name.split(",")[0])
+        if "full" in profile.name:  # nothing is given away
+            shares = [np.max(np.abs(u)) / bounds.acceleration,
+                      np.max(np.abs(velocity)) / bounds.velocity, np.ptp(position) / bounds.stroke]
+            assert max(shares) == pytest.approx(1.0, abs=1e-3)
+    assert len(kinds) == 7
+
+
+def test_profiles_are_the_same_for_a_seed_and_differ_between_draws() -> None:
+    first, again, other = (profiles(2.35, seed=s, draws=2) for s in (0, 0, 1))
+    assert all(np.array_equal(a["u_x"].values, b["u_x"].values)
+               for a, b in zip(first, again, strict=True))
+    assert not np.array_equal(first[4]["u_x"].values, other[4]["u_x"].values)
+    assert len({p.name for p in first}) == len(first)
+
+
+@pytest.mark.parametrize("wrong", [
+    {"duration": 2.5}, {"frequency": 12.0}, {"frequency": 0.0}, {"quiet": 19.9}])
+def test_profiles_that_cannot_be(wrong: dict[str, float]) -> None:
+    with pytest.raises(errors.BadSetting, match="profile"):
+        profiles(**{"frequency": 2.35, **wrong})  # type: ignore[arg-type]
+    with pytest.raises(errors.BadSetting, match="velocity"):
+        Bounds(velocity=0.0)
+
+
+def test_scaled_profile_is_smaller() -> None:
+    profile = profiles(2.35, seed=3)[6]
+    smaller = scaled(profile, 1 / 3)
+    assert np.all(np.abs(smaller["u_x"].values) <= np.abs(profile["u_x"].values) / 3 + 1e-6)
+
+
+# --- distances ---------------------------------------------------------------------------------
+
+
+def pendulum(length: float, damping: float) -> np.ndarray:
+    """Eq. (6) under the two pulses by SciPy, restarted at each switch, in σ."""
+    t, theta, x = excitation.two_pulse().t, np.zeros(501), np.zeros(2)
+    cuts = [(0.0, 0.2, 0.0), (0.2, 0.6, 1.0), (0.6, 1.2, 0.0), (1.2, 1.6, -1.0), (1.6, 5.0, 0.0)]
+    for start, stop, u in cuts:
+        inside = (t >= start - 1e-9) & (t <= stop + 1e-9)
+
+        def rhs(_: float, x: np.ndarray, u: float = u) -> list[float]:
+            return [x[1], (u * np.cos(x[0]) - 9.81 * np.sin(x[0])) / length
+                    - damping / 0.3 * x[1] * np.cos(x[0]) ** 2]
+
+        done = solve_ivp(rhs, (start, stop), x, t_eval=np.clip(t[inside], start, stop),
+                         method="DOP853", rtol=1e-11, atol=1e-13)
+        theta[inside], x = done.y[0], done.y[:, -1]
+    return theta / SIGMA
+
+
+def test_response_agrees_with_scipy_and_its_differences() -> None:
+    response = seen(systems.sloshing(), excitation.two_pulse(), SIGMA)
+    assert response.y == pytest.approx(pendulum(0.045, 0.15), abs=0.02)
+    for k, (dl, dd) in enumerate(((1e-6, 0.0), (0.0, 1e-5))):
+        up, down = pendulum(0.045 + dl, 0.15 + dd), pendulum(0.045 - dl, 0.15 - dd)
+        slope = (up - down) / 2 / (dl + dd)
+        assert response.jacobian[:, k] == pytest.approx(slope, abs=2e-3 * np.max(np.abs(slope)))
+
+
+def test_unexplained_agrees_with_bounded_least_squares() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        J, r = rng.normal(size=(40, 3)) * [1.0, 100.0, 1e-3], rng.normal(size=40)
+        low, high = np.array([-np.inf, 0.0, -50.0]), np.array([0.02, np.inf, 50.0])
+        wanted = least_squares(lambda d, J=J, r=r: r - J @ d, np.full(3, 1e-9),
+                               bounds=(low, high), x_scale=[1.0, 0.01, 1e3], xtol=1e-14,
+                               ftol=1e-14)
+        assert np.sum(unexplained(r, J, low, high) ** 2) == pytest.approx(2 * wanted.cost, rel=1e-5)
+
+
+def test_parameter_without_influence_explains_nothing() -> None:
+    r, free = np.arange(4.0), np.full(2, np.inf)
+    J = np.array([np.zeros(4), np.ones(4)]).T
+    assert unexplained(r, J, -free, free) == pytest.approx(r - 1.5)
+
+
+def closest(rival: Watched, truth: np.ndarray, starts: np.ndarray) -> float:
+    """Distance after a search that knows no derivatives, in units of the starts."""
+    def misfit(q: np.ndarray) -> float:
+        return float(np.sum((rival.at(np.abs(q) * unit).y - truth) ** 2))
+
+    unit = starts[0]
+    best = minimize(misfit, np.ones(len(unit)), method="Nelder-Mead", options={
+        "initial_simplex": starts / unit, "maxfev": 300, "xatol": 1e-7, "fatol": 1e-6})
+    return float(np.sqrt(best.fun))
+
+
+def test_distance_is_that_of_a_refit() -> None:
+    """For a small effect the first order is what refitting the rival's simulation finds."""
+    e, nominal = excitation.two_pulse(), systems.sloshing()
+    truth = seen(drag(0.01), e, SIGMA)
+    searched = closest(Watched(nominal, e, SIGMA), truth.y,
+                       np.array([[0.045, 0.15], [0.04501, 0.15], [0.045, 0.16]]))
+    assert distance([truth], [seen(nominal, e, SIGMA)]) == pytest.approx(searched, rel=0.02)
+    assert refitted([truth], nominal, [e], SIGMA) == pytest.approx(searched, rel=1e-3)
+
+
+def test_refit_goes_where_the_first_order_does_not() -> None:
+    """Another length is no other physics, however far away it is."""
+    e, nominal = excitation.two_pulse(), systems.sloshing()
+    truth = seen(nominal.with_values(l_theta=0.047, d_theta=0.3), e, SIGMA)
+    assert distance([truth], [seen(nominal, e, SIGMA)]) > 20
+    assert refitted([truth], nominal, [e], SIGMA) < 0.5
+
+
+def test_signs_separate_what_a_line_could_not() -> None:
+    """Drag looks like friction with the other sign: at q >= 0 it explains none of it."""
+    e = excitation.two_pulse(20.0)
+    bounded = distance([seen(friction(0.1), e, SIGMA)], [seen(drag(0.0), e, SIGMA)])
+    nominal = distance([seen(friction(0.1), e, SIGMA)], [seen(systems.sloshing(), e, SIGMA)])
+    loose = systems.sloshing().with_term(
+        "theta_dot", "-q*abs(theta_dot)*theta_dot", [Parameter("q", 0.0)])
+    free = distance([seen(friction(0.1), e, SIGMA)], [seen(loose, e, SIGMA)])
+    assert bounded == pytest.approx(nominal, rel=1e-6)
+    assert free < 0.9 * bounded
+
+
+def test_free_initial_states_belong_to_their_recording() -> None:
+    model = systems.sloshing().with_initial(theta="free")
+    one = seen(model, excitation.two_pulse(), SIGMA)
+    both = joined([one, one])
+    assert both.jacobian.shape == (2 * 501, 4)
+    assert np.all(both.jacobian[501:, 2] == 0)
+    assert np.all(both.jacobian[:501, 3] == 0)
+    assert both.jacobian[501:, 3] == pytest.approx(one.jacobian[:, 2])
+
+
+def test_natural_frequency() -> None:
+    assert natural_frequency(systems.sloshing()) == pytest.approx(
+        np.sqrt(9.81 / 0.045 - 0.25**2) / 2 / np.pi)
+    decay = Model.from_dict({
+        "name": "decay", "states": {"x": {"initial": 1.0}}, "parameters": {"k": {"guess": 0.5}},
+        "equations": {"x": "-k*x"}, "outputs": {"x": {"expression": "x"}}})
+    assert natural_frequency(decay) is None
+
+
+# --- the next experiment -----------------------------------------------------------------------
+
+
+def test_best_profile_is_the_one_that_a_refit_would_choose() -> None:
+    offered = profiles(2.35, duration=10.0, draws=1)[:6]
+    models = {"friction": friction(0.3), "drag": drag(0.3)}
+    chosen = next_experiment(models, sigma=SIGMA, candidates=offered)
+    values = [value for _, value in chosen.ranking]
+    assert values == sorted(values, reverse=True)
+    assert (chosen.profile.name, chosen.value) == chosen.ranking[0]
+    truth = seen(models["drag"], chosen.profile, SIGMA).y
+    starts = np.array([0.045, 0.2, 0.01]) + np.vstack([np.zeros(3), np.diag([2e-4, 0.1, 0.05])])
+    rival = Watched(models["friction"], chosen.profile, SIGMA)
+    # The other way round may be closer, but this one is not.
+    assert chosen.value <= 1.01 * closest(rival, truth, starts)
+
+
+def test_what_was_recorded_before_counts() -> None:
+    models = {"friction": friction(0.3), "drag": drag(0.3)}
+    e = excitation.two_pulse()
+    chosen = next_experiment(models, recorded=e, sigma=SIGMA, candidates=[e])
+    # The same again: √2 times as far apart, and no better than a repetition.
+    assert chosen.value == pytest.approx(np.sqrt(2) * chosen.before, rel=1e-6)
+    assert chosen.gain == pytest.approx(1.0)
+
+
+def test_more_noise_separates_less() -> None:
+    models = {"friction": friction(0.3), "drag": drag(0.3)}
+    e = [excitation.two_pulse(20.0)]
+    near, far = (next_experiment(models, sigma=s, candidates=e).value for s in (10 * SIGMA, SIGMA))
+    assert far == pytest.approx(10 * near, rel=1e-2)
+
+
+def test_limits_make_profiles_smaller() -> None:
+    chosen = d_optimal(systems.sloshing(), sigma=SIGMA, limits={"theta": 0.05},
+                       candidates=[excitation.two_pulse()])
+    reached = np.max(np.abs(pk.simulate(systems.sloshing(), chosen.profile)["theta"].values))
+    assert 0.04 < reached <= 0.05
+
+
+def test_d_optimal_agrees_with_the_cramer_rao_bound() -> None:
+    offered = [excitation.two_pulse(), excitation.two_pulse(amplitude=0.3), excitation.move(0.1)]
+    chosen = d_optimal(systems.sloshing(), sigma=SIGMA, candidates=offered)
+    bounds = [pk.uncertainty.cramer_rao(systems.sloshing(), e, SIGMA) for e in offered]
+    volumes = [np.linalg.det(bound.fisher) for bound in bounds]
+    assert chosen.profile.name == offered[int(np.argmax(volumes))].name
+    assert chosen.value == pytest.approx(max(volumes) ** 0.25, rel=1e-4)
+    assert chosen.std["d_theta"] == pytest.approx(
+        bounds[int(np.argmax(volumes))].std("d_theta"), rel=1e-4)
+
+
+def test_precision_of_a_blind_experiment_is_zero() -> None:
+    assert mean_precision(np.zeros((5, 2))) == 0.0
+    assert mean_precision(np.ones((5, 2))) == 0.0
+    assert mean_precision(np.diag([4.0, 9.0])) == pytest.approx(6.0)
+
+
+def test_profile_is_ready_to_run(tmp_path: Path) -> None:
+    chosen = d_optimal(systems.sloshing(), sigma=SIGMA, duration=6.0)
+    chosen.save(tmp_path / "next.csv")
+    again = pk.Recording.read(tmp_path / "next.csv")
+    assert again["u_x"].unit == "m/s^2"
+    assert np.array_equal(again["u_x"].values, chosen.profile["u_x"].values)
+    figure = chosen.plot()
+    assert [a.get_ylabel() for a in figure.axes] == ["u_x [m/s^2]", "theta"]
+    assert "l_theta" in str(chosen)
+    assert chosen.to_dict()["profile"] == chosen.profile.name
+
+
+def test_what_cannot_be_designed() -> None:
+    with pytest.raises(errors.BadSetting, match="hypotheses"):
+        next_experiment({"only": friction(0.3)}, sigma=SIGMA)
+    with pytest.raises(errors.BadSetting, match="free parameter"):
+        d_optimal(systems.sloshing().fix("l_theta", "d_theta"), sigma=SIGMA)
+    with pytest.raises(errors.BadSetting, match="noise"):
+        d_optimal(systems.sloshing(), candidates=[excitation.two_pulse()])
+    with pytest.raises(errors.SimulationFailed, match="profiles"):
+        d_optimal(systems.sloshing(), sigma=SIGMA, limits={"theta": 1e-9},
+                  candidates=[])
+    still = Model.from_dict({
+        "name": "still", "states": {"x": {"initial": 1.0}}, "parameters": {"k": {"guess": 0.5}},
+        "equations": {"x": "-k*x"}, "outputs": {"x": {"expression": "x"}}})
+    with pytest.raises(errors.BadSetting, match="drive"):
+        d_optimal(still, sigma=0.1)
