@@ -88,7 +88,7 @@ def _with_prior(model: Model, recording: Recording, precision: np.ndarray, probl
     for k, row in enumerate(rows):
         expression = sp.Add(*(float(v) * n for v, n in zip(row, names, strict=True) if v != 0.0))
         outputs.append(Output(f"prior_{k}", expression))
-        # a channel has two samples at least: each says half
-        channels.append(Channel(f"prior_{k}", ends, np.zeros(2), "", float(np.sqrt(2.0))))
+        # a channel that says the same twice counts as dead: zero is the mean of ±1, each half sure
+        channels.append(Channel(f"prior_{k}", ends, np.array([1.0, -1.0]), "", float(np.sqrt(2.0))))
     return (model.replace(outputs=(*model.outputs, *outputs)),
             recording.with_channels(*channels))
