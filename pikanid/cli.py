@@ -20,6 +20,8 @@ from pikanid.commands.diagnose import EXAMPLES as DIAGNOSE
 from pikanid.commands.diagnose import diagnose
 from pikanid.commands.equivalence import EXAMPLES as EQUIVALENCE
 from pikanid.commands.equivalence import equivalence
+from pikanid.commands.extract import EXAMPLES as EXTRACT
+from pikanid.commands.extract import extract
 from pikanid.commands.identify import EXAMPLES as IDENTIFY
 from pikanid.commands.identify import identify
 from pikanid.commands.models import EXAMPLES as MODELS
@@ -53,6 +55,7 @@ app.command(epilog=SIMULATE)(simulate)
 app.command(epilog=MODELS)(models)
 app.command(epilog=STUDY)(study)
 app.command(epilog=EQUIVALENCE)(equivalence)
+app.command(epilog=EXTRACT)(extract)
 app.command(epilog=CONCEAL)(conceal)
 
 

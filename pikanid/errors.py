@@ -809,6 +809,24 @@ def no_law_simulated() -> str:
     return "None of the laws tried can be simulated along the recording: read without recordings."
 
 
+def no_edges(model: str) -> str:
+    return (
+        f"The estimate of '{model}' holds no edges to read: give one that kan_discrepancy made, or "
+        "a KAN."
+    )
+
+
+def not_a_network(path: str) -> str:
+    return f"'{path}' is neither a saved KAN (.npz, .json) nor a saved estimate (.json, .json.gz)."
+
+
+def extract_columns(names: Sequence[str], known: Sequence[str]) -> str:
+    return (
+        f"The data have no columns {', '.join(names)}; they have {', '.join(known)}. Name the "
+        "inputs with --input and the output with --output."
+    )
+
+
 def nothing_to_push() -> str:
     return "This reading is not that of a KAN: there is no pykan model to put it into."
 
@@ -950,6 +968,10 @@ def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: flo
         f"for a model that rings at {frequency:.3g} Hz: leave two periods of motion, and ten "
         "samples a period."
     )
+
+
+def not_in_catalogue(effect: str, known: Iterable[str]) -> str:
+    return f"The experiment could not show an effect '{_short(effect)}' (known: {_listed(known)})."
 
 
 def too_few_hypotheses(given: int) -> str:

@@ -34,7 +34,7 @@ from pikanid.symbolic.significance import Contribution, contributions
 from pikanid.symbolic.tidy import tidied
 
 DRAWN = 120  # points of an edge that are compared
-TRUE_TO = 0.003  # of its spread: how far a network without data is believed
+TRUE_TO = 0.01  # of its spread: how far a network without data is believed
 
 
 def read_network(kan: Any, x: Array | None = None, y: Array | None = None, *,

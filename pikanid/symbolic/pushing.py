@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from pikanid.approximators.kan.push import SymbolicEdge
 from pikanid.approximators.kan.push import push as fix
 from pikanid.expressions import symbol
 from pikanid.symbolic.library import NOTHING, X
-from pikanid.symbolic.numeric import compiled
+from pikanid.symbolic.numeric import Array, compiled
 from pikanid.symbolic.reading import Reading
 
 
@@ -38,7 +37,7 @@ def push(reading: Reading) -> Any:
         own = [*form.amplitudes, *(k.name for k in form.knobs)]
         swap = {symbol(n): sp.Float(float(v)) for n, v in zip(own, theta[at], strict=True)}
         formula = (form.expression - symbol("d")).xreplace(swap)
-        edges[place] = SymbolicEdge(form.name, _torch(formula), _formula(formula))
+        edges[place] = SymbolicEdge(form.name, _function(formula), _formula(formula))
     offsets = tuple(np.array(theta[first:first + made.subnodes(layer)])
                     for layer, first in enumerate(made.offsets))
     live = {(e.layer, e.source, e.target) for e in edges_of(DeepKAN(reading.kan))}
@@ -46,10 +45,9 @@ def push(reading: Reading) -> Any:
     return fix(reading.kan, edges, offsets, gone)
 
 
-def _torch(formula: sp.Expr) -> Callable[[Any], Any]:
-    torch = import_module("torch")
+def _function(formula: sp.Expr) -> Callable[[Array], Array]:
     function = compiled((X,), (formula,))
-    return lambda u: torch.from_numpy(np.array(function(u.detach().cpu().numpy())[0]))
+    return lambda u: function(u)[0]
 
 
 def _formula(formula: sp.Expr) -> Callable[[sp.Expr], sp.Expr]:

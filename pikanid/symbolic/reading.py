@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid import errors
-from pikanid.estimate import rounded
+from pikanid.estimate import Estimate, rounded
 from pikanid.expressions import symbol
 from pikanid.model import Parameter
 from pikanid.symbolic.composed import Composition, Groups, Place
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ADEQUATE = 1e-3  # level of the test against the network
-CLOSE = 0.01  # share of the spread that may be left where no data can judge
+CLOSE = 0.03  # share of the spread that may be left where no data can judge
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,7 @@ class Reading:
     units : of the constants, "" where not known
     kan, composition, theta : the network that was read, pruned, and the formula in its places with
         all its constants
+    estimate : of the model with the formula in it, where it was refitted inside an ODE
     """
 
     expression: sp.Expr
@@ -70,6 +71,7 @@ class Reading:
     kan: Any = field(default=None, repr=False)
     composition: Composition | None = field(default=None, repr=False)
     theta: Array = field(default_factory=lambda: np.empty(0), repr=False)
+    estimate: Estimate | None = field(default=None, repr=False)
 
     @property
     def ok(self) -> bool:

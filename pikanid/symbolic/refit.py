@@ -53,7 +53,7 @@ def refit(composition: Composition, theta: Array, x: Array, y: Array, generic: A
     from scipy.optimize import least_squares
 
     fixed = np.zeros(composition.count, bool) if held is None else held
-    full = np.array(theta, float)
+    full = _solved_last(composition, np.array(theta, float), x, y, fixed)
     value, J = composition.evaluate(full, x)
     if not (np.isfinite(value).all() and np.isfinite(J).all()):
         return None
@@ -87,6 +87,26 @@ def refit(composition: Composition, theta: Array, x: Array, y: Array, generic: A
         return None
     return Refit(composition, full.copy(), fixed, float(np.sum((y - value) ** 2)),
                  generic, len(y), (exact * spread) ** 2)
+
+
+def _solved_last(composition: Composition, theta: Array, x: Array, y: Array, fixed: Array
+                 ) -> Array:
+    """θ with the last layer's amplitudes and offset, linear as they are, at their best."""
+    last = len(composition.groups) - 1
+    if any(len(g) > 1 for g in composition.groups[last]):
+        return theta
+    linear = [k for place, form, at in composition.edges if place[0] == last
+              for k in range(at.start, at.start + len(form.columns))]
+    linear = [k for k in [*linear, composition.count - 1] if not fixed[k]]
+    value, J = composition.evaluate(theta, x)
+    if not linear or not (np.isfinite(value).all() and np.isfinite(J).all()):
+        return theta
+    columns = J[:, linear]
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    rest = y - value + columns @ theta[linear]
+    solved = np.array(theta)
+    solved[linear] = np.linalg.lstsq(columns / size, rest, rcond=1e-10)[0] / size
+    return solved
 
 
 def generic_jacobian(composition: Composition, x: Array, theta: Array | None = None,

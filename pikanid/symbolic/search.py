@@ -21,6 +21,7 @@ from pikanid.symbolic.numeric import Array
 from pikanid.symbolic.refit import Refit, generic_jacobian, refit
 
 TRIED = 7  # forms an edge
+SIMPLE = ("linear", "quadratic")
 OUTER = 3  # starts
 SEARCHED = 400  # data that a first choice is made on
 POLISHED = 8  # compositions that all data then rank
@@ -38,16 +39,17 @@ class Ranked:
 def shortlist(edge: NamedEdge) -> list[FormFit]:
     """The best form of each of the best families, whatever they leave behind.
 
-    A line and nothing at all are always among them, but never the first.
+    The simplest forms and nothing at all are always among them: where layers or factors have shared
+    a law in their own way, an edge alone does not show them.
     """
     best: dict[str, FormFit] = {}
     for c in sorted(edge.candidates, key=lambda c: c.score):
         best.setdefault(c.form.family, c.fit)
-    plain = [best.pop(name) for name in (NOTHING.family, "linear") if name in best]
+    empty = [best.pop(NOTHING.family)] if NOTHING.family in best else []
+    simple = [best.pop(name) for name in SIMPLE if name in best]
     ranked = list(best.values())
-    straight = [f for f in plain if f.form is not NOTHING]
-    first = sorted([*ranked[:1], *straight], key=lambda f: f.rss)
-    return [*first, *ranked[1:TRIED], *(f for f in plain if f.form is NOTHING)]
+    first = sorted([*ranked[:1], *simple], key=lambda f: f.rss)
+    return [*first, *ranked[1:TRIED], *empty]
 
 
 def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, NamedEdge],

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from pikanid.approximators.kan.build import read, write
@@ -21,10 +22,10 @@ from pikanid.approximators.kan.state import from_state, to_state
 
 @dataclass(frozen=True, eq=False)
 class SymbolicEdge:
-    """What an edge becomes: its label, the function of torch and the formula of one symbol."""
+    """What an edge becomes: its label, the function of arrays and the formula of one symbol."""
 
     label: str
-    function: Callable[[Any], Any]
+    function: Callable[[Array], Array]
     formula: Callable[[sp.Expr], sp.Expr]
 
 
@@ -51,9 +52,9 @@ def push(kan: Any, edges: Mapping[tuple[int, int, int], SymbolicEdge],
             for (layer, i, s), edge in edges.items():
                 symbolic = made.symbolic_fun[layer]
                 symbolic.funs_name[s][i] = edge.label
-                symbolic.funs[s][i] = edge.function
+                symbolic.funs[s][i] = _on_tensors(edge.function)
                 symbolic.funs_sympy[s][i] = edge.formula
-                symbolic.funs_avoid_singularity[s][i] = _plainly(edge.function)
+                symbolic.funs_avoid_singularity[s][i] = _plainly(_on_tensors(edge.function))
                 affine = read(symbolic.affine)
                 affine[s, i] = (1.0, 0.0, 1.0, 0.0)
                 write(symbolic.affine, affine)
@@ -68,6 +69,11 @@ def push(kan: Any, edges: Mapping[tuple[int, int, int], SymbolicEdge],
         library.clear()
         library.update(before)
     return made
+
+
+def _on_tensors(function: Callable[[Array], Array]) -> Callable[[Any], Any]:
+    torch = import_module("torch")
+    return lambda u: torch.from_numpy(np.array(function(u.detach().cpu().numpy()))).to(u.device)
 
 
 def _plainly(function: Callable[[Any], Any]) -> Callable[[Any, Any], tuple[Any, Any]]:

@@ -1,0 +1,113 @@
+"""Named edges of an equation as one sum of laws, with names for all constants."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from pikanid.estimate import Estimate
+from pikanid.expressions import symbol
+from pikanid.model import Model, Parameter
+from pikanid.symbolic.composed import Place
+from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.fitting import FormFit
+from pikanid.symbolic.library import NOTHING, X
+from pikanid.symbolic.named import NO_SIMPLE_FORM, NamedEdge
+from pikanid.symbolic.reading import ADEQUATE, Reading
+from pikanid.symbolic.significance import Contribution
+
+
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """One law on every edge that has one; the parameters' values are those of `fits`."""
+
+    fits: Mapping[Place, FormFit]
+    expression: sp.Expr
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def label(self) -> str:
+        """The laws' names."""
+        return "; ".join(f.form.name for f in self.fits.values())
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of all constants, edge by edge."""
+        from scipy.linalg import block_diag
+
+        blocks = [f.covariance[:-1, :-1] for f in self.fits.values()]
+        return np.asarray(block_diag(*blocks)) if blocks else np.zeros((0, 0))
+
+
+def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, FormFit]) -> Laws:
+    """The sum without the laws' offsets, which the equation's own constant part holds.
+
+    Parameters
+    ----------
+    model : in whose names the arguments are, and whose names the constants must not take
+    arguments : of every edge, by its number
+    fits : the laws, by place (0, number, 0)
+    """
+    terms, parameters = [], []
+    taken = set(model.symbols)
+    for (_, k, _), fit in fits.items():
+        tail = re.sub(r"\W+", "_", arguments[k]).strip("_")
+        swap: dict[sp.Symbol, sp.Expr] = {}
+        names = [*fit.form.amplitudes, *(q.name for q in fit.form.knobs)]
+        for name, value in zip(names, [*fit.amplitudes, *fit.inside], strict=True):
+            full = f"{name}_{tail}"
+            while full in taken:
+                full += "_"
+            taken.add(full)
+            swap[symbol(name)] = symbol(full)
+            parameters.append(Parameter(full, float(value), description=f"of {arguments[k]}"))
+        argument = model.formula(arguments[k], f"argument '{arguments[k]}'")
+        bare = fit.form.expression - symbol("d")
+        terms.append(bare.xreplace({**swap, X: argument}))
+    return Laws(fits, sp.Add(*terms), tuple(parameters))
+
+
+def chosen(named: Mapping[Place, NamedEdge]) -> dict[Place, FormFit]:
+    """The named law of every edge that has one."""
+    return {p: e.best.fit for p, e in named.items()
+            if e.name not in (NO_SIMPLE_FORM, NOTHING.name)}
+
+
+def reading_of_laws(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Sequence[str],
+                    ranges: Sequence[tuple[float, float]],
+                    contributions: Sequence[Contribution], share: np.ndarray,
+                    labels: Sequence[str], covariance: np.ndarray,
+                    estimate: Estimate | None = None) -> Reading:
+    """The answer; `estimate` is of the model with the laws in it, where they were refitted."""
+    off, size, adequate = 0.0, 0.0, [1.0]
+    for place, edge in named.items():
+        fit = laws.fits.get(place)
+        shown = _apart(edge.curve, edge.curve.y)
+        size += float(np.mean(shown**2))
+        if fit is None:
+            off += float(np.mean(shown**2)) if edge.name == NO_SIMPLE_FORM else 0.0
+            adequate.append(0.0 if edge.name == NO_SIMPLE_FORM else 1.0)
+            continue
+        off += float(np.mean(_apart(edge.curve, edge.curve.y - fit.values) ** 2))
+        adequate.append(next(c.adequacy for c in edge.candidates if c.form is fit.form))
+    p_value = min(adequate) if estimate is None else estimate.adequacy.p_value
+    if estimate is not None and estimate.adequacy.verdict == "fits":
+        p_value = max(p_value, ADEQUATE)  # the verdict counts where no noise was stated
+    return Reading(
+        laws.expression, tuple(p.name for p in laws.parameters),
+        np.array([p.value for p in laws.parameters]), covariance, tuple(arguments), tuple(ranges),
+        dict(named), tuple(contributions), float(share[0]),
+        tuple(zip(labels[1:], map(float, share[1:]), strict=False)), float(np.sqrt(off)),
+        None if estimate is None else estimate.rmse, float(np.sqrt(size)), float(p_value),
+        {place: laws.fits[place].form.name if place in laws.fits else edge.name
+         for place, edge in named.items()}, estimate=estimate)
+
+
+def _apart(curve: Curve, values: np.ndarray) -> np.ndarray:
+    """Values (n,) without their constant and gauge parts."""
+    columns = np.column_stack([np.ones(len(curve.x)), curve.free])
+    return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=1e-10)[0])

@@ -1,0 +1,108 @@
+"""Reads a discrepancy: the laws that a model lacks, named, and refitted inside the ODE.
+
+An edge is gauge-fixed: whatever the free parameters can do in its place has been taken out of it.
+A law is therefore compared with the gauge's own functions as free columns beside it.  Where the
+recordings are given, the most probable laws are put into the equation one after the other, all
+parameters are estimated again through the simulation, and BIC of the recordings decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import islice, product
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.discrepancy.result import Discrepancy, Edge
+from pikanid.estimate import Estimate
+from pikanid.model import Model
+from pikanid.recording import Recording
+from pikanid.symbolic.composed import Place
+from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.laws import Laws, chosen, reading_of_laws, sum_of_laws
+from pikanid.symbolic.library import NOTHING, Form
+from pikanid.symbolic.named import NamedEdge
+from pikanid.symbolic.naming import name_curve, priors
+from pikanid.symbolic.reading import Reading, probabilities
+from pikanid.symbolic.search import shortlist
+from pikanid.symbolic.significance import Contribution
+
+DRAWN = 120  # points of an edge that are compared
+TRIED = 4  # laws an edge that are put into the equation
+MOST = 16  # combinations of them
+
+
+def read_discrepancy(found: Discrepancy, library: Sequence[Form],
+                     recordings: Recording | Sequence[Recording] | None = None) -> Reading:
+    """A formula for what is missing; without recordings, by the edges alone."""
+    places = {(0, k, 0): edge for k, edge in enumerate(found.edges)}
+    named = {place: name_curve(edge_curve(edge, found.estimate.n), library)
+             for place, edge in places.items() if edge.significant}
+    arguments = [e.argument for e in found.edges]
+    ranges = [e.range for e in found.edges]
+    weights = [Contribution(0, k, 0, float(np.sqrt(np.mean(e.values**2))),
+                            float(np.sqrt(np.mean(e.std**2))), e.p_value)
+               for k, e in enumerate(found.edges)]
+    if not named or recordings is None:
+        laws = sum_of_laws(found.nominal.model, arguments, chosen(named))
+        share = np.array([float(np.prod([e.probability for e in named.values()]))])
+        return reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
+                               laws.covariance)
+    tried = _tried(found, named, recordings, priors(library))
+    share = probabilities([score for score, _, _ in tried])
+    _, laws, estimate = tried[0]
+    at = [estimate.index(p.name) for p in laws.parameters]
+    refitted = replace(laws, parameters=tuple(
+        replace(p, value=float(estimate.theta[k]))
+        for p, k in zip(laws.parameters, at, strict=True)))
+    return reading_of_laws(refitted, named, arguments, ranges, weights, share,
+                           [one.label for _, one, _ in tried],
+                           estimate.covariance[np.ix_(at, at)], estimate)
+
+
+def edge_curve(edge: Edge, samples: int) -> Curve:
+    """An edge of a discrepancy, ready to be named: at visited arguments, its gauge free."""
+    visited = np.sort(edge.gauge.a)
+    at = np.unique(visited[np.linspace(0, len(visited) - 1, DRAWN).round().astype(int)])
+    return Curve.of_spline(
+        at, edge.gauge.plan.basis(at), edge.coefficients, edge.covariance, samples=samples,
+        free=edge.gauge_functions(at), argument=edge.argument, unit=edge.unit,
+        x_unit=edge.argument_unit)
+
+
+def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
+           recordings: Recording | Sequence[Recording], weights: Mapping[str, float]
+           ) -> list[tuple[float, Laws, Estimate]]:
+    """Laws inside the ODE, best first: BIC less twice the log of the prior, law, estimate."""
+    from pikanid.strategies.nls import NLS
+
+    lists = [[(place, fit) for fit in shortlist(edge) if fit.form is not NOTHING][:TRIED]
+             for place, edge in named.items()]
+    arguments = [e.argument for e in found.edges]
+    results = []
+    for choice in islice(product(*lists), MOST):
+        law = sum_of_laws(found.nominal.model, arguments, dict(choice))
+        try:
+            estimate = NLS().fit(_extended(found, law), recordings)
+        except errors.SimulationFailed:
+            continue
+        prior = sum(np.log(weights[fit.form.name]) for _, fit in choice)
+        results.append((_score(estimate) - 2.0 * float(prior), law, estimate))
+    if not results:
+        raise errors.SimulationFailed(errors.no_law_simulated())
+    return sorted(results, key=lambda r: r[0])
+
+
+def _extended(found: Discrepancy, law: Laws) -> Model:
+    return found.nominal.fitted_model.with_term(found.equation, law.expression, law.parameters)
+
+
+def _score(estimate: Estimate) -> float:
+    """BIC: with χ² where the noise is known."""
+    n, a = estimate.n, estimate.adequacy
+    penalty = len(estimate.theta) * float(np.log(n))
+    if a.source == "given":
+        return a.value + penalty
+    return n * float(np.log(2.0 * estimate.cost / n + 1e-300)) + penalty
