@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Literal
 
 import numpy as np
@@ -38,6 +39,7 @@ class Shooting:
         self.rows = len(self.y)
         self._at: np.ndarray | None = None
         self._kept: tuple[np.ndarray, np.ndarray] | None = None
+        self._tried: tuple[bytes, dict[tuple[int, str, float], Response]] = (b"", {})
 
     def choose_steps(self, theta: np.ndarray, accuracy: Accuracy) -> bool:
         """Choose integration steps at θ; returns whether they changed.
@@ -60,7 +62,8 @@ class Shooting:
             method, finest = self.method, 0.0
             if self.limits:
                 method, finest = self.limits[r].method, self.limits[r].longest / HURRY
-            self.steps.append(simulator.choose_steps(p, tolerance, method, known, finest))
+            trial = functools.partial(self._trial, theta, r)
+            self.steps.append(simulator.choose_steps(p, tolerance, method, known, finest, trial))
         self._at = None
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
@@ -74,8 +77,28 @@ class Shooting:
 
     def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
         """Simulate every recording at θ with sensitivities of its own parameters."""
-        return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
-                for r, s in enumerate(self.simulators)]
+        if states:
+            return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r],
+                          states=True) for r, s in enumerate(self.simulators)]
+        return [self._trial(theta, r, steps, True) for r, steps in enumerate(self.steps)]
+
+    def _trial(self, theta: np.ndarray, r: int, steps: Steps, likely: bool) -> Response:
+        """The response of recording r at θ, with sensitivities if the steps are `likely` used.
+
+        Those at the latest θ are kept: where steps are checked the optimiser starts.
+        """
+        key = (r, steps.method, steps.longest)
+        at = theta.tobytes()
+        if self._tried[0] != at:
+            self._tried = (at, {})
+        kept = self._tried[1]
+        if key in kept:
+            return kept[key]
+        active = self.columns[r][0] if likely else None
+        response = self.simulators[r].run(self.problem.parameters(theta, r), active, steps)
+        if likely:
+            kept[key] = response
+        return response
 
     def residual(self, theta: np.ndarray) -> np.ndarray:
         """(ŷ - y)/σ (rows,)."""
@@ -103,10 +126,9 @@ class Shooting:
             for r, (_, outside) in zip(responses, self.columns, strict=True):
                 jacobian[row:row + len(r.y), outside] = r.sensitivity
                 row += len(r.y)
-        predicted -= self.y
-        predicted *= self.weights
-        jacobian *= self.weights[:, None]
-        return predicted, jacobian
+        residual = predicted - self.y
+        residual *= self.weights
+        return residual, jacobian * self.weights[:, None]
 
     def adequacy(self, theta: np.ndarray) -> Adequacy:
         """The χ² verdict at θ."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any, Literal
@@ -46,6 +47,9 @@ class Response:
     finished: bool = True
     stopped_at: float = np.nan
     status: int = 0
+
+
+Trial = Callable[[Steps, bool], Response]
 
 
 @dataclass(frozen=True)
@@ -116,24 +120,27 @@ class Simulator:
         steps = steps or self.choose_steps(p)
         module = self.module(steps.method)
         grid = self.grid(p)
-        n, A = len(self.model.states), len(active)
-        S0 = np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active])
-        delayed = not self._undelayed and bool(np.any(self._delayed_by[active]))
-        if delayed:
-            dtau_in = delay_jacobian(self.model.inputs, self.model, p)[:, active]
-            dtau_out = delay_jacobian(self.model.outputs, self.model, p)[:, active]
-        else:
-            dtau_in = np.zeros((len(self.model.inputs), A))
-            dtau_out = np.zeros((len(self.model.outputs), A))
-        X = np.empty((len(grid.T) if states else 0, n))
-        Y, J = np.empty(grid.rows), np.empty((grid.rows, A))
+        X = np.empty((len(grid.T) if states else 0, len(self.model.states)))
+        Y, J = np.empty(grid.rows), np.empty((grid.rows, len(active)))
         status, stop = module.integrate(
             grid.T, self._pieces(grid, steps.longest), grid.U, grid.V, grid.jumps,
-            np.ascontiguousarray(dtau_in), np.ascontiguousarray(dtau_out), delayed,
-            self.experiment.initial(p), S0, p, active, *grid.seen, X, Y, J)
+            *self._moved(p, active), self.experiment.initial(p),
+            np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active]), p, active,
+            *grid.seen, X, Y, J)
         # a sum is finite only if everything in it is, and costs a fifth of looking at each
         finite = status == 0 and math.isfinite(Y.sum()) and math.isfinite(J.sum())
         return Response(Y, J, grid.T, X, finite, float(grid.T[stop]), int(status))
+
+    def _moved(self, p: np.ndarray, active: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """∂delay/∂θ of inputs and outputs (channels, A), and whether any is not zero."""
+        if self._undelayed or not np.any(self._delayed_by[active]):
+            A = len(active)
+            return (np.zeros((len(self.model.inputs), A)), np.zeros((len(self.model.outputs), A)),
+                    False)
+        both = (delay_jacobian(c, self.model, p)[:, active]
+                for c in (self.model.inputs, self.model.outputs))
+        dtau_in, dtau_out = map(np.ascontiguousarray, both)
+        return dtau_in, dtau_out, True
 
     def _pieces(self, grid: Grid, longest: float) -> np.ndarray:
         if self._kept.get("pieces_of") is not grid or self._kept.get("longest") != longest:
@@ -142,7 +149,7 @@ class Simulator:
 
     def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
                      method: MethodChoice = "auto", known: Steps | None = None,
-                     finest: float = 0.0) -> Steps:
+                     finest: float = 0.0, trial: Trial | None = None) -> Steps:
         """The longest sub-step whose error, by step doubling, is below `tolerance`.
 
         Runs with steps h and h/2 and takes |y_h - y_{h/2}|·16/15 as the error of h (order 4:
@@ -154,15 +161,20 @@ class Simulator:
         tolerance : of the outputs, in their own units; default 1e-8 of the largest output
         known : coarser steps in use: shorter ones follow from the method's order, checked at p
         finest : give up below this step [s]; at least 1/4096 of the median interval is tried
+        trial : the response at p for given steps and whether these are likely to be chosen; by
+            default simulated without sensitivities
 
         Raises
         ------
         pikanid.errors.SimulationFailed : the trajectory is not finite at p with any step
         """
+        if trial is None:
+            def trial(steps: Steps, _: bool) -> Response:
+                return self._outputs(p, steps)
         grid = self.grid(p)
         spacing = float(np.median(np.diff(grid.T)))
         if known is not None and tolerance:
-            foretold = self._foretold(p, tolerance, known)
+            foretold = _foretold(trial, tolerance, known)
             if foretold is not None:
                 return foretold
         candidates: list[Method] = ["explicit", "implicit"] if method == "auto" else [method]
@@ -170,9 +182,9 @@ class Simulator:
         failure = Response(*(np.empty(0),) * 4)
         for candidate in candidates:
             longest = float(np.max(np.diff(grid.T)))
-            rough = self._outputs(p, Steps(candidate, longest))
+            rough = trial(Steps(candidate, longest), True)
             while longest > max(spacing / FINEST, finest):
-                fine = self._outputs(p, Steps(candidate, longest / 2))
+                fine = trial(Steps(candidate, longest / 2), False)
                 if rough.finished and fine.finished:
                     scale = tolerance or 1e-8 * max(float(np.abs(fine.y).max(initial=0.0)), 1e-12)
                     error = float(np.abs(fine.y - rough.y).max(initial=0.0)) * 16 / 15
@@ -191,21 +203,6 @@ class Simulator:
                 else errors.not_finite(failure.stopped_at, self._where(p)))
         return best
 
-    def _foretold(self, p: np.ndarray, tolerance: float, known: Steps) -> Steps | None:
-        """Steps for `tolerance` by the known order, checked at p; None where that does not hold."""
-        if not known.error > 0:
-            return None
-        ratio = min((tolerance / (4 * known.error)) ** 0.25, 0.5)
-        finer = Steps(known.method, known.longest * ratio)
-        rough, fine = self._outputs(p, known), self._outputs(p, finer)
-        if not rough.finished or not fine.finished:
-            return None
-        gap = float(np.abs(fine.y - rough.y).max(initial=0.0))
-        error = gap * ratio**4 / (1 - ratio**4)
-        asymptotic = gap < 1e-3 * float(np.abs(fine.y).max(initial=0.0))
-        good = asymptotic and error <= tolerance
-        return Steps(known.method, finer.longest, error) if good else None
-
     def _where(self, p: np.ndarray) -> str:
         return ", ".join(f"{n} = {v:.4g}" for n, v in zip(
             self.model.parameter_names, p, strict=True))
@@ -218,3 +215,19 @@ class Simulator:
         finite = response.finished and bool(np.isfinite(response.states).all())
         return Response(response.states.ravel(), response.sensitivity, response.t,
                         response.states, finite, response.stopped_at, response.status)
+
+
+def _foretold(trial: Trial, tolerance: float, known: Steps) -> Steps | None:
+    """Steps for `tolerance` by the known order, checked; None where that does not hold."""
+    if not known.error > 0:
+        return None
+    ratio = min((tolerance / (4 * known.error)) ** 0.25, 0.5)
+    finer = Steps(known.method, known.longest * ratio)
+    rough, fine = trial(known, False), trial(finer, True)
+    if not rough.finished or not fine.finished:
+        return None
+    gap = float(np.abs(fine.y - rough.y).max(initial=0.0))
+    error = gap * ratio**4 / (1 - ratio**4)
+    asymptotic = gap < 1e-3 * float(np.abs(fine.y).max(initial=0.0))
+    good = asymptotic and error <= tolerance
+    return Steps(known.method, finer.longest, error) if good else None
