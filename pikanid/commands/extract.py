@@ -79,7 +79,8 @@ def _load(path: str) -> Any:
     from pikanid.estimate import Estimate
 
     try:
-        start = Path(path).open("rb").read(4096)
+        with open(path, "rb") as file:
+            start = file.read(4096)
     except OSError as problem:
         raise errors.BadSetting(
             errors.cannot_open(path, problem.strerror or "it cannot be read")) from None
