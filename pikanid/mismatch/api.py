@@ -85,7 +85,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
             # the first level was read through the mismatch itself: now it is out of the way
             tell("noise again")
             search = case.search
-            ranked = search.run(lambda h: case.test(h).p_value > 0.05)
+            ranked = search.grow(lambda h: case.test(h).p_value > 0.05)
         tell("confirmation")
         answer = settle(ranked, search.scale(), case.test, case.predicted, case.proves)
     return _diagnosis(case, detection, answer, alpha, begun)
@@ -121,7 +121,7 @@ class Case:
                for a, b in zip(self.records.levels, new.levels, strict=True) for o in a):
             return False
         self.records = new
-        self.search = replace(self.search, records=new, fits={})
+        self.search = self.search.carried_over(new)
         self.base = self.search.base()
         if self.later is not None:
             self.later = Records(self.later.recordings,

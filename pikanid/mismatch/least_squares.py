@@ -59,7 +59,8 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
                 break
             new = np.clip(theta + step, lower, upper)
             expected = float(best - np.sum((r + J @ (new - theta)) ** 2))
-            if expected < tolerance:
+            # far from an explanation nobody needs the last digits
+            if expected < max(tolerance, 2e-5 * best):
                 return Minimum(theta, r, J, True)
             at = evaluate(new)
             if at is not None and float(at[0] @ at[0]) < best:

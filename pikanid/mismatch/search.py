@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -15,6 +16,8 @@ from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
 SINGLES, PAIRS, MORE = 14, 8, 6  # refits of one effect, of two at once, of one more
+LEADING = 3  # single effects that a second one is added to
+CARRIED = 12  # hypotheses refitted where the noise level changes
 MOST = 4  # effects in a hypothesis
 Adequate = Callable[[Hypothesis], bool]
 
@@ -47,29 +50,61 @@ class Search:
 
     def run(self, adequate: Adequate) -> list[Hypothesis]:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
-        base = self.fits.get(frozenset()) or self._fit((), [{}])
-        screen = Screen(base, [c for c in self.candidates if c.fits])
+        screen = Screen(self.base(), [c for c in self.candidates if c.fits])
         self.tell("single effects")
         for candidate, starts in screen.singles(SINGLES):
             self._fit((candidate,), starts)
-        best = self.ranked()[0]
-        if not adequate(best):
+        if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
             for pair, starts in screen.pairs(PAIRS):
                 self._fit(pair, starts)
+        return self.grow(adequate)
+
+    def grow(self, adequate: Adequate) -> list[Hypothesis]:
+        """Add effects to the best hypotheses as long as something is left and that helps."""
         for count in range(1, MOST):
             best = self.ranked()[0]
             if adequate(best):
                 break
             self.tell(f"{count + 1} effects together")
-            leading = [h for h in self.ranked() if len(h.effects) >= 1][:3]
             before = best.score()
+            leading = [h for h in self.ranked() if h.effects][: LEADING if count == 1 else 1]
             for hypothesis in leading:
                 if len(hypothesis.effects) < MOST:
                     self._extend(hypothesis, MORE)
             if self.ranked()[0].score() > before - 1e-9:
                 break
+        self._exchange(self.ranked()[0])
+        self._with_power_laws(self.ranked()[0])
         return self.ranked()
+
+    def _exchange(self, best: Hypothesis) -> None:
+        """Put others in the place of each effect of a hypothesis: rivals that no path led to."""
+        for effect in best.effects if len(best.effects) > 1 else ():
+            rest = tuple(e for e in best.effects if e is not effect)
+            without = self._fit(rest, [best.values])
+            if without.key == frozenset(e.key for e in rest):
+                self._extend(without, MORE)
+
+    def carried_over(self, records: Records) -> Search:
+        """The same search with other noise levels; the best hypotheses are refitted to them."""
+        new = dataclasses.replace(self, records=records, fits={})
+        new.base()
+        for h in self.ranked()[:CARRIED]:
+            if h.effects:
+                new._fit(h.effects, [h.values])
+        return new
+
+    def _with_power_laws(self, best: Hypothesis) -> None:
+        """Fit the law of free exponent beside each law of whole exponent that it contains."""
+        for effect in best.effects:
+            for other in self.candidates:
+                if other.known and effect.key in other.covers:
+                    rest = [e for e in best.effects if e is not effect and e is not other]
+                    power = dict.fromkeys([other.parameters[1].name],
+                                          {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8))
+                    size = {other.parameters[0].name: best.values[effect.parameters[0].name]}
+                    self._fit((*rest, other), [{**best.values, **size, **power}])
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""

@@ -1,0 +1,134 @@
+"""How good are diagnoses?  Open sets of concealed recordings, scored: `reports/diagnosis.md`.
+
+    python benchmarks/report_diagnosis.py [--work build/diagnosis] [--cases 60] [--workers 2]
+
+Every set is made from its seed, every diagnosis is kept in the work folder: an interrupted run goes
+on where it stopped.  Nothing of the truth reaches a diagnosis.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from provenance import provenance
+
+from pikanid.concealed.generate import generate
+from pikanid.concealed.score import Score, Share, judge, reliability, tally
+from pikanid.concealed.seal import Settings
+
+DEGREE = math.pi / 180
+
+
+@dataclass(frozen=True)
+class Set:
+    """An open set: its name, excitation, noise [rad], seed and mix (default where None)."""
+
+    name: str
+    excitation: str
+    sigma: float
+    seed: int
+    mix: Mapping[str, float] | None = None
+
+
+SETS = (
+    Set("rich", "rich", 0.1 * DEGREE, 20261),
+    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20262),
+    Set("rich_1deg", "rich", 1.0 * DEGREE, 20263),
+    Set("clean", "rich", 0.1 * DEGREE, 20264, {"nothing": 1.0}),
+)
+
+
+def main() -> None:
+    """Make the sets, diagnose, score, write the report."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--work", type=Path, default=Path("build/diagnosis"))
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--only", choices=[s.name for s in SETS], action="append")
+    parser.add_argument("--out", type=Path, default=Path("reports/diagnosis.md"))
+    given = parser.parse_args()
+    chosen = [s for s in SETS if not given.only or s.name in given.only]
+    parts = ["# Diagnoses of concealed recordings\n", provenance(), INTRODUCTION]
+    for one in chosen:
+        parts.append(_section(one, list(_diagnosed(one, given.work, given.cases, given.workers))))
+    given.out.write_text("\n".join(parts))
+
+
+INTRODUCTION = """
+Each case is a pair of recordings of a rig that hides an effect, a pair of effects, or nothing; the
+diagnosis gets the nominal model and the recordings. *Right*: the truth is among at most two
+hypotheses, of the cases that the recordings could tell ("nameable": the nominal model is at least
+5 sigma away, the best rival 4 sigma). *Wrong*: an answer without the truth, of all cases. Intervals
+are Wilson's at 95 %.
+"""
+
+
+def _diagnosed(one: Set, work: Path, cases: int, workers: int
+               ) -> Iterator[tuple[Score, dict[str, Any]]]:
+    from pikanid.concealed.deck import DEFAULT_MIX
+
+    folder = work / one.name
+    settings = Settings(cases, one.excitation, one.sigma, dict(one.mix or DEFAULT_MIX))
+    made = generate(folder / "recordings", folder / "truth.json", settings, seed=one.seed,
+                    workers=workers)
+    truth = json.loads(made.truth.read_text())
+    (folder / "answers").mkdir(exist_ok=True)
+    waiting = [(str(made.folder), str(folder / "answers"), case["id"]) for case in truth["cases"]]
+    with ProcessPoolExecutor(workers) as pool:
+        for case, text in zip(truth["cases"], pool.map(_answer, waiting), strict=True):
+            answer = json.loads(text)
+            yield judge(case, answer), answer
+
+
+def _answer(job: tuple[str, str, str]) -> str:
+    folder, answers, case = job
+    kept = Path(answers) / f"{case}.json"
+    if kept.exists():
+        return kept.read_text()
+    import pikanid as pk
+
+    train, other = (pk.Recording.read(f"{folder}/{case}_{part}.csv")
+                    for part in ("train", "held_out"))
+    begun = time.process_time()
+    answer = pk.diagnose(pk.systems.sloshing(), train, other).to_dict()
+    answer["cpu"] = time.process_time() - begun
+    text = json.dumps(answer)
+    kept.write_text(text)
+    return text
+
+
+def _section(one: Set, found: list[tuple[Score, dict[str, Any]]]) -> str:
+    scores = [score for score, _ in found]
+    seconds = np.array([answer["cpu"] for _, answer in found])
+    lines = [f"\n## {one.name}: {one.excitation}, sigma = {one.sigma / DEGREE:g} deg, "
+             f"seed {one.seed}, {len(scores)} cases\n", "| what | share |", "| --- | --- |"]
+    lines += [f"| {name.replace('_', ' ')} | {share} |" for name, share in tally(scores).items()]
+    lines += ["", "| class | right of nameable | wrong of all |", "| --- | --- | --- |"]
+    for kind in dict.fromkeys(s.kind for s in scores):
+        own = [s for s in scores if s.kind == kind]
+        named = [s for s in own if s.nameable]
+        lines.append(f"| {kind} | {Share(sum(s.outcome == 'right' for s in named), len(named))} | "
+                     f"{Share(sum(s.outcome == 'wrong' for s in own), len(own))} |")
+    rows = reliability(scores)
+    if rows:
+        lines += ["", "| probability stated | true |", "| --- | --- |"]
+        lines += [f"| {stated:.2f} | {share} |" for stated, share in rows]
+    wrong = [f"{s.case} ({s.reason}, nominal {s.nominal:.0f} sigma)" for s in scores
+             if s.outcome == "wrong"]
+    lines += ["", f"Wrong answers: {', '.join(wrong) or 'none'}.",
+              f"Processor seconds a diagnosis: median {np.median(seconds):.1f}, "
+              f"largest {seconds.max():.1f}."]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    main()

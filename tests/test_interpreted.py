@@ -1,0 +1,104 @@
+"""Models run from tapes: against compiled models, closed forms and finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pikanid import excitation, systems
+from pikanid.model import Model, Parameter
+from pikanid.problem import bind
+from pikanid.recording import Recording
+from pikanid.simulation.interpreted import Interpreted
+from pikanid.simulation.simulator import Simulator, Steps
+from pikanid.simulation.structure import Structure
+from pikanid.simulation.tape import tape
+
+FINE = Steps("explicit", 0.0025)
+
+
+def recorded(model: Model, duration: float = 4.0) -> Recording:
+    u = excitation.planar_moves(2, duration)["u_x"]
+    y = {o.name: np.sin(u.time) for o in model.outputs}
+    return Recording.from_arrays(u.time, {"u_x": u.values, **y}, hold={"u_x": "zero"})
+
+
+def values(model: Model) -> np.ndarray:
+    return np.array(list(model.values.values()))
+
+
+def test_smooth_model_agrees_with_its_compiled_self() -> None:
+    model = systems.sloshing()
+    experiment = bind(model, recorded(model))
+    p, active = values(model), np.arange(4)
+    tape_run = Interpreted(model, experiment).run(p, active, FINE)
+    compiled = Simulator(model, experiment).run(p, active, FINE)
+    np.testing.assert_allclose(tape_run.y, compiled.y, atol=1e-14)
+    np.testing.assert_allclose(tape_run.sensitivity, compiled.sensitivity, atol=1e-11)
+
+
+@pytest.mark.parametrize("term, parameters", [
+    ("-a*abs(theta_dot)*theta_dot", {"a": 0.3}),
+    ("-a*signed_power(theta_dot, n)", {"a": 0.3, "n": 1.5}),
+    ("-k*max(theta - w, 0)", {"k": 400.0, "w": 0.04}),
+    ("a*exp(-theta**2)*tanh(theta_dot) + a**3/(2 + theta**4)", {"a": 0.7}),
+    ("-a*sign(theta_dot)", {"a": 0.4}),
+], ids=["drag", "power", "wall", "functions", "friction"])
+def test_sensitivities_are_derivatives(term: str, parameters: dict[str, float]) -> None:
+    model = systems.sloshing().with_term(
+        "theta_dot", term, [Parameter(n, v) for n, v in parameters.items()])
+    simulator = Interpreted(model, bind(model, recorded(model)))
+    p = values(model)
+    active = np.array([0, 1, *range(4, len(p))])
+    steps = Steps("explicit", 0.00125)
+    exact = simulator.run(p, active, steps).sensitivity
+    for column, k in enumerate(active):
+        h = 1e-5 * abs(p[k])
+        up, down = p.copy(), p.copy()
+        up[k] += h
+        down[k] -= h
+        slope = (simulator.run(up, steps=steps).y - simulator.run(down, steps=steps).y) / (2 * h)
+        np.testing.assert_allclose(exact[:, column], slope,
+                                   atol=2e-3 * np.abs(slope).max())
+
+
+def sliding_block() -> tuple[Model, Recording]:
+    """x'' = -c sgn x': stops at t = v0/c after v0²/2c."""
+    model = Model.from_dict({
+        "name": "block", "states": {"x": {}, "v": {"initial": "v0"}},
+        "parameters": {"c": {"guess": 2.0}, "v0": {"guess": 1.0}},
+        "equations": {"x": "v", "v": "-c*sign(v)"}, "outputs": {"x": {"expression": "x"}}})
+    t = np.linspace(0, 1.0, 101)
+    return model, Recording.from_arrays(t, {"x": t})
+
+
+def test_dry_friction_stops_exactly_and_stays() -> None:
+    model, recording = sliding_block()
+    response = Interpreted(model, bind(model, recording)).run(
+        np.array([2.0, 1.0]), np.array([0, 1]), Steps("explicit", 0.01))
+    t = recording.t
+    moving = np.minimum(t, 0.5)
+    np.testing.assert_allclose(response.y, moving - moving**2, atol=1e-12)
+    # where it has stopped: x = v0²/2c, so ∂x/∂c = -1/8 and ∂x/∂v0 = 1/2
+    np.testing.assert_allclose(response.sensitivity[-1], [-0.125, 0.5], atol=1e-10)
+
+
+def test_only_jumps_are_stopped_at() -> None:
+    def switches(term: str) -> int:
+        model = systems.sloshing().with_term("theta_dot", term, [Parameter("a", 1.0)])
+        return tape(Structure(model)).sizes[4]
+
+    assert switches("-a*abs(theta_dot)*theta_dot") == 0
+    assert switches("-a*clip(theta, -0.1, 0.1)") == 0
+    assert switches("-a*sign(theta_dot)") == 1
+
+
+def test_delay_of_an_output_moves_it_and_is_differentiated() -> None:
+    plain = systems.sloshing()
+    model = plain.map_output("theta", [Parameter("tau", 0.03)], delay="tau")
+    recording = recorded(plain)
+    late = Interpreted(model, bind(model, recording)).run(values(model), np.array([4]), FINE)
+    now = Interpreted(plain, bind(plain, recording)).run(values(plain), steps=FINE)
+    np.testing.assert_allclose(late.y[100:], now.y[97:-3], atol=1e-9)
+    slope = np.gradient(now.y, recording.t)[97:-3]
+    np.testing.assert_allclose(late.sensitivity[100:, 0], -slope, atol=0.05 * np.abs(slope).max())
