@@ -20,6 +20,8 @@ from pikanid.symbolic.named import NO_SIMPLE_FORM, NamedEdge
 from pikanid.symbolic.reading import ADEQUATE, Reading
 from pikanid.symbolic.significance import Contribution
 
+POINTS = 100  # that tell apart what is inside a law
+
 
 @dataclass(frozen=True, eq=False)
 class Laws:
@@ -43,7 +45,8 @@ class Laws:
         return np.asarray(block_diag(*blocks)) if blocks else np.zeros((0, 0))
 
 
-def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, FormFit]) -> Laws:
+def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, FormFit],
+                ranges: Sequence[tuple[float, float]]) -> Laws:
     """The sum without the laws' offsets, which the equation's own constant part holds.
 
     Parameters
@@ -51,6 +54,7 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
     model : in whose names the arguments are, and whose names the constants must not take
     arguments : of every edge, by its number
     fits : the laws, by place (0, number, 0)
+    ranges : of every edge's argument, which bound the parameters inside a law
     """
     terms, parameters = [], []
     taken = set(model.symbols)
@@ -58,13 +62,17 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
         tail = re.sub(r"\W+", "_", arguments[k]).strip("_")
         swap: dict[sp.Symbol, sp.Expr] = {}
         names = [*fit.form.amplitudes, *(q.name for q in fit.form.knobs)]
-        for name, value in zip(names, [*fit.amplitudes, *fit.inside], strict=True):
+        bounds = [(-np.inf, np.inf)] * len(fit.amplitudes)
+        bounds += [q.limits(*ranges[k], POINTS) for q in fit.form.knobs]
+        for name, value, reach in zip(names, [*fit.amplitudes, *fit.inside], bounds, strict=True):
             full = f"{name}_{tail}"
             while full in taken:
                 full += "_"
             taken.add(full)
             swap[symbol(name)] = symbol(full)
-            parameters.append(Parameter(full, float(value), description=f"of {arguments[k]}"))
+            inside = float(np.clip(value, *reach))
+            parameters.append(Parameter(full, inside, bounds=reach,
+                                        description=f"of {arguments[k]}"))
         argument = model.formula(arguments[k], f"argument '{arguments[k]}'")
         bare = fit.form.expression - symbol("d")
         terms.append(bare.xreplace({**swap, X: argument}))

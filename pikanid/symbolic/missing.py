@@ -21,6 +21,7 @@ from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.symbolic.composed import Place
 from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.fitting import FormFit
 from pikanid.symbolic.laws import Laws, chosen, reading_of_laws, sum_of_laws
 from pikanid.symbolic.library import NOTHING, Form
 from pikanid.symbolic.named import NamedEdge
@@ -32,6 +33,7 @@ from pikanid.symbolic.significance import Contribution
 DRAWN = 120  # points of an edge that are compared
 TRIED = 4  # laws an edge that are put into the equation
 MOST = 16  # combinations of them
+UNLIKELY = 30.0  # difference of scores: odds of three millions to one
 
 
 def read_discrepancy(found: Discrepancy, library: Sequence[Form],
@@ -46,7 +48,7 @@ def read_discrepancy(found: Discrepancy, library: Sequence[Form],
                             float(np.sqrt(np.mean(e.std**2))), e.p_value)
                for k, e in enumerate(found.edges)]
     if not named or recordings is None:
-        laws = sum_of_laws(found.nominal.model, arguments, chosen(named))
+        laws = sum_of_laws(found.nominal.model, arguments, chosen(named), ranges)
         share = np.array([float(np.prod([e.probability for e in named.values()]))])
         return reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
                                laws.covariance)
@@ -78,14 +80,15 @@ def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
     """Laws inside the ODE, best first: BIC less twice the log of the prior, law, estimate."""
     from pikanid.strategies.nls import NLS
 
-    lists = [[(place, fit) for fit in shortlist(edge) if fit.form is not NOTHING][:TRIED]
-             for place, edge in named.items()]
+    lists = [[(place, fit) for fit in _likely(edge)] for place, edge in named.items()]
     arguments = [e.argument for e in found.edges]
+    ranges = [e.range for e in found.edges]
     results = []
     for choice in islice(product(*lists), MOST):
-        law = sum_of_laws(found.nominal.model, arguments, dict(choice))
+        law = sum_of_laws(found.nominal.model, arguments, dict(choice), ranges)
         try:
-            estimate = NLS().fit(_extended(found, law), recordings)
+            with np.errstate(all="ignore"):  # on its way a law may leave its domain
+                estimate = NLS().fit(_extended(found, law), recordings)
         except errors.SimulationFailed:
             continue
         prior = sum(np.log(weights[fit.form.name]) for _, fit in choice)
@@ -93,6 +96,15 @@ def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
     if not results:
         raise errors.SimulationFailed(errors.no_law_simulated())
     return sorted(results, key=lambda r: r[0])
+
+
+def _likely(edge: NamedEdge) -> list[FormFit]:
+    """The laws worth a fit inside the ODE; at least the best one."""
+    scores = {c.form.name: c.score for c in edge.candidates}
+    laws = [f for f in shortlist(edge) if f.form is not NOTHING]
+    best = min(scores[f.form.name] for f in laws)
+    near = [f for f in laws if scores[f.form.name] <= best + UNLIKELY]
+    return sorted(near, key=lambda f: scores[f.form.name])[:TRIED]
 
 
 def _extended(found: Discrepancy, law: Laws) -> Model:

@@ -50,9 +50,9 @@ def read_estimate(estimate: Estimate, library: Sequence[Form]) -> Reading:
         weights.append(Contribution(0, k, 0, float(np.std(values)),
                                     float(np.sqrt(np.mean(std**2))), nothing.adequacy))
     arguments = [p.argument for p in plans]
-    laws = sum_of_laws(estimate.model, arguments, chosen(named))
-    share = np.array([float(np.prod([e.probability for e in named.values()]))])
     ranges = [e.range for e in named.values()]
+    laws = sum_of_laws(estimate.model, arguments, chosen(named), ranges)
+    share = np.array([float(np.prod([e.probability for e in named.values()]))])
     return reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
                            laws.covariance)
 
