@@ -10,7 +10,6 @@ from __future__ import annotations
 import difflib
 import math
 import os
-import tempfile
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,6 +21,7 @@ from pikanid import errors
 from pikanid.channel_maps import INPUT_MAPS, OUTPUT_MAPS, map_input, map_output
 from pikanid.expressions import RESERVED, check_name, parse, symbol, to_text
 from pikanid.model import Input, Model, Output, Parameter, Spline, State
+from pikanid.writing import atomically
 
 SECTIONS = ("name", "states", "inputs", "parameters", "equations", "outputs", "splines")
 KEYS = {
@@ -59,15 +59,7 @@ def save(model: Model, path: str | os.PathLike[str]) -> None:
     """Write a model file; an existing one is replaced only once the new one is complete."""
     import tomli_w
 
-    target = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            tomli_w.dump(to_dict(model), file)
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    atomically(Path(path), tomli_w.dumps(to_dict(model)).encode())
 
 
 def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:

@@ -428,7 +428,9 @@ def test_a_full_disk_is_one_sentence() -> None:
 def test_an_interrupt_is_one_word_and_leaves_nothing(tmp_path: Path) -> None:
     child = subprocess.Popen(
         [sys.executable, "-m", "pikanid", "study", "--out", str(tmp_path), "--seeds", "100000"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        # a session in the background ignores interrupts, and its children would do as it does
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     time.sleep(4)
     child.send_signal(signal.SIGINT)
     out, err = child.communicate(timeout=60)
