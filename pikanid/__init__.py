@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from pikanid.discrepancy import kan_discrepancy
     from pikanid.estimate import Estimate
     from pikanid.mismatch import Diagnosis, diagnose
+    from pikanid.mismatch.confusable import confusable
+    from pikanid.mismatch.experiments import d_optimal, next_experiment
     from pikanid.model import Input, Model, Output, Parameter, State
     from pikanid.recording import Channel, Recording
     from pikanid.simulation import simulate
@@ -44,6 +46,9 @@ _HOMES: dict[str, str | None] = {
     "kan_discrepancy": "pikanid.discrepancy",
     "diagnose": "pikanid.mismatch",
     "Diagnosis": "pikanid.mismatch",
+    "confusable": "pikanid.mismatch.confusable",
+    "next_experiment": "pikanid.mismatch.experiments",
+    "d_optimal": "pikanid.mismatch.experiments",
     "simulate": "pikanid.simulation",
     "symbolic": None,
     "systems": None,
@@ -69,6 +74,9 @@ __all__ = [
     "kan_discrepancy",
     "diagnose",
     "Diagnosis",
+    "confusable",
+    "next_experiment",
+    "d_optimal",
     "simulate",
     "symbolic",
     "systems",

@@ -16,6 +16,10 @@ import typer
 from pikanid import errors
 from pikanid.commands.conceal import EXAMPLES as CONCEAL
 from pikanid.commands.conceal import conceal
+from pikanid.commands.confusable import EXAMPLES as CONFUSABLE
+from pikanid.commands.confusable import confusable
+from pikanid.commands.design import EXAMPLES as DESIGN
+from pikanid.commands.design import design
 from pikanid.commands.diagnose import EXAMPLES as DIAGNOSE
 from pikanid.commands.diagnose import diagnose
 from pikanid.commands.equivalence import EXAMPLES as EQUIVALENCE
@@ -51,6 +55,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
 app.command(epilog=IDENTIFY)(identify)
 app.command(epilog=DIAGNOSE)(diagnose)
+app.command(epilog=CONFUSABLE)(confusable)
+app.command(epilog=DESIGN)(design)
 app.command(epilog=SIMULATE)(simulate)
 app.command(epilog=MODELS)(models)
 app.command(epilog=STUDY)(study)

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares, minimize
 
 import pikanid as pk
 from pikanid import errors, excitation, systems
+from pikanid.cli import main
 from pikanid.mismatch.experiments import d_optimal, next_experiment
 from pikanid.mismatch.profiles import Bounds, motion, profiles, scaled
 from pikanid.mismatch.seen import Watched, joined, natural_frequency, seen
@@ -274,3 +275,16 @@ def test_what_cannot_be_designed() -> None:
         "equations": {"x": "-k*x"}, "outputs": {"x": {"expression": "x"}}})
     with pytest.raises(errors.BadSetting, match="drive"):
         d_optimal(still, sigma=0.1)
+
+
+def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, plot = tmp_path / "next.csv", tmp_path / "next.png"
+    words = ["design", "sloshing", "--sigma", "0.1deg", "--limit", "theta=10deg", "--duration", "5"]
+    assert main([*words, "--out", str(out), "--plot", str(plot)]) == 0
+    assert "Standard errors" in capsys.readouterr().out
+    profile = pk.Recording.read(out)
+    reached = seen(systems.sloshing(), profile.with_hold(u_x="zero"), SIGMA).reached("theta")
+    assert reached <= np.radians(10)
+    assert plot.stat().st_size > 1000
+    assert main([*words, "--out", str(out), "--velocity", "0"]) == 2
+    assert "velocity" in capsys.readouterr().err

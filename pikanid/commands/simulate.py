@@ -58,8 +58,8 @@ def simulate(
     from pikanid.simulation import simulate as run
 
     chosen = adjusted(systems.find(model), set_)
-    drive = _excitation(chosen, excitation, duration, rate, column)
-    made = run(chosen, drive, sigma=_sigmas(chosen, sigma), seed=seed)
+    drive = excited(chosen, excitation, duration, rate, column)
+    made = run(chosen, drive, sigma=sigmas(chosen, sigma), seed=seed)
     if not chosen.inputs:
         made = made.without(*drive.names)
     made.write(out)
@@ -72,7 +72,7 @@ def simulate(
     return 0
 
 
-def _excitation(model: Model, name: str, duration: float, rate: float,
+def excited(model: Model, name: str, duration: float, rate: float,
                 column: list[str]) -> Recording:
     from pathlib import Path
 
@@ -112,7 +112,7 @@ def _excitation(model: Model, name: str, duration: float, rate: float,
     return rec
 
 
-def _sigmas(model: Model, texts: list[str]) -> dict[str, float]:
+def sigmas(model: Model, texts: list[str]) -> dict[str, float]:
     common = [text for text in texts if "=" not in text]
     named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
     if len(common) > 1:

@@ -1,0 +1,64 @@
+"""`pikanid confusable`: what could an experiment reveal, before it is run?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pikanid.commands.options import adjusted, check_outputs
+from pikanid.commands.simulate import excited, sigmas
+
+EXAMPLES = """Examples:
+
+  pikanid confusable --model sloshing --sigma 0.1deg
+
+  pikanid confusable --model my.toml --excitation motion.csv --sigma 0.1deg --json told.json"""
+
+
+def confusable(
+    model: Annotated[str, typer.Option(
+        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
+        show_default=False)],
+    excitation: Annotated[str, typer.Option(
+        "--excitation", "-e", metavar="NAME|FILE",
+        help="the experiment: two_pulse, free_decay, move, planar_moves, or a recording of inputs",
+    )] = "two_pulse",
+    sigma: Annotated[list[str], typer.Option(
+        metavar="[NAME=]VALUE", show_default=False,
+        help="standard deviation of the noise, as 0.1deg or theta=0.1deg")] = [],  # noqa: B006
+    set_: Annotated[list[str], typer.Option(
+        "--set", metavar="NAME=VALUE", help="value of a parameter", show_default=False)] = [],  # noqa: B006
+    duration: Annotated[float, typer.Option(
+        metavar="S", help="of a built-in excitation [s]")] = 5.0,
+    rate: Annotated[float, typer.Option(
+        metavar="HZ", help="sampling rate of a built-in excitation")] = 100.0,
+    strength: Annotated[float, typer.Option(
+        metavar="N", help="how many σ strong effects are made before they are compared")] = 30.0,
+    quick: Annotated[bool, typer.Option(
+        "--quick", help="first order only: nothing is refitted")] = False,
+    json_: Annotated[str | None, typer.Option(
+        "--json", metavar="FILE", help="write JSON (- for standard output)")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+) -> int:
+    """Say which effects an experiment could detect, from which size, and which it confuses."""
+    check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [model, excitation])
+    from pikanid import systems
+    from pikanid.mismatch.confusable import confusable as run
+    from pikanid.reporting.console import console, working
+    from pikanid.reporting.strict_json import text
+    from pikanid.writing import atomically
+
+    chosen = adjusted(systems.find(model), set_)
+    drive = excited(chosen, excitation, duration, rate, [])
+    with working("looking", 28, quiet) as step:
+        found = run(chosen, drive, sigmas(chosen, sigma) or None, strength=strength,
+                    refit=not quick, tell=step)
+    if json_ == "-":
+        print(text(found.to_dict()), end="")
+    elif json_ is not None:
+        atomically(Path(json_), text(found.to_dict()).encode())
+    if not quiet and json_ != "-":
+        console().print(str(found), markup=False, soft_wrap=True)
+    return 0
