@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import random
-
 import numpy as np
 import pytest
 from relaxing import BOUND, DEGREE, TRUTH, guessed, slosh
@@ -103,26 +100,6 @@ def test_its_own_methods_work_and_leave_nothing_open() -> None:
     kan.prune()
     assert kan.refine(80).grid == 80
     assert plt.get_fignums() == []
-
-
-def test_no_traces(tmp_path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
-    import matplotlib
-
-    monkeypatch.chdir(tmp_path)
-    torch.manual_seed(7)
-    np.random.seed(7)
-    random.seed(7)
-    before = (torch.random.get_rng_state().clone(), np.random.get_state()[1].copy(),
-              random.getstate(), torch.get_default_dtype(), dict(matplotlib.rcParams))
-    for width in ((1, 1), (1, 3, 1)):
-        PIKAN(width=width, grid=40, lam=100.0).fit(guessed(), slosh(1.0))
-    PIKAN(grid=40).fit(guessed(), slosh(1.0)).approximator.kan.prune()
-    after = (torch.random.get_rng_state(), np.random.get_state()[1],
-             random.getstate(), torch.get_default_dtype(), dict(matplotlib.rcParams))
-    assert torch.equal(before[0], after[0])
-    assert np.array_equal(before[1], after[1])
-    assert before[2:] == after[2:]
-    assert os.listdir(tmp_path) == []
 
 
 def test_same_result_every_time_whatever_the_global_generators() -> None:

@@ -75,7 +75,7 @@ def undisturbed(*, double: bool = False, silent: bool = True) -> Iterator[Module
     }
     with _LOCK, redirect_stdout(io.StringIO()) if silent else _as_it_is():
         before = {name: pykan.__dict__[name] for name in veils}
-        generator = torch.random.get_rng_state()
+        generators = torch.random.get_rng_state(), np.random.get_state(), random.getstate()
         dtype = torch.get_default_dtype()
         pykan.__dict__.update(veils)
         if double:
@@ -84,7 +84,9 @@ def undisturbed(*, double: bool = False, silent: bool = True) -> Iterator[Module
             yield pykan
         finally:
             torch.set_default_dtype(dtype)
-            torch.random.set_rng_state(generator)
+            torch.random.set_rng_state(generators[0])
+            np.random.set_state(generators[1])
+            random.setstate(generators[2])
             pykan.__dict__.update(before)
 
 
