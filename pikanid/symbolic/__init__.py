@@ -17,8 +17,9 @@ from pikanid.symbolic.library import LIBRARY, Form, user_form
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.naming import name_edge
 from pikanid.symbolic.prune import prune
+from pikanid.symbolic.pushing import push
 from pikanid.symbolic.reading import Reading
 from pikanid.symbolic.significance import contributions
 
 __all__ = ["LIBRARY", "Form", "NamedEdge", "Reading", "contributions", "extract", "name_edge",
-           "prune", "user_form"]
+           "prune", "push", "user_form"]
