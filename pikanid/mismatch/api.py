@@ -16,7 +16,7 @@ from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
-from pikanid.mismatch.locate import locate
+from pikanid.mismatch.locate import locate, smallest
 from pikanid.mismatch.preparation import prepared, with_refined_noise
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
@@ -27,7 +27,6 @@ from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
-SET_ASIDE = 0.3  # share of a lone recording's end that is kept for confirmation
 Recordings = Recording | Sequence[Recording]
 
 
@@ -44,7 +43,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         model: Nominal model with a second-order coordinate (a state that is the rate of another).
         train: Recording, or several, to explain.
         held_out: Recording, or several, with another excitation, to prove it on.  Without one the
-            end of the recording is set aside, and the verdict is at most "unconfirmed".
+            verdict is at most "unconfirmed".
         alpha: Rate of false alarms.
         quiet: Start and stop [s] of a stretch known to show noise only.
         tell: Called with what is being done.
@@ -157,9 +156,8 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     proves = later is not None
     if later is not None:
         _check_pair(train, later)
-    elif len(train) == 1:
-        cut = train[0].start + (1 - SET_ASIDE) * (train[0].stop - train[0].start)
-        notes.append(f"No held-out recording: what was recorded after {cut:.3g} s is set aside.")
+    else:
+        notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
     model = _held_as_recorded(model, train)
     tell("nominal fit")
     records = prepared(model, train, quiet, notes)
@@ -215,7 +213,7 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, alpha: float, b
     return Diagnosis(
         answer.verdict, detection.p_value, alpha, locate(case.base, best, answer, case.sites),
         given, rejected, case.before, after, proof, tuple(levels), tuple(case.notes),
-        seconds=time.perf_counter() - begun)
+        smallest(case.base, case.candidates), seconds=time.perf_counter() - begun)
 
 
 def _proof(case: Case, best: Hypothesis) -> Proof | None:

@@ -37,7 +37,8 @@ class Sign:
     """How a small effect would show: as a force on q'', a change of inputs, or of what is seen.
 
     `start` holds parameter values from where a fit begins; the first parameter is the size: it
-    starts at `null + amplitude * size`, with the amplitude that suits the residual best.
+    starts at `null + amplitude * size`, with the amplitude that suits the residual best, and the
+    parameter's own value as null unless given.
     `one_sided`: the amplitude must be positive.
     """
 
@@ -48,6 +49,7 @@ class Sign:
     initial: Mapping[str, float] = field(default_factory=dict)
     one_sided: bool = False
     scales: bool = True
+    null: float | None = None
 
 
 @dataclass(frozen=True)

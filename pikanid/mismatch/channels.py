@@ -102,8 +102,9 @@ def lags(site: Site) -> list[Candidate]:
     tau = Parameter(site.name("tau_s"), 0.01, "s", (2e-4, 5.0))
 
     def seen(view: View) -> list[Sign]:
+        # a first guess of the right size matters: far shorter lags are stiff
         return [Sign({tau.name: s}, seen=_lagged(view.t, view.y[o], s) - view.y[o],
-                     one_sided=True, scales=False) for s in LAGS]
+                     one_sided=True, null=0.0) for s in LAGS]
 
     found = [Candidate(("sensor_lag",), "a lag of the sensor", f"{o} behind a lag {tau.name}",
                        "sensor", site, (tau,), lambda m: m.map_output(o, lag=tau.name), seen,
@@ -113,7 +114,7 @@ def lags(site: Site) -> list[Candidate]:
 
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[Sign]:
             return [Sign({t_u.name: s}, push={u: _lagged(view.t, view.u[u], s, True) - view.u[u]},
-                         one_sided=True, scales=False) for s in LAGS]
+                         one_sided=True, null=0.0) for s in LAGS]
 
         found.append(_input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),
                             f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name))

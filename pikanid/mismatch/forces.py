@@ -151,18 +151,27 @@ def hysteresis(site: Site) -> list[Candidate]:
         top = float(np.abs(view.x[site.q]).max(initial=1e-9))
         found = []
         for share in (0.02, 0.06, 0.15, 0.4):
-            path = np.zeros(len(view.t))
-            steps = np.diff(view.x[site.q]) / (share * top)
-            for k, dz in enumerate(steps):
-                now = path[k]
-                # along the loop z moves by dz (1 - sgn(dz) z) when loaded, by dz when unloaded
-                path[k + 1] = now + (dz * (1 - abs(now)) if dz * now > 0 else dz)
-            found.append(Sign({b.name: 1.0, d.name: share * top}, force=-np.clip(path, -1, 1),
-                              one_sided=True))
+            path = _loop(view.x[site.q] / (share * top))
+            found.append(Sign({b.name: 1.0, d.name: share * top}, force=-path, one_sided=True))
         return found
 
     return [Candidate(("hysteresis",), "hysteresis (Bouc-Wen)", f"-{b.name}*{z}", "dynamics", site,
                       (b, d), extend, signs, variant="bouc_wen")]
+
+
+def _loop(q: np.ndarray) -> np.ndarray:
+    """Bouc and Wen's z along q, both in units of the yield displacement: dz = dq (1 - sgn(dq) z)
+    when loaded further, dz = dq when unloaded; exact along straight lines.
+    """
+    z = np.zeros(len(q))
+    for k, dq in enumerate(np.diff(q)):
+        sense, now = np.sign(dq), np.sign(dq) * z[k]
+        free = min(abs(dq), max(-now, 0.0))
+        now += free
+        z[k + 1] = sense * (1 - (1 - now) * np.exp(-(abs(dq) - free)) if now >= 0 else now)
+        if dq == 0:
+            z[k + 1] = z[k]
+    return z
 
 
 def boundary_layer(site: Site) -> list[Candidate]:

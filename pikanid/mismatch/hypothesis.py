@@ -128,5 +128,6 @@ def start_from(candidate: Candidate, sign: Sign, amplitude: float,
     if sign.scales and candidate.parameters:
         size = next(iter(sign.start), candidate.parameters[0].name)
         null = next((p.value for p in candidate.parameters if p.name == size), 0.0)
+        null = null if sign.null is None else sign.null
         start[size] = null + amplitude * sign.start.get(size, 1.0)
     return start

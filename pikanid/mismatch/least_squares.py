@@ -52,12 +52,12 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
         B, b = (A / norms).T @ (A / norms), -g[moving] / norms
         accepted = False
         for _ in range(8):
-            step = np.zeros(len(theta))
-            try:
-                step[moving] = np.linalg.solve(B + damping * np.eye(len(b)), b) / norms
-            except np.linalg.LinAlgError:
-                break
-            new = np.clip(theta + step, lower, upper)
+            low, high = (lower - theta)[moving] * norms, (upper - theta)[moving] * norms
+            step = _boxed_step(B + damping * np.eye(len(b)), b, low, high)
+            new = theta.copy()
+            # at a wall exactly, not up to rounding
+            new[moving] = np.where(step <= low, lower[moving], np.where(
+                step >= high, upper[moving], theta[moving] + step / norms))
             expected = float(best - np.sum((r + J @ (new - theta)) ** 2))
             # far from an explanation nobody needs the last digits
             if expected < max(tolerance, 2e-5 * best):
@@ -72,3 +72,20 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
         if not accepted:
             return Minimum(theta, r, J, False)
     return Minimum(theta, r, J, len(theta) == 0)
+
+
+def _boxed_step(A: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The step x (n,) that solves A x = b, what would leave its box held at the wall meanwhile."""
+    x = np.zeros(len(b))
+    free = np.ones(len(b), bool)
+    for _ in range(len(b) + 1):
+        if not free.any():
+            break
+        rest = b[free] - A[np.ix_(free, ~free)] @ x[~free]
+        x[free] = np.linalg.lstsq(A[np.ix_(free, free)], rest, rcond=None)[0]
+        out = free & ((x < low) | (x > high))
+        if not out.any():
+            break
+        x[out] = np.clip(x[out], low[out], high[out])
+        free &= ~out
+    return x

@@ -8,13 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-from pikanid.mismatch.candidate import Channel
+from pikanid.mismatch.candidate import Candidate, Channel
+from pikanid.mismatch.detect import unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.result import Where
+from pikanid.mismatch.result import Value, Where
 from pikanid.mismatch.site import Site
+from pikanid.mismatch.tangent import directions
 from pikanid.mismatch.verdict import Answer
 
 WINDOWS = 40
+CLEAR = 5.0  # standard errors from which on an effect counts as detectable
 
 
 def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[Site]) -> Where:
@@ -33,6 +36,26 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[S
         static = all(e.channel == "dynamics" and e.ids[0] in STATIC for e in best.effects)
     spans = () if answer.verdict == "none" else loud_windows(base)
     return Where(channel, site.v, states, spans, static)
+
+
+def smallest(base: Hypothesis, candidates: Sequence[Candidate]) -> dict[str, Value]:
+    """The size of each effect that would stand out by `CLEAR` standard errors, by id.
+
+    Only of effects that grow from nothing in proportion to one parameter.
+    """
+    found = directions(base.whitened, base.minimum.theta, [c for c in candidates if c.known])
+    _, lengths = unit_columns(found.D, base.minimum.J)
+    sizes: dict[str, Value] = {}
+    for owner, sign, length in zip(found.owner, found.signs, lengths, strict=True):
+        candidate = found.candidates[owner]
+        if length > 0 and sign.scales and candidate.parameters and sign.start:
+            name = next(iter(sign.start))
+            unit = next(p.unit for p in candidate.parameters if p.name == name)
+            size = CLEAR / float(length) * abs(sign.start[name])
+            for key in candidate.ids:
+                if key not in sizes or size < sizes[key].value:
+                    sizes[key] = Value(size, 0.0, unit)
+    return sizes
 
 
 STATIC = frozenset({"coulomb_friction", "quadratic_drag", "power_drag", "amplitude_damping",

@@ -16,6 +16,7 @@ from pikanid.channel import Channel
 from pikanid.recording import Recording
 
 SPIKE = 5.0  # σ by which a sample must leave its neighbours to count as an outlier
+CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
 QUIET = 100  # samples of a quiet stretch that say something about low frequencies
 
 
@@ -54,27 +55,35 @@ class Level:
 
 
 def without_outliers(recording: Recording, output: str) -> tuple[Recording, int]:
-    """The recording without samples that leave both neighbours far behind, and their number."""
-    from scipy.ndimage import median_filter
+    """The recording without samples that leave the cubic through their neighbours, and how many.
 
+    The worst goes first: beside a spike its neighbours look bad as well.
+    """
     channel = recording[output]
     seen = np.flatnonzero(np.isfinite(channel.values))
-    y = channel.values[seen]
+    y = channel.values[seen].copy()
     if len(y) < 20:
         return recording, 0
     try:
         sigma, _ = noise.high_band_sigma(channel)
     except errors.BadRecording:
         return recording, 0
-    gap = np.abs(y - median_filter(y, 5, mode="nearest"))
-    # where the signal itself is fast its neighbours differ, and nothing is an outlier
-    usual = median_filter(gap, 41, mode="nearest")
-    bad = gap > SPIKE * np.maximum(sigma, 3.0 * usual)
-    if not bad.any() or bad.mean() > 0.1:
+    gap = np.zeros(len(y))
+    gap[2:-2] = y[2:-2] - np.convolve(y, CUBIC, "valid")
+    bad: list[int] = []
+    while len(bad) <= 0.1 * len(y):
+        k = int(np.argmax(np.abs(gap)))
+        if abs(gap[k]) < SPIKE * sigma * np.sqrt(1 + np.sum(CUBIC**2)):
+            break
+        bad.append(k)
+        y[k] -= gap[k]
+        for near in range(max(k - 2, 2), min(k + 3, len(y) - 2)):
+            gap[near] = y[near] - CUBIC @ y[near - 2:near + 3]
+    if not bad or len(bad) > 0.1 * len(y):
         return recording, 0
     values = channel.values.copy()
     values[seen[bad]] = np.nan
-    return recording.with_channels(replace(channel, values=values)), int(bad.sum())
+    return recording.with_channels(replace(channel, values=values)), len(bad)
 
 
 def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None) -> Level:
@@ -105,18 +114,20 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
         rate: Natural frequency [rad/s]: the residual counts from six times that on.
         quiet: Stretch in which nothing moves; looked for if None.
     """
+    from scipy.signal.windows import tukey
+
     h = level.interval
     grid = np.round((t - t[0]) / h).astype(int)
     if np.max(np.abs((t - t[0]) / h - grid)) > 0.2 or len(t) < 200:
         return level
     even = np.interp(np.arange(grid[-1] + 1), grid, residual)
     share = len(t) / len(even)
-    window = np.hanning(len(even))
+    window = tukey(len(even), 0.2)
     power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)
     omega = np.linspace(0, np.pi, len(power))
     # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
     high = (omega > np.clip(6 * rate * h, 0.25 * np.pi, 0.6 * np.pi)) & (omega < 0.97 * np.pi)
-    spectra = [(omega[high], power[high], 0.5 * share)]
+    spectra = [(omega[high], power[high], 0.9 * share)]
     source = "the residual's highest frequencies"
     found = quiet or noise_stretch(channel)
     if found is not None:

@@ -20,6 +20,8 @@ from pikanid.problem import HeldInput
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 
+TOGETHER = 100  # signs integrated at once
+
 
 @dataclass(frozen=True)
 class Directions:
@@ -116,7 +118,11 @@ class Tangent:
                     {o.name: rate[:, i] for i, o in enumerate(self.model.outputs)}, force)
 
     def columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
-        """δy (rows, m) of every sign."""
+        """δy (rows, m) of every sign; a few at a time, to keep long recordings in memory."""
+        parts = [self._columns(listed[k:k + TOGETHER]) for k in range(0, len(listed), TOGETHER)]
+        return np.concatenate(parts, axis=1) if parts else np.empty((len(self.stop), 0))
+
+    def _columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
         L, n, m = len(self.t), self.x.shape[1], len(listed)
         force, start = np.zeros((L, n, m)), np.zeros((n, m))
         held = np.zeros((L, n, m))
