@@ -67,9 +67,8 @@ def count_parts(quick: bool) -> int:
     """
     from pikanid.equivalence.checks import optimised, settings
 
-    compared = len(range(0, len(list(settings())), 3 if quick else 1))
     # Uniqueness, the KAN handed over, deep KANs, negative controls, degree 2 at the end.
-    return compared + len(list(optimised())) + 5
+    return len(list(settings(quick=quick))) + len(list(optimised())) + 5
 
 
 def show(screen: Console, report: EquivalenceReport) -> None:
