@@ -189,3 +189,14 @@ def test_candidate_needs_its_argument() -> None:
         user_form("q + 2")
     with pytest.raises(errors.BadModel):
         user_form("__import__('os')")
+
+
+def test_curve_that_knows_little_is_offered_little() -> None:
+    """A covariance of rank three carries no polynomial of five powers."""
+    basis = np.column_stack([np.ones(X.size), X, X**2, X**3])
+    curve = Curve.of_spline(X, basis, np.array([0.0, 0.0, 0.0, 1.0]), 1e-6 * np.eye(4))
+    assert curve.rows == 3
+    full = FORMS["polynomial x + x^2 + x^3 + x^4 + x^5"]
+    assert fit_form(full, curve) is None
+    fit = fit_form(FORMS["cubic"], curve)
+    assert fit is not None and fit.amplitudes[0] == pytest.approx(1.0)

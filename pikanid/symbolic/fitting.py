@@ -47,9 +47,9 @@ class FormFit:
 
 
 def fit_form(form: Form, curve: Curve) -> FormFit | None:
-    """The least-squares fit; None where the form does not exist on the curve's range."""
-    if not form.fits_range(curve.low, curve.high):
-        return None
+    """The least-squares fit; None where there is none on the curve's range."""
+    if not form.fits_range(curve.low, curve.high) or curve.rows < form.count:
+        return None  # or the curve knows fewer numbers than the form has
     if not form.knobs:
         return _finish(form, curve, np.empty(0))
     starts = _search(form, curve)
