@@ -157,7 +157,8 @@ def _linear(form: Form, curve: Curve, p: Array) -> _Projected | None:
         return None
     phi = curve.project(curve.whiten(raw.T)).T
     size = np.linalg.norm(phi, axis=0)
-    if np.any(size <= 1e-9 * np.linalg.norm(curve.whiten(raw.T), axis=-1)) or not np.all(size > 0):
+    whole = np.linalg.norm(raw, axis=0) * float(np.abs(curve.weight).max())
+    if np.any(size <= 1e-9 * whole) or not np.all(size > 0):
         return None
     q, r = np.linalg.qr(phi / size)
     if r.size and np.abs(np.diag(r)).min() < 1e-9:
