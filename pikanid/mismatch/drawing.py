@@ -39,6 +39,7 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
                         label="±2σ of the noise")
         axes[2].set(ylabel=proof.unit or "residual", title="Held-out recording: what is left")
     for axis in axes:
+        axis.margins(x=0.01, y=0.2)  # room for the legend
         axis.legend(loc="upper right", fontsize=8, ncols=3)
         axis.grid(alpha=0.2)
     axes[-1].set_xlabel("t [s]")
