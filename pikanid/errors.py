@@ -842,6 +842,13 @@ def estimate_file(path: str, detail: str) -> str:
     return f"The estimate file '{path}' cannot be read: {detail}."
 
 
+def left_out_as_slow() -> str:
+    return (
+        "Left out of the sparse scenarios and the real recording, where a fit takes minutes: try it "
+        "with pikanid identify."
+    )
+
+
 def bad_start() -> str:
     return (
         "The model cannot be simulated from any starting point: give other guesses or narrower "
