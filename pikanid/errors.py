@@ -844,7 +844,7 @@ def estimate_file(path: str, detail: str) -> str:
 
 def left_out_as_slow() -> str:
     return (
-        "Left out of the sparse scenarios and the real recording, where a fit takes minutes: try it "
+        "Left out of the sparse scenarios and the real recording, where a fit takes long: try it "
         "with pikanid identify."
     )
 
