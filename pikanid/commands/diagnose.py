@@ -67,17 +67,17 @@ def diagnose(
     columns, units = assignments("--column", column, "theta=angle"), assignments(
         "--unit", unit, "theta=deg")
 
-    def read(paths: list[str]) -> list[object]:
+    def read(paths: list[str]) -> list[Recording]:
         return [prepared(p, chosen, columns, units, None, None, None, None, decimate, sigma)
                 for p in paths]
 
     records, others = read(train), read(held_out)
     stretch = None
     if quiet_until is not None:
-        start = min(r.start for r in records)  # type: ignore[attr-defined]
+        start = min(r.start for r in records)
         stretch = (start, start + quantity(quiet_until, "s", "--quiet-until"))
     with working("diagnosing", 8, quiet) as step:
-        dx = run(chosen, records, others or None,  # type: ignore[arg-type]
+        dx = run(chosen, records, others or None,
                  alpha=alpha, quiet=stretch, tell=step)
     _write(dx, train[0], json_, report)
     if not quiet and json_ != "-":

@@ -73,7 +73,8 @@ def simulate(
 
 
 def excited(model: Model, name: str, duration: float, rate: float,
-                column: list[str]) -> Recording:
+            column: list[str]) -> Recording:
+    """The inputs to simulate under: the built-in excitation `name`, or the recording it names."""
     from pathlib import Path
 
     from pikanid import excitation
@@ -113,6 +114,7 @@ def excited(model: Model, name: str, duration: float, rate: float,
 
 
 def sigmas(model: Model, texts: list[str]) -> dict[str, float]:
+    """Standard deviation of the noise per output from texts like "0.1deg" or "theta=0.1deg"."""
     common = [text for text in texts if "=" not in text]
     named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
     if len(common) > 1:

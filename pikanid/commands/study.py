@@ -13,7 +13,7 @@ EXAMPLES = """Examples:
 
   pikanid study
 
-  pikanid study --seeds 100 --out /tmp/reports
+  pikanid study --seeds 100 --out reports-100
 
   PIKANID_DATA=recordings pikanid study
 

@@ -30,7 +30,7 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known for c in found), found[0].key
-    (28, 'coulomb_friction')
+    (27, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
     for table in (ENTRIES, GUARDS):

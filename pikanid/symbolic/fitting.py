@@ -8,6 +8,7 @@ p. 413; the Jacobian is Kaufman's, BIT 15, 1975, p. 49).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,14 +100,15 @@ def _nearest_gap(form: Form, curve: Curve, q: Array) -> Array:
     return near[[int(np.argmin(rss))]]
 
 
-def _profile(form: Form, curve: Curve, mesh: Array, x: Array, free: Array, thin: object) -> Array:
+def _profile(form: Form, curve: Curve, mesh: Array, x: Array, free: Array,
+             thin: Callable[[Array], Array]) -> Array:
     """Residual sums of squares (P,) at parameters mesh (P, q), amplitudes at their best."""
     if curve.weight.ndim == 1:
-        weight = thin(curve.weight)  # type: ignore[operator]
+        weight = thin(curve.weight)
         base = np.vstack([np.ones(len(x)), free]) * weight
         u, s, _ = np.linalg.svd(base.T, full_matrices=False)
         fixed = u[:, s > 1e-10 * s[0]]
-        y = thin(curve.target)  # type: ignore[operator]
+        y = thin(curve.target)
         y = y - fixed @ (fixed.T @ y)
     else:
         weight, fixed, y = None, curve.fixed, curve.centred
