@@ -11,6 +11,7 @@ from pikanid.commands.options import adjusted, assignments, check_outputs, quant
 
 if TYPE_CHECKING:
     from pikanid.mismatch import Diagnosis
+    from pikanid.recording import Recording
 
 EXAMPLES = """Examples:
 
