@@ -17,14 +17,14 @@ INF = float("inf")
 
 
 def _sensor(site: Site, identifier: str, name: str, size: Parameter, expression: str,
-            shape: Callable[[View], np.ndarray], twin: str = "", **maps: str) -> Candidate:
+            shape: Callable[[View], np.ndarray], twin: str = "", **maps: object) -> Candidate:
     o = site.output.name
 
     def signs(view: View) -> list[Sign]:
         return [Sign({size.name: 1.0}, seen=shape(view))]
 
     return Candidate((identifier,), name, expression, "sensor", site, (size,),
-                     lambda m: m.map_output(o, **maps), signs, twin=twin)
+                     lambda m: m.map_output(o, **maps), signs, twin=twin)  # type: ignore[arg-type]  # all text
 
 
 def sensor_offset(site: Site) -> list[Candidate]:
@@ -141,10 +141,10 @@ def _lagged(t: np.ndarray, y: np.ndarray, tau: float, held: bool = False) -> np.
 
 def _input(site: Site, u: str, identifier: str, name: str, parameters: tuple[Parameter, ...],
            expression: str, signs: Callable[[View], Sequence[Sign]], twin: str = "",
-           channel: Channel = "input", **maps: str) -> Candidate:
+           channel: Channel = "input", **maps: object) -> Candidate:
     several = len(site.inputs) > 1
     return Candidate((identifier,), name, expression, channel, site, parameters,
-                     lambda m: m.map_input(u, **maps), signs,
+                     lambda m: m.map_input(u, **maps), signs,  # type: ignore[arg-type]  # all text
                      u if several else "", twin)
 
 
