@@ -11,7 +11,8 @@ STAMP := $(VENV)/.installed
 
 # Tests run in parallel processes; threads of BLAS and OpenMP on top would fight for the cores.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
-PYTEST := $(ONE_THREAD) $(BIN)/python -m pytest -n $(JOBS)
+# Stealing leaves neighbours together, so that what a file sets up is set up once.
+PYTEST := $(ONE_THREAD) $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .DEFAULT_GOAL := help
 .PHONY: help venv study lint test test-all bench reports notebooks clean

@@ -1,8 +1,11 @@
-"""Doctests of modules that need torch and pykan are left out where these are not installed."""
+"""For tests and doctests alike: which are left out, and how models are run."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib.util import find_spec
+
+import pytest
 
 collect_ignore_glob = (
     []
@@ -16,3 +19,24 @@ collect_ignore_glob = (
         "pikanid/strategies/pinn*.py",
     ]
 )
+USED = "pikanid.simulation.simulator.compiled"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def models_from_tapes() -> Iterator[None]:
+    """Compiling every model of every test would take most of the session."""
+    from interpreted import from_tapes
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(USED, from_tapes)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def compiled_where_marked(
+        request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests marked `compiled` are about compiled models."""
+    if request.node.get_closest_marker("compiled") is not None:
+        from pikanid.simulation.compiled import compiled
+
+        monkeypatch.setattr(USED, compiled)

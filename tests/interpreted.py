@@ -1,7 +1,8 @@
-"""Generated models run by Python instead of numba: no compiling, and every index is checked.
+"""Models without compiling each of them, which takes about ten seconds a model.
 
-The kernels are the same source text; only ``njit`` is replaced by a decorator that does nothing.
-Good for many small models; compiled code is tested with a few shared ones.
+By Python: the kernels' source text with ``njit`` replaced by a decorator that does nothing, so that
+every index is checked; good for small models.  From tapes: by the compiled interpreter that serves
+all models.
 """
 
 from __future__ import annotations
@@ -14,15 +15,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pikanid import systems
 from pikanid.model import Model
 from pikanid.problem import bind
 from pikanid.recording import Recording
 from pikanid.simulation import compiled as compiler
+from pikanid.simulation import interpreted as interpreter
 from pikanid.simulation import support
 from pikanid.simulation.compiled import Method
 from pikanid.simulation.simulator import Simulator
 from pikanid.simulation.structure import Structure
 from pikanid.simulation.synthetic import with_outputs
+from pikanid.simulation.tape import can_run, tape
 
 
 def _plain(*_: Any, **__: Any) -> Callable[[Any], Any]:
@@ -74,3 +78,11 @@ def simulator(model: Model, recording: Recording, t: np.ndarray | None = None) -
 def instead_of_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let everything in this test run by Python: for fits of small models of their own."""
     monkeypatch.setattr("pikanid.simulation.simulator.compiled", module)
+
+
+def from_tapes(model: Model, method: Method = "explicit") -> Any:
+    """Stands for `compiled`: tapes for all but the slosh pendulum, which many tests share."""
+    structure = Structure(model)
+    if method == "explicit" and can_run(model) and structure != Structure(systems.sloshing()):
+        return interpreter.Machine(tape(structure))
+    return compiler.compiled(model, method)

@@ -95,7 +95,9 @@ def test_identify_writes_what_was_agreed(run: Run, recorded: str, tmp_path: Path
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.png", "b.json.gz", "run.csv"]
 
 
-def test_all_strategies_side_by_side(run: Run, recorded: str) -> None:
+def test_all_strategies_side_by_side(
+        run: Run, recorded: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pikanid.strategies.pinn_fit.NEWTON_STEPS", 25)  # of 400: half a minute
     code, out, _ = run("identify", recorded, "--model", "sloshing", "--sigma", "0.1deg",
                        "--strategy", "all", "--json", "-")
     content = strict(out)

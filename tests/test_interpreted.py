@@ -14,6 +14,8 @@ from pikanid.simulation.simulator import Simulator, Steps
 from pikanid.simulation.structure import Structure
 from pikanid.simulation.tape import tape
 
+pytestmark = pytest.mark.compiled
+
 FINE = Steps("explicit", 0.0025)
 
 

@@ -164,10 +164,8 @@ def test_unknown_noise_is_estimated_from_the_residual() -> None:
         assert found.value(name) == pytest.approx(known.value(name), rel=1e-6)
 
 
-def test_outputs_of_different_size_are_weighted_by_their_own_noise(
-        monkeypatch: pytest.MonkeyPatch) -> None:
+def test_outputs_of_different_size_are_weighted_by_their_own_noise() -> None:
     """Without σ, an angle in rad and one in thousandths must not count a million to one."""
-    interpreted.instead_of_compiled(monkeypatch)
     model = Model.from_dict({**systems.sloshing().to_dict(), "outputs": {
         "theta": {"expression": "theta"}, "rate": {"expression": "1000*theta_dot"}}})
     recording = pk.simulate(model, excitation.two_pulse(2.0, 0.02), seed=2,

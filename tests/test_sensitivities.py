@@ -20,6 +20,8 @@ from pikanid.problem import bind
 from pikanid.recording import Channel, Recording
 from pikanid.simulation import Simulator, Steps
 
+pytestmark = pytest.mark.compiled
+
 Values = Mapping[str, float]
 
 

@@ -17,6 +17,8 @@ from pikanid.problem import bind
 from pikanid.recording import Channel, Recording
 from pikanid.simulation import Simulator, Steps, VectorField
 
+pytestmark = pytest.mark.compiled
+
 
 def swing(x: np.ndarray, u: float, length: float = 0.045, damping: float = 0.5) -> list[float]:
     return [x[1], u / length * np.cos(x[0]) - 9.81 / length * np.sin(x[0])

@@ -13,6 +13,8 @@ from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.simulation import Steps
 
+pytestmark = pytest.mark.compiled
+
 T = np.linspace(0, 1, 21)
 FAST = Model.from_dict({
     "states": {"x": {"initial": 1.0}, "y": {"initial": 0.0}}, "inputs": {"u": {}},

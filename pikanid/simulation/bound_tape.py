@@ -15,7 +15,8 @@ class BoundTape(NamedTuple):
     `code` (ops, 4) of all groups, `span` (groups, 3) first and last operation and number of results
     of each, `out` (groups, results) their registers; values `r` (R,), derivatives `d` (R, lanes)
     and `ds` (R, switches) by the signs, which of them are not all zero (`live`, `signed`);
-    `sizes` states, inputs, parameters, outputs, switching functions.
+    `sizes` states, inputs, parameters, outputs, switching functions.  `group` and `flag` hold the
+    numbers of the groups and (0, 1): a constant in a call would have the callee compiled for it.
     """
 
     code: np.ndarray
@@ -27,6 +28,8 @@ class BoundTape(NamedTuple):
     live: np.ndarray
     signed: np.ndarray
     sizes: np.ndarray
+    group: np.ndarray
+    flag: np.ndarray
 
 
 def bound(tape: Tape, lanes: int) -> BoundTape:
@@ -44,4 +47,4 @@ def bound(tape: Tape, lanes: int) -> BoundTape:
     return BoundTape(
         np.concatenate([tape.code[g] for g in GROUPS]), span.astype(np.int64), out, r,
         np.zeros((R, lanes)), np.zeros((R, K)), np.zeros(R, np.bool_), np.zeros(R, np.bool_),
-        np.array(tape.sizes, np.int64))
+        np.array(tape.sizes, np.int64), np.arange(len(GROUPS)), np.array([0, 1]))

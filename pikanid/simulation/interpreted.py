@@ -63,11 +63,11 @@ class Interpreted(Simulator):
         if method != "explicit" or not can_run(self.model):
             return super().module(method)
         if method not in self._kept:
-            self._kept[method] = _Machine(tape(Structure(self.model)))
+            self._kept[method] = Machine(tape(Structure(self.model)))
         return self._kept[method]
 
 
-class _Machine:
+class Machine:
     """What `Simulator` asks of a compiled module: `integrate`."""
 
     def __init__(self, program: Tape):

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import product
 
 from pikanid import errors
 from pikanid.strategies import STRATEGIES
@@ -50,31 +54,53 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
     # Timed fits are warm; without noise NLS tries starts that are stiff, which is code of its own.
     for scenario in (slosh.SCENARIOS[1], slosh.SCENARIOS[3]):
         slosh.fit(scenario, "nls", SEED)
-    singles = []
-    for scenario in slosh.SCENARIOS:
-        for name in strategies:
+    quick, slow = ([n for n in strategies if (n in SLOW) is late] for late in (False, True))
+    with _meanwhile([(scenario, name) for name in slow for scenario in slosh.SCENARIOS
+                     if scenario.stride == 1]) as pending:
+        singles = []
+        for scenario, name in product(slosh.SCENARIOS, quick):
             step(f"slosh, {scenario.label}, {name}")
-            if name in SLOW and scenario.stride > 1:
-                singles.append(slosh.Result(scenario, name, None, errors.left_out_as_slow()))
-            else:
-                singles.append(slosh.fit(scenario, name, SEED))
-    spreads = []
-    for result in singles:
-        if not result.scenario.noise or seeds < 1:
-            continue
-        step(f"slosh, {result.scenario.label}, {result.strategy}, {seeds} seeds")
-        if result.estimate is not None and result.estimate.seconds < REPEATABLE:
-            spreads.append(slosh.repeated(result.scenario, result.strategy, range(seeds)))
-    swing, missing, real = None, "", []
-    try:
-        swing = pendulum.load()
-    except errors.DatasetUnavailable as problem:
-        missing = str(problem)
-    if swing is not None:
-        pendulum.warm_up(swing)
-        for name in strategies:
-            step(f"real pendulum, {name}")
-            real.append(pendulum.Result(name, None, errors.left_out_as_slow())
-                        if name in SLOW else pendulum.fit(swing, name))
+            singles.append(slosh.fit(scenario, name, SEED))
+        spreads = []
+        for result in singles:
+            if not result.scenario.noise or seeds < 1:
+                continue
+            step(f"slosh, {result.scenario.label}, {result.strategy}, {seeds} seeds")
+            if result.estimate is not None and result.estimate.seconds < REPEATABLE:
+                spreads.append(slosh.repeated(result.scenario, result.strategy, range(seeds)))
+        swing, missing, real = None, "", []
+        try:
+            swing = pendulum.load()
+        except errors.DatasetUnavailable as problem:
+            missing = str(problem)
+        if swing is not None:
+            pendulum.warm_up(swing)
+            for name in strategies:
+                step(f"real pendulum, {name}")
+                real.append(pendulum.Result(name, None, errors.left_out_as_slow())
+                            if name in SLOW else pendulum.fit(swing, name))
+        for scenario, name in product(slosh.SCENARIOS, slow):
+            step(f"slosh, {scenario.label}, {name}")
+            task = pending.get((scenario, name))
+            singles.append(slosh.Result(scenario, name, None, errors.left_out_as_slow())
+                           if task is None else task.result())
+    order = {(s, n): k for k, (s, n) in enumerate(product(slosh.SCENARIOS, strategies))}
+    singles.sort(key=lambda r: order[r.scenario, r.strategy])
     return Study(tuple(singles), tuple(spreads), tuple(real), swing, missing, seeds,
                  time.perf_counter() - begun)
+
+
+@contextmanager
+def _meanwhile(jobs: Sequence[tuple[slosh.Scenario, str]]
+               ) -> Iterator[dict[tuple[slosh.Scenario, str], Future[slosh.Result]]]:
+    """Fits that one other process makes in the meantime; an interruption ends it."""
+    if not jobs:
+        yield {}
+        return
+    pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+    try:
+        yield {job: pool.submit(slosh.fit, *job, SEED) for job in jobs}
+        pool.shutdown()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise

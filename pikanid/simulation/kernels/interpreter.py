@@ -197,8 +197,8 @@ def show(b, q, x, S, U, V, T, first, output, row, inside, dtau_in, dtau_out, del
     """Write the observations that belong to the q-th stop; states, inputs and signs are put."""
     A = S.shape[1]
     put_tangents(b, S, V[q], dtau_in, delayed)
-    values(b, H)
-    tangents(b, H)
+    values(b, b.group[H])
+    tangents(b, b.group[H])
     for k in range(first[q], first[q + 1]):
         o = b.out[H, output[k]]
         Y[row[k]] = b.r[o]
@@ -206,7 +206,7 @@ def show(b, q, x, S, U, V, T, first, output, row, inside, dtau_in, dtau_out, del
             J[row[k], a] = b.d[o, a] if b.live[o] else 0.0
     if delayed:
         put_rates(b, V[q])
-        values(b, H_RATE)
+        values(b, b.group[H_RATE])
         for k in range(first[q], first[q + 1]):
             if inside[k]:
                 rate = b.r[b.out[H_RATE, output[k]]]
@@ -219,10 +219,12 @@ def prepare(b, p, act, moving_inputs):
     """Set parameters and their derivatives; mark what is live; run the prelude."""
     n, m, P, K = b.sizes[0], b.sizes[1], b.sizes[2], b.sizes[4]
     first = 1 + n + m
-    b.live[:] = False
-    b.signed[:] = False
-    b.d[:, :] = 0.0
-    b.ds[:, :] = 0.0
+    for i in range(len(b.live)):
+        b.live[i] = b.signed[i] = False
+        for a in range(len(act)):
+            b.d[i, a] = 0.0
+        for k in range(K):
+            b.ds[i, k] = 0.0
     for i in range(n):
         b.live[1 + i] = True
     for j in range(m):
@@ -237,7 +239,7 @@ def prepare(b, p, act, moving_inputs):
         b.live[first + P + k] = True
         b.signed[first + P + k] = True
         b.ds[first + P + k, k] = 1.0
-    values(b, PRELUDE)
+    values(b, b.group[PRELUDE])
     spread(b.code, b.live)
     spread(b.code, b.signed)
-    tangents(b, PRELUDE)
+    tangents(b, b.group[PRELUDE])

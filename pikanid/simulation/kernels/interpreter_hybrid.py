@@ -16,7 +16,7 @@ def put_signs(b, mode, slide):
                 b.d[first + k, a] = 0.0
     if held == 0:
         return False
-    values(b, G_RATE)
+    values(b, b.group[G_RATE])
     differentiate(b.code, b.span[G_RATE, 0], b.span[G_RATE, 1], b.r, b.ds, b.signed)
     matrix, right = np.zeros((K, K)), np.zeros((K, 1))
     for k in range(K):
@@ -35,8 +35,8 @@ def put_signs(b, mode, slide):
     if not slide:
         return True
     # now that the signs are known: dG = 0 holds them as parameters vary
-    values(b, G_RATE)
-    tangents(b, G_RATE)
+    values(b, b.group[G_RATE])
+    tangents(b, b.group[G_RATE])
     change = np.zeros((K, b.d.shape[1]))
     for k in range(K):
         o = b.out[G_RATE, k]
@@ -68,9 +68,9 @@ def take_step(b, t, h, x, S, u, v, gap, dtau, delayed, mode, slopes_on, kx, kS, 
                     Ss[i, a] = S[i, a] if stage == 0 else S[i, a] + c * kS[stage - 1, i, a]
             put_tangents(b, Ss, v, dtau, delayed)
         put_signs(b, mode, slopes_on)
-        values(b, F)
+        values(b, b.group[F])
         if slopes_on:
-            tangents(b, F)
+            tangents(b, b.group[F])
         for i in range(n):
             o = out[i]
             kx[stage, i] = r[o]
@@ -92,8 +92,8 @@ def margin(b, t, x, u, v, gap, mode):
     first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
     put(b, t, x, u, v, gap)
     put_rates(b, v)
-    put_signs(b, mode, False)
-    values(b, G)
+    put_signs(b, mode, b.flag[0])
+    values(b, b.group[G])
     least, which = np.inf, -1
     for k in range(K):
         room = (1.0 - abs(b.r[first + k]) if mode[k] == 0.0
@@ -106,8 +106,8 @@ def margin(b, t, x, u, v, gap, mode):
 @njit(cache=True, error_model="numpy")
 def rate_of(b, k, mode):
     """d g_k/dt at what is put, in the given modes."""
-    put_signs(b, mode, False)
-    values(b, G_RATE)
+    put_signs(b, mode, b.flag[0])
+    values(b, b.group[G_RATE])
     return b.r[b.out[G_RATE, k]]
 
 
@@ -137,12 +137,12 @@ def passed(b, k, t, x, S, u, v, gap, dtau, delayed, mode, before):
     put(b, t, x, u, v, gap)
     put_rates(b, v)
     if mode[k] == 0.0:
-        put_signs(b, mode, False)
+        put_signs(b, mode, b.flag[0])
         first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
         mode[k] = 1.0 if b.r[first + k] > 0.0 else -1.0
         return
     rate = rate_of(b, k, mode)
-    values(b, F)
+    values(b, b.group[F])
     for i in range(n):
         before[i] = b.r[out[i]]
     new = settled(b, k, mode)
@@ -150,10 +150,10 @@ def passed(b, k, t, x, S, u, v, gap, dtau, delayed, mode, before):
     if A == 0 or rate == 0.0:
         return
     put_tangents(b, S, v, dtau, delayed)
-    put_signs(b, mode, True)
-    values(b, G)
-    tangents(b, G)
-    values(b, F)
+    put_signs(b, mode, b.flag[1])
+    values(b, b.group[G])
+    tangents(b, b.group[G])
+    values(b, b.group[F])
     o = b.out[G, k]
     for a in range(A):
         when = -(b.d[o, a] if b.live[o] else 0.0) / rate
@@ -167,7 +167,7 @@ def begin(b, t, x, u, v, mode):
     put(b, t, x, u, v, 0.0)
     put_rates(b, v)
     for k in range(b.sizes[4]):
-        values(b, G)
+        values(b, b.group[G])
         g = b.r[b.out[G, k]]
         if abs(g) > 1e-9 and mode[k] != 0.0:
             mode[k] = 1.0 if g > 0.0 else -1.0
@@ -190,14 +190,14 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
             if delayed and q > 0 and A > 0:
                 put(b, T[q], x, U[q - 1], V[q - 1], T[q] - T[q - 1])
                 put_rates(b, V[q - 1])
-                put_signs(b, mode, False)
+                put_signs(b, mode, b.flag[0])
                 for j in range(b.sizes[1]):
-                    values(b, F)
+                    values(b, b.group[F])
                     for i in range(n):
                         before[i] = b.r[out[i]]
                     b.r[1 + n + j] = U[q, j]
-                    put_signs(b, mode, False)
-                    values(b, F)
+                    put_signs(b, mode, b.flag[0])
+                    values(b, b.group[F])
                     for i in range(n):
                         for a in range(A):
                             S[i, a] += (before[i] - b.r[out[i]]) * dtau_in[j, a]
@@ -206,10 +206,11 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
             put(b, T[q], x, u, v, 0.0)
             put_rates(b, v)
             put_tangents(b, S, v, dtau_in, delayed)
-            put_signs(b, mode, True)
+            put_signs(b, mode, b.flag[1])
             show(b, q, x, S, U, V, T, first, output, row, inside, dtau_in, dtau_out, delayed, Y, J)
         if X.shape[0] > 0:
-            X[q] = x
+            for i in range(n):
+                X[q, i] = x[i]
         if q == L - 1:
             break
         h = (T[q + 1] - T[q]) / pieces[q]
@@ -218,7 +219,7 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
             goal = (piece + 1) * h
             while done < goal:
                 part = goal - done
-                take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode, True,
+                take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode, b.flag[1],
                           kx, kS, xs, Ss, xn, Sn)
                 end, which = margin(b, T[q] + goal, xn, u, v, goal, mode)
                 crossing = end < -1e-13
@@ -233,14 +234,14 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
                             edge = 1e-4 * (high - low) if count % 3 == 0 else 0.0
                             middle = min(max(middle, low + edge), high - edge)
                         take_step(b, T[q] + done, middle, x, S, u, v, done, dtau_in, delayed, mode,
-                                  False, kx, kS, xs, Ss, xn, Sn)
+                                  b.flag[0], kx, kS, xs, Ss, xn, Sn)
                         room, k = margin(b, T[q] + done + middle, xn, u, v, done + middle, mode)
                         if room < 0.0:
                             high, at_high, which = middle, room, k
                         else:
                             low, at_low = middle, room
                     part = high
-                    take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode, True,
+                    take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode, b.flag[1],
                               kx, kS, xs, Ss, xn, Sn)
                 for i in range(n):
                     x[i] = xn[i]

@@ -12,11 +12,11 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
             # an input that comes later switches later: the state moves by (f- - f+) ddelay
             put(b, T[q], x, U[q - 1], V[q - 1], T[q] - T[q - 1])
             for j in range(b.sizes[1]):
-                values(b, F)
+                values(b, b.group[F])
                 for i in range(n):
                     kx[0, i] = r[out[i]]
                 r[1 + n + j] = U[q, j]
-                values(b, F)
+                values(b, b.group[F])
                 for i in range(n):
                     for a in range(A):
                         S[i, a] += (kx[0, i] - r[out[i]]) * dtau_in[j, a]
@@ -24,7 +24,8 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
             put(b, T[q], x, U[q], V[q], 0.0)
             show(b, q, x, S, U, V, T, first, output, row, inside, dtau_in, dtau_out, delayed, Y, J)
         if X.shape[0] > 0:
-            X[q] = x
+            for i in range(n):
+                X[q, i] = x[i]
         if q == L - 1:
             break
         h = (T[q + 1] - T[q]) / pieces[q]
@@ -37,8 +38,8 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
                         Ss[i, a] = S[i, a] if stage == 0 else S[i, a] + c * kS[stage - 1, i, a]
                 put(b, T[q] + piece * h + c, xs, U[q], V[q], piece * h + c)
                 put_tangents(b, Ss, V[q], dtau_in, delayed)
-                values(b, F)
-                tangents(b, F)
+                values(b, b.group[F])
+                tangents(b, b.group[F])
                 for i in range(n):
                     o = out[i]
                     kx[stage, i] = r[o]
