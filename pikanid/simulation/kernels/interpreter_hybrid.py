@@ -241,8 +241,8 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
                         else:
                             low, at_low = middle, room
                     part = high
-                    take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode, b.flag[1],
-                              kx, kS, xs, Ss, xn, Sn)
+                    take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode,
+                              b.flag[1], kx, kS, xs, Ss, xn, Sn)
                 for i in range(n):
                     x[i] = xn[i]
                     if not abs(x[i]) < 1e120:
