@@ -123,6 +123,7 @@ def test_clean_data_show_nothing(seed: int) -> None:
     assert "nothing" in str(clean)
 
 
+@pytest.mark.slow
 def test_the_functional_sees_the_same_edge(found: Discrepancy) -> None:
     relaxed = pk.kan_discrepancy(tank(), recording(0.3, 0), "x", ["x"], grid=[8],
                                  method="functional")
@@ -227,3 +228,23 @@ def test_laws_of_slosh_data(law: str) -> None:
         assert np.mean((true >= low) & (true <= high)) >= 0.9
         edges.append(edge)
     assert len(edges) == 3
+
+
+def test_information_of_an_edge_is_what_the_data_leave(found: Discrepancy) -> None:
+    """The true law leaves what noise leaves, another one more; parameters' part is not seen."""
+    edge = found.edge("x")
+    basis = edge.gauge.plan.basis(edge.gauge.a)
+    least = -float(edge.gain @ np.linalg.pinv(edge.information, 1e-10) @ edge.gain)
+
+    def left(values: np.ndarray) -> float:
+        c = np.linalg.lstsq(basis, values, rcond=None)[0]
+        return float(c @ edge.information @ c - 2.0 * edge.gain @ c) - least
+
+    law = np.linalg.lstsq(basis, cubic(edge.gauge.a), rcond=None)[0]
+    size = float(law @ edge.information @ law)
+    assert left(cubic(edge.gauge.a)) < 30.0  # χ² of nine
+    assert left(0.9 * cubic(edge.gauge.a)) > 60.0
+    assert left(np.zeros(len(edge.gauge.a))) > 0.9 * size
+    for own in (edge.gauge.plan.constant, edge.gauge.removed[:, -1]):
+        shown = own * np.linalg.norm(basis @ law) / np.linalg.norm(basis @ own)
+        assert abs(shown @ edge.information @ shown) < 1e-3 * size

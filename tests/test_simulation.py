@@ -16,6 +16,7 @@ from pikanid.model import Model, Parameter
 from pikanid.problem import bind
 from pikanid.recording import Channel, Recording
 from pikanid.simulation import Simulator, Steps, VectorField
+from pikanid.simulation.simulator import Response, _foretold
 
 pytestmark = pytest.mark.compiled
 
@@ -206,6 +207,14 @@ def test_parameters_that_depend_on_time() -> None:
 
 
 # --- failures ------------------------------------------------------------------------------------
+
+
+def test_steps_after_an_escape_are_not_foretold() -> None:
+    """An error of 1e83 says nothing of the order's steps, some 1e-23 of those in use."""
+    def refuse(steps: Steps, _: bool) -> Response:
+        raise AssertionError(steps)
+
+    assert _foretold(refuse, 4e-7, Steps("explicit", 1e-3, 1.5e83)) is None
 
 
 def test_trajectory_that_escapes_is_a_bad_step_not_a_crash(

@@ -10,7 +10,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.adequacy import judge
-from pikanid.discrepancy.bands import Posterior, holm, wald
+from pikanid.discrepancy.bands import Posterior, holm, likelihood, wald
 from pikanid.discrepancy.edges import OFFSET, plan_edges
 from pikanid.discrepancy.functional import relaxed_level
 from pikanid.discrepancy.gauge import Gauge, fix_gauges
@@ -124,11 +124,12 @@ def _edge(seen: Sequence[View], k: int, gauge: Gauge, model: Model, test: tuple[
     basis = plan.basis(a)
     std = np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", basis, V, basis), 0.0))
     jumps = float(sum(v.weight for v in seen if v.plans[k].step))
+    same = max((v for v in seen if v.plans[k].step == plan.step), key=lambda v: v.weight)
     named: list[State | Input | Parameter] = [*model.states, *model.inputs, *model.parameters]
     units = {q.name: q.unit for q in named}
     return Edge(plan.argument, units.get(plan.argument, ""), plan.name,
                 model.parameter(OFFSET).unit, a, basis @ c, std, c, V, *test,
-                significant, jumps, freedom, gauge)
+                significant, jumps, freedom, gauge, *likelihood(same.fit, k))
 
 
 def _offset(level: Level, known: Posterior) -> tuple[float, float]:

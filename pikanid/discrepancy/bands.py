@@ -53,6 +53,25 @@ def posterior(fit: PenalisedFit) -> Posterior:
     return Posterior(whole, full, freedom)
 
 
+def likelihood(fit: PenalisedFit, k: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the data alone say of edge k: S (K, K) and g (K,) in cᵀSc - 2gᵀc + const = χ²(c).
+
+    Parameters and offset are at their best for every c, without a prior; the other edges keep their
+    smoothness.  Gauge directions, which parameters follow, have no information in S.
+    """
+    at = fit.smoothness.priors[k].at
+    inside = np.array(fit.inside)
+    inside[at] = False
+    others = np.flatnonzero(inside)
+    H = fit.information + fit.smoothness.precision(fit.rho) - np.diag(fit.smoothness.weak)
+    gain = fit.gain - fit.information @ np.where(fit.inside, 0.0, fit.theta)
+    cross = fit.information[np.ix_(others, at)]
+    right = np.column_stack([cross, gain[others]])
+    solved = np.linalg.lstsq(H[np.ix_(others, others)], right, rcond=1e-13)[0]
+    S = fit.information[np.ix_(at, at)] - cross.T @ solved[:, :-1]
+    return 0.5 * (S + S.T), gain[at] - cross.T @ solved[:, -1]
+
+
 def wald(fit: PenalisedFit, edges: Sequence[int], gauges: Sequence[Gauge],
          freedom: Sequence[float]) -> tuple[float, int]:
     """p-value and degrees of freedom of the Wald test that some edges are zero, gauge-fixed.

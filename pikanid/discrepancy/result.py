@@ -39,6 +39,8 @@ class Edge:
         and without
     effective : effective degrees of freedom that the fit spent on the edge beyond its gauge part
     gauge : what was taken out of it
+    information, gain : (K, K), (K,) of what the data alone say, smooth or not: coefficients c, not
+        gauge-fixed, leave χ² = cᵀ information c - 2 gainᵀ c + const, parameters at their best
     """
 
     argument: str
@@ -56,6 +58,8 @@ class Edge:
     jump_probability: float
     effective: float
     gauge: Gauge = field(repr=False)
+    information: np.ndarray = field(repr=False)
+    gain: np.ndarray = field(repr=False)
 
     @property
     def range(self) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from pikanid.simulation.grid import Grid, build_grid
 
 MethodChoice = Literal["auto", "explicit", "implicit"]
 _NOTHING = np.empty(0, np.int64)
+FORETOLD = 64  # times finer: beyond that an error is far from what the order says
 FINEST = 4096  # sub-steps of the median interval beyond which the explicit route gives up
 
 
@@ -222,6 +223,8 @@ def _foretold(trial: Trial, tolerance: float, known: Steps) -> Steps | None:
     if not known.error > 0:
         return None
     ratio = min((tolerance / (4 * known.error)) ** 0.25, 0.5)
+    if ratio < 1.0 / FORETOLD:
+        return None
     finer = Steps(known.method, known.longest * ratio)
     rough, fine = trial(known, False), trial(finer, True)
     if not rough.finished or not fine.finished:

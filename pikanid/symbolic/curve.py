@@ -17,6 +17,8 @@ from pikanid import errors
 from pikanid.symbolic.numeric import Array
 
 FEWEST = 8  # points that can name anything
+SHOWN = 0.05  # of a function's size: with less left beside the free columns it is theirs
+INFORMED = 1e-9  # of the largest: eigenvalues of an information matrix that are not rounding
 EXACT = 1e-6  # of the spread of y: closer than this nothing is told apart
 
 
@@ -115,6 +117,29 @@ class Curve:
                                samples=samples, free=free, argument=argument, unit=unit,
                                x_unit=x_unit)
 
+    @staticmethod
+    def of_likelihood(x: Array, basis: Array, coefficients: Array, covariance: Array,
+                      information: Array, gain: Array, *, samples: int, free: Array,
+                      argument: str = "x", unit: str = "", x_unit: str = "") -> Curve:
+        """basis (n, K) @ coefficients (K,), compared by χ² = cᵀ information c - 2 gainᵀ c + const.
+
+        Unlike `of_spline` nothing smooths what is compared: a law with a kink is not blamed for a
+        prior that has none.  A law's c is its least-squares spline at x; the information must not
+        see the constant.  `covariance` (K, K) is shown; `free` (n, m) are columns that it holds
+        already.
+        """
+        x = np.asarray(x, float)
+        order = np.argsort(x, kind="stable")
+        B = np.asarray(basis, float)[order]
+        sizes, vectors = np.linalg.eigh(information)
+        good = sizes > INFORMED * sizes[-1]
+        root = vectors[:, good] * np.sqrt(sizes[good])
+        weight = root.T @ np.linalg.pinv(B, 1e-10)
+        target = (vectors[:, good] / np.sqrt(sizes[good])).T @ gain
+        std = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", B, covariance, B), 0.0))
+        return Curve(x[order], B @ coefficients, weight, True, np.asarray(free, float)[order],
+                     samples, argument, unit, x_unit, target, std)
+
     @property
     def low(self) -> float:
         """Lower end of the range."""
@@ -144,6 +169,26 @@ class Curve:
         columns = np.vstack([np.ones(len(self.x)), self.free.T])
         u, s, _ = np.linalg.svd(self.whiten(columns).T, full_matrices=False)
         return np.asarray(u[:, s > 1e-10 * s[0]])
+
+    @cached_property
+    def taken(self) -> Array:
+        """Orthonormal basis (n, m) of the constant and the free columns."""
+        columns = np.column_stack([np.ones(len(self.x)), self.free])
+        u, s, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.asarray(u[:, s > 1e-10 * s[0]])
+
+    def visible(self, functions: Array) -> Array:
+        """Which functions of x (..., n) are not the free columns over again: (...,) bool.
+
+        A law that the free columns follow but for a trace could take any size, so that the trace
+        fits what another law has left.
+        """
+        if not self.free.shape[1]:
+            return np.ones(functions.shape[:-1], bool)
+        centred = functions - functions.mean(axis=-1, keepdims=True)
+        left = functions - (functions @ self.taken) @ self.taken.T
+        return np.asarray(np.linalg.norm(left, axis=-1)
+                          > SHOWN * np.linalg.norm(centred, axis=-1))
 
     def project(self, whitened: Array) -> Array:
         """Whitened functions (..., r) without their constant and free parts."""

@@ -20,6 +20,7 @@ from pikanid.symbolic.numeric import Array
 SEARCHED = 400  # points of the first search
 STARTS = 2
 ITERATIONS = 60
+ROUNDING = 1e-9  # of the range: samples that are closer are one
 GAIN = 1e-6  # relative decrease below which no ranking changes
 
 
@@ -67,8 +68,7 @@ def _search(form: Form, curve: Curve) -> list[Array]:
     x, free = thin(curve.x), thin(curve.free.T)
     grids = [k.grid(curve.low, curve.high, count) for k in form.knobs]
     if not form.smooth:  # a step: between any two samples
-        at = np.unique(x)
-        grids = [0.5 * (at[1:] + at[:-1])]
+        grids = [_gaps(x)]
     mesh = np.stack([g.ravel() for g in np.meshgrid(*grids, indexing="ij")], axis=1)
     rss = _profile(form, curve, mesh, x, free, thin)
     order = np.argsort(rss)
@@ -89,12 +89,18 @@ def _spacing(grids: list[Array], q: Array) -> Array:
                      for g, v in zip(grids, q, strict=True)])
 
 
+def _gaps(x: Array) -> Array:
+    """Middles between samples that are apart: what rests at zero is there but for rounding."""
+    at = np.sort(x)
+    gap = np.diff(at)
+    return (at[:-1] + 0.5 * gap)[gap > ROUNDING * (at[-1] - at[0])]
+
+
 def _nearest_gap(form: Form, curve: Curve, q: Array) -> Array:
     """The best place of a step among all samples around q."""
-    at = np.unique(curve.x)
-    middle = 0.5 * (at[1:] + at[:-1])
+    middle = _gaps(curve.x)
     k = int(np.searchsorted(middle, q[0]))
-    width = 1 + len(at) // SEARCHED
+    width = 1 + len(middle) // SEARCHED
     near = middle[max(0, k - 2 * width):k + 2 * width + 1]
     rss = _profile(form, curve, near[:, None], curve.x, curve.free.T, lambda f: f)
     return near[[int(np.argmin(rss))]]
@@ -115,6 +121,7 @@ def _profile(form: Form, curve: Curve, mesh: Array, x: Array, free: Array,
     raw = form.values(x, *(mesh[:, [j]] for j in range(mesh.shape[1])))
     with np.errstate(all="ignore"):
         columns = [np.broadcast_to(c, (len(mesh), len(x))) for c in raw]
+        seen = np.all([curve.visible(c) for c in columns], axis=0)
         columns = [c * weight if weight is not None else c @ curve.weight.T for c in columns]
         columns = [c - (c @ fixed) @ fixed.T for c in columns]
         left = np.broadcast_to(y, columns[0].shape).copy()
@@ -129,7 +136,7 @@ def _profile(form: Form, curve: Curve, mesh: Array, x: Array, free: Array,
             sizes.append(norm)
             left = left - np.einsum("pn,pn->p", c, left)[:, None] * c
         rss = np.einsum("pn,pn->p", left, left)
-    return np.where(np.isfinite(rss), rss, np.inf)
+    return np.where(np.isfinite(rss) & seen, rss, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +162,7 @@ def _linear(form: Form, curve: Curve, p: Array) -> _Projected | None:
     """None where the form is not finite, or the curve cannot show it."""
     raw = np.column_stack(form.values(curve.x, *p)) if form.columns else np.empty(
         (len(curve.x), 0))
-    if not np.isfinite(raw).all():
+    if not np.isfinite(raw).all() or not curve.visible(raw.T).all():
         return None
     phi = curve.project(curve.whiten(raw.T)).T
     size = np.linalg.norm(phi, axis=0)

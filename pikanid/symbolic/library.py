@@ -144,7 +144,12 @@ class Form:
 
     def typical(self, low: float, high: float) -> list[float]:
         """Parameters inside that make all of the form show over [low, high]."""
-        return [float(g[len(g) // 3]) for g in (k.grid(low, high, 100) for k in self.knobs)]
+        found = [float(g[len(g) // 3]) for g in (k.grid(low, high, 100) for k in self.knobs)]
+        if [k.kind for k in self.knobs] == ["width"]:  # around zero: between the range's |x|
+            far = max(abs(low), abs(high))
+            near = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+            found = [near + (far - near) / 3.0]
+        return found
 
     def fits_range(self, low: float, high: float) -> bool:
         """Whether the form is finite over [low, high] for some parameters."""

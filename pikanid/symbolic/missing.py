@@ -68,43 +68,75 @@ def edge_curve(edge: Edge, samples: int) -> Curve:
     """An edge of a discrepancy, ready to be named: at visited arguments, its gauge free."""
     visited = np.sort(edge.gauge.a)
     at = np.unique(visited[np.linspace(0, len(visited) - 1, DRAWN).round().astype(int)])
-    return Curve.of_spline(
-        at, edge.gauge.plan.basis(at), edge.coefficients, edge.covariance, samples=samples,
-        free=edge.gauge_functions(at), argument=edge.argument, unit=edge.unit,
-        x_unit=edge.argument_unit)
+    return Curve.of_likelihood(
+        at, edge.gauge.plan.basis(at), edge.coefficients, edge.covariance, edge.information,
+        edge.gain, samples=samples, free=edge.gauge_functions(at), argument=edge.argument,
+        unit=edge.unit, x_unit=edge.argument_unit)
 
 
 def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
            recordings: Recording | Sequence[Recording], weights: Mapping[str, float]
            ) -> list[tuple[float, Laws, Estimate]]:
-    """Laws inside the ODE, best first: BIC less twice the log of the prior, law, estimate."""
+    """Laws inside the ODE, best first: BIC less twice the log of the prior, law, estimate.
+
+    The likely laws of every edge in all combinations; then whatever is simpler than the best, one
+    edge at a time, until nothing simpler is better.
+    """
     from pikanid.strategies.nls import NLS
 
-    lists = [[(place, fit) for fit in _likely(edge)] for place, edge in named.items()]
     arguments = [e.argument for e in found.edges]
     ranges = [e.range for e in found.edges]
-    results = []
-    for choice in islice(product(*lists), MOST):
-        law = sum_of_laws(found.nominal.model, arguments, dict(choice), ranges)
+    results: dict[tuple[str, ...], tuple[float, Laws, Estimate] | None] = {}
+
+    def put_in(choice: Mapping[Place, FormFit]) -> None:
+        key = tuple(fit.form.name for fit in choice.values())
+        if key in results:
+            return
+        results[key] = None
+        law = sum_of_laws(found.nominal.model, arguments, choice, ranges)
         try:
             with np.errstate(all="ignore"):  # on its way a law may leave its domain
-                estimate = NLS().fit(_extended(found, law), recordings)
+                estimate = NLS(starts=1).fit(_extended(found, law), recordings)
         except errors.SimulationFailed:
-            continue
-        prior = sum(np.log(weights[fit.form.name]) for _, fit in choice)
-        results.append((_score(estimate) - 2.0 * float(prior), law, estimate))
-    if not results:
+            return
+        prior = sum(np.log(weights[fit.form.name]) for fit in choice.values())
+        results[key] = (_score(estimate) - 2.0 * float(prior), law, estimate)
+
+    def ranked() -> list[tuple[float, Laws, Estimate]]:
+        return sorted((r for r in results.values() if r is not None), key=lambda r: r[0])
+
+    lists = [[(place, fit) for fit in _likely(edge)] for place, edge in named.items()]
+    for choice in islice(product(*lists), MOST):
+        put_in(dict(choice))
+    if not ranked():
         raise errors.SimulationFailed(errors.no_law_simulated())
-    return sorted(results, key=lambda r: r[0])
+    tried = 0
+    while tried < len(results):
+        tried = len(results)
+        best = ranked()[0][1].fits
+        for place, edge in named.items():
+            for fit in _simpler(edge, best[place].form):
+                put_in({**best, place: fit})
+    return ranked()
 
 
 def _likely(edge: NamedEdge) -> list[FormFit]:
-    """The laws worth a fit inside the ODE; at least the best one."""
+    """The laws worth a fit inside the ODE, the best of every family; at least the best one."""
     scores = {c.form.name: c.score for c in edge.candidates}
     laws = [f for f in shortlist(edge) if f.form is not NOTHING]
-    best = min(scores[f.form.name] for f in laws)
-    near = [f for f in laws if scores[f.form.name] <= best + UNLIKELY]
+    first = min(laws, key=lambda f: scores[f.form.name])
+    # an edge knows its law by a linear model: where none fits, that says less than it claims
+    freedom = max(edge.curve.rows - first.form.count + 1, 1)
+    doubt = max(1.0, first.rss / freedom)
+    near = [f for f in laws if scores[f.form.name] <= scores[first.form.name] + doubt * UNLIKELY]
     return sorted(near, key=lambda f: scores[f.form.name])[:TRIED]
+
+
+def _simpler(edge: NamedEdge, form: Form) -> list[FormFit]:
+    """Laws that a form contains: its family's with fewer constants, and parts of its sum."""
+    return [c.fit for c in edge.candidates
+            if c.form is not NOTHING and c.form.count < form.count
+            and (c.form.family == form.family or set(c.form.columns) < set(form.columns))]
 
 
 def _extended(found: Discrepancy, law: Laws) -> Model:

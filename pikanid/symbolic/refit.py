@@ -14,6 +14,7 @@ from pikanid.symbolic.numeric import Array
 REFUSED = 1e10
 EVALUATIONS = 200
 RANK = 1e-7  # of column-scaled Jacobians
+CROSSING = 0.3  # of its spread: a typical sum's mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +135,25 @@ def generic_jacobian(composition: Composition, x: Array, theta: Array | None = N
                     inside = slice(at.start + len(form.columns), at.stop)
                     usual = form.typical(float(seen.min()), float(seen.max()))
                     place[inside] = np.where(fixed[inside], place[inside], usual)
+            _centre(composition, place, fixed, layer, x)
     J = composition.evaluate(place, x)[1]
     J = J[np.isfinite(J).all(axis=1)]
     if len(J) <= composition.count:
         return np.eye(composition.count)
     size = np.linalg.norm(J, axis=0)
     return np.asarray(np.linalg.qr(J / np.where(size > 0.0, size, 1.0), mode="r"))
+
+
+def _centre(composition: Composition, place: Array, fixed: Array, layer: int, x: Array) -> None:
+    """Moves a layer's free offsets to where its sums cross zero.
+
+    Far from it a limiting form behind them, all of it at its limit, would hide what is inside.
+    """
+    sums = composition.stages(place, x)[layer][1]
+    for s, v in enumerate(sums.T):
+        seen, at = v[np.isfinite(v)], composition.offsets[layer] + s
+        if len(seen) and not fixed[at]:
+            place[at] += CROSSING * float(seen.std()) - float(seen.mean())
 
 
 def _rank(J: Array) -> int:

@@ -14,7 +14,8 @@ import numpy as np
 import sympy as sp
 
 from pikanid.symbolic.composed import Composition, Groups, Place
-from pikanid.symbolic.fitting import FormFit
+from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.fitting import FormFit, fit_form
 from pikanid.symbolic.library import NOTHING, Form
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.numeric import Array
@@ -25,6 +26,7 @@ SIMPLE = ("linear", "quadratic")
 OUTER = 3  # starts
 SEARCHED = 400  # data that a first choice is made on
 POLISHED = 8  # compositions that all data then rank
+FAINT = 1e-2  # of the loudest: least weight of a value that the output hardly depends on
 QUICK = 40  # evaluations of a first try
 
 
@@ -81,15 +83,18 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
         prior = sum(np.log(priors[form.name]) for _, form, _ in it.edges)
         return Ranked(fit, fit.score - 2.0 * float(prior))
 
-    def changed(best: Ranked | None, now: Composition, other: Composition, place: Place,
-                fit: FormFit) -> Ranked | None:
+    def changed(best: Ranked | None, other: Composition, place: Place) -> Ranked | None:
         """Another form in one place: from the constants of the others as they are, or as named."""
         fits = {p: _of(lists[p], other.forms[p]) for p in lists}
         fresh = ranked(other, _start(other, fits, offsets))
         if best is None or (place[0] < len(groups) - 1 and fresh and fresh.score < best.score):
             return fresh
-        own = np.concatenate([fit.amplitudes, fit.inside])
-        return _best(fresh, ranked(other, now.carried(best.fit.theta, other, place, own)))
+        return _best(fresh, followed(best, other, place))
+
+    def followed(best: Ranked, other: Composition, place: Place) -> Ranked | None:
+        """From where the new form follows the old one best."""
+        theta = follow(best.fit, other, place, few)
+        return None if theta is None else ranked(other, theta)
 
     for first in _starts(lists, len(groups)):
         now = Composition(groups, {p: f.form for p, f in first.items()}, inputs)
@@ -101,13 +106,55 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
                 for fit in lists[place]:
                     other = now.swapped(place, fit.form)
                     if _key(other) not in made:
-                        made[_key(other)] = changed(best, now, other, place, fit)
+                        made[_key(other)] = changed(best, other, place)
                     trial = made[_key(other)]
                     if trial and (best is None or trial.score < best.score - 1e-6):
                         best, now, improved = trial, trial.fit.composition, True
+    for best in sorted((r for r in made.values() if r is not None),
+                       key=lambda r: r.score)[:POLISHED]:
+        simpler: Ranked | None = best
+        while simpler is not None:  # forms that have become others' limits give way to them
+            best = made[_key(simpler.fit.composition)] = simpler
+            simpler = None
+            for place in sorted(best.fit.composition.forms, reverse=True):
+                own = best.fit.composition.forms[place]
+                for fit in lists[place]:
+                    if not 1 < fit.form.count < own.count:
+                        continue
+                    other = best.fit.composition.swapped(place, fit.form)
+                    simpler = _best(simpler, followed(best, other, place))
+            if simpler is not None and simpler.score > best.score - 1e-6:
+                simpler = None
     found = sorted((r for r in made.values() if r is not None), key=lambda r: r.score)
     full = [ranked(r.fit.composition, r.fit.theta, True) for r in found[:POLISHED]]
     return sorted((r for r in full if r is not None), key=lambda r: r.score)
+
+
+def follow(old: Refit, other: Composition, place: Place, x: Array) -> Array | None:
+    """Constants of `other`, which has another form in one place, that keep the old values there.
+
+    The new form follows the old one over the arguments that it gets, weighted by what the output
+    makes of it; None where there is nothing to follow, or the form cannot.
+    """
+    layer, i, s = place
+    form = other.forms[place]
+    own = next((theta_at for p, _, theta_at in old.composition.edges if p == place), None)
+    if own is None or form is NOTHING:
+        return None
+    made, theta = old.composition, old.theta
+    u = made.stages(theta, x)[layer][0][:, i]
+    k = len(made.forms[place].columns)
+    values = theta[own][:k] @ np.array(made.forms[place].values(u, *theta[own][k:]))
+    heard = np.abs(made.evaluate(theta, x)[1][:, made.offsets[layer] + s])
+    heard = np.maximum(heard, FAINT * heard.max())
+    if np.ptp(u) == 0.0 or not np.isfinite([u, values, heard]).all() or heard.max() == 0.0:
+        return None
+    fit = fit_form(form, Curve.of_points(u, values, 1.0 / heard))
+    if fit is None:
+        return None
+    result = made.carried(theta, other, place, np.concatenate([fit.amplitudes, fit.inside]))
+    result[other.offsets[layer] + s] += fit.offset
+    return result
 
 
 def _key(made: Composition) -> tuple[str, ...]:

@@ -1,0 +1,86 @@
+"""Laws that a model lacks: what an edge's data say of them, and which are put into the ODE."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.approximators.bspline import BSpline
+from pikanid.approximators.kan.plan import uniform_extended_knots
+from pikanid.symbolic import extract
+from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.fitting import fit_form
+from pikanid.symbolic.library import LIBRARY
+from pikanid.symbolic.missing import _simpler
+from pikanid.symbolic.naming import name_curve
+
+FORMS = {form.name: form for form in LIBRARY}
+X = np.linspace(-2.0, 2.0, 400)
+SIGMA = 0.1 * np.pi / 180
+
+
+def edge_with_gauge(law: np.ndarray, bent: float, seed: int) -> Curve:
+    """What 400 noisy points say of a spline when an almost linear term beside it is free."""
+    B = BSpline(3, uniform_extended_knots(-2.0, 2.0, 10, 3)).basis(X).toarray()
+    nominal = np.column_stack([np.ones(X.size), X * (1.0 - bent * np.abs(X))])
+    y = (law + 0.02 * np.random.default_rng(seed).normal(size=X.size)) / 0.02
+    A, N = B / 0.02, nominal / 0.02
+    apart = np.eye(X.size) - N @ np.linalg.pinv(N)
+    c = np.linalg.lstsq(B, law, rcond=None)[0]
+    return Curve.of_likelihood(X, B, c, 1e-4 * np.eye(c.size), A.T @ apart @ A, A.T @ apart @ y,
+                               samples=X.size, free=nominal)
+
+
+@pytest.mark.parametrize("name, law", [
+    ("signed square", 0.8 * X * np.abs(X)), ("cubic", 0.5 * X**3), ("sine", np.sin(3.0 * X))])
+def test_law_is_named_beside_a_free_term(name: str, law: np.ndarray) -> None:
+    for seed in range(3):
+        edge = name_curve(edge_with_gauge(law + 0.7 * X, 0.01, seed))
+        assert edge.name == name
+        assert edge.probability > 0.9
+
+
+def test_trace_of_a_nominal_term_is_no_law() -> None:
+    """x beside x(1 - 0.01|x|), a hundred times too large, looks like x|x|: it is not offered."""
+    curve = edge_with_gauge(-0.8 * X * np.abs(X), 0.01, 0)
+    assert list(curve.visible(np.array([X, X * np.abs(X), X**2]))) == [False, True, True]
+    assert fit_form(FORMS["linear"], curve) is None
+    assert fit_form(FORMS["sign and linear"], curve) is None
+    found = fit_form(FORMS["tanh"], curve)
+    assert found is None or curve.visible(np.tanh(found.inside[0] * X))
+
+
+def test_rest_is_one_place() -> None:
+    """Samples at rest differ by rounding: no step is looked for between them."""
+    x = np.concatenate([X, [1e-19, 3e-18, -2e-18]])
+    noise = np.random.default_rng(0).normal(0.0, 0.1, x.size)
+    found = fit_form(FORMS["shifted sign"], Curve.of_points(x, np.sign(x - 1e-3) + noise))
+    assert found is not None and abs(found.inside[0]) > 1e-9
+
+
+def test_simpler_laws_are_parts_and_relatives() -> None:
+    curve = Curve.of_points(X, np.sign(X) + 0.1 * np.random.default_rng(0).normal(size=X.size))
+    edge = name_curve(curve, [FORMS[n] for n in ("sign", "shifted sign", "Stribeck", "cubic")])
+    assert [f.form.name for f in _simpler(edge, FORMS["Stribeck"])] == ["sign"]
+    assert [f.form.name for f in _simpler(edge, FORMS["shifted sign"])] == ["sign"]
+    assert _simpler(edge, FORMS["sign"]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [100, 102])
+@pytest.mark.parametrize("law, size, name", [
+    ("sign(theta_dot)", 0.2, "sign"), ("abs(theta_dot)*theta_dot", 0.06, "signed square")])
+def test_friction_and_drag_are_named_inside_the_ode(law: str, size: float, name: str, seed: int
+                                                    ) -> None:
+    """Through the functional, on slosh data of ten moves; with stops, an edge alone can err."""
+    truth = pk.systems.sloshing().with_term(
+        "theta_dot", f"-c*{law}", [pk.Parameter("c", size)])
+    moves = pk.excitation.planar_moves(10, 20.0, acceleration=1.0, velocity=0.5, seed=seed)
+    recording = pk.simulate(truth, moves, sigma=SIGMA, seed=seed)
+    found = pk.kan_discrepancy(pk.systems.sloshing(), recording, "theta_dot",
+                               ["theta", "theta_dot"], grid=[10])
+    reading = extract(found, recordings=recording)
+    assert dict(reading.forms) == {(0, 1, 0): name}
+    assert reading.ok and reading.probability > 0.9
+    assert -reading.values[0] == pytest.approx(size, abs=5 * reading.std[0])
