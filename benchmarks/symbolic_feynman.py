@@ -18,6 +18,7 @@ from pikanid.approximators.kan import build_kan
 from pikanid.approximators.kan.train import PointFit, fit_points
 from pikanid.symbolic import extract
 
+SECONDS = 20  # of one thread, as long as genetic programming may search
 POINTS, NOISE, RECOVERED, RESTARTS = 1000, 0.01, 0.01, 3
 
 
@@ -129,3 +130,43 @@ def run_feynman_pykan(number: str, seed: int) -> dict[str, Any]:
         error = off(kan(torch.from_numpy(there)).numpy()[:, 0], truth)
     return {"recovered": error < RECOVERED, "error": error if np.isfinite(error) else None,
             "seconds": time.process_time() - begun}
+
+
+def run_feynman_operon(number: str, seed: int) -> dict[str, Any]:
+    """The same points, their noise told, through genetic programming with local search, pyoperon.
+
+    Of the expressions between error and length the one of least description length counts.
+    """
+    from pyoperon.sklearn import SymbolicRegressor
+
+    formula = next(f for f in FORMULAS if f.number == number)
+    x, y = points(formula, seed)
+    search = SymbolicRegressor(
+        allowed_symbols="add,sub,mul,div,constant,variable,sin,cos,exp,log,sqrt,square,asin",
+        optimizer_iterations=5, generations=10_000, max_evaluations=100_000_000, max_length=30,
+        max_time=SECONDS, n_threads=1, random_state=seed, objectives=["r2", "length"],
+        uncertainty=[NOISE * float(np.std(y))])
+    return searched(search, formula, x, y)
+
+
+def run_feynman_gplearn(number: str, seed: int) -> dict[str, Any]:
+    """The same points through plain genetic programming, gplearn."""
+    from gplearn.genetic import SymbolicRegressor
+
+    formula = next(f for f in FORMULAS if f.number == number)
+    x, y = points(formula, seed)
+    search = SymbolicRegressor(
+        population_size=1000, generations=40, parsimony_coefficient=0.001, random_state=seed,
+        function_set=("add", "sub", "mul", "div", "sqrt", "log", "sin", "cos"))
+    return searched(search, formula, x, y)
+
+
+def searched(search: Any, formula: Formula, x: np.ndarray, y: np.ndarray) -> dict[str, Any]:
+    """What a regressor of scikit-learn's manner makes of the points, beyond them."""
+    begun = time.process_time()
+    search.fit(x, y)
+    seconds = time.process_time() - begun
+    there, truth = beyond(formula)
+    error = off(np.asarray(search.predict(there), float), truth)
+    return {"recovered": error < RECOVERED, "error": error if np.isfinite(error) else None,
+            "seconds": seconds}

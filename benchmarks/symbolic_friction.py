@@ -30,7 +30,13 @@ def run_friction(label: str, seed: int) -> dict[str, Any]:
     in_ode = extract(found, recordings=data)
     wanted = {(0, ARGUMENTS.index(law.argument), 0): NAMES[label]}
     estimate = in_ode.values[0] if len(in_ode.values) else np.nan
-    return {"edge": list(by_edge.forms.values()), "ode": list(in_ode.forms.values()),
+    edge = found.edge(law.argument)
+    picture = {} if seed else {
+        "argument": edge.grid.tolist(), "values": edge.values.tolist(), "std": edge.std.tolist(),
+        "truth": edge.fix_gauge(lambda a: -value * law.shape(a)).tolist()}
+    return {"picture": picture, "edge_ok": by_edge.ok, "found": edge.significant,
+            "probability": in_ode.probability, "edge": list(by_edge.forms.values()),
+            "ode": list(in_ode.forms.values()),
             "edge_exact": dict(by_edge.forms) == wanted, "ode_exact": dict(in_ode.forms) == wanted,
             "ok": in_ode.ok, "coefficient": value, "estimate": -float(estimate),
             "std": float(in_ode.std[0]) if len(in_ode.std) else None,

@@ -805,6 +805,11 @@ def network_without_inputs() -> str:
     return "The network has seen no inputs yet: give x, the inputs over which it is to be read."
 
 
+def edge_sticks(arguments: Sequence[str]) -> str:
+    return (f"The jump in {' and '.join(arguments)} brings the model to rest, which the edge alone "
+            "cannot judge: give the recordings too, and the laws are compared inside the ODE.")
+
+
 def no_law_simulated() -> str:
     return "None of the laws tried can be simulated along the recording: read without recordings."
 

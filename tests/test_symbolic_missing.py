@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from pikanid.symbolic import extract
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import fit_form
 from pikanid.symbolic.library import LIBRARY
-from pikanid.symbolic.missing import _simpler
+from pikanid.symbolic.missing import _simpler, sticks
 from pikanid.symbolic.naming import name_curve
 
 FORMS = {form.name: form for form in LIBRARY}
@@ -67,6 +69,16 @@ def test_simpler_laws_are_parts_and_relatives() -> None:
     assert _simpler(edge, FORMS["sign"]) == []
 
 
+@pytest.mark.parametrize("jump, resting, stuck", [
+    (1.0, 30, True), (1.0, 0, False), (0.0, 30, False)])
+def test_edge_of_a_model_that_comes_to_rest_is_not_trusted(jump: float, resting: int, stuck: bool
+                                                           ) -> None:
+    a = np.concatenate([np.linspace(-1.0, 1.0, 1000), np.full(resting, 1e-18)])
+    gauge = SimpleNamespace(a=a, weights=np.full(a.size, 1.0 / a.size))
+    assert sticks(SimpleNamespace(  # type: ignore[arg-type]
+        range=(-1.0, 1.0), gauge=gauge, jump_probability=jump)) == stuck
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [100, 102])
 @pytest.mark.parametrize("law, size, name", [
@@ -83,4 +95,6 @@ def test_friction_and_drag_are_named_inside_the_ode(law: str, size: float, name:
     reading = extract(found, recordings=recording)
     assert dict(reading.forms) == {(0, 1, 0): name}
     assert reading.ok and reading.probability > 0.9
+    alone = extract(found)
+    assert dict(alone.forms) == dict(reading.forms) or not alone.ok
     assert -reading.values[0] == pytest.approx(size, abs=5 * reading.std[0])

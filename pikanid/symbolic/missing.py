@@ -33,6 +33,8 @@ from pikanid.symbolic.significance import Contribution
 DRAWN = 120  # points of an edge that are compared
 TRIED = 4  # laws an edge that are put into the equation
 MOST = 16  # combinations of them
+SIMPLER = 2  # laws that one contains, put into the equation beside it
+REST, RESTING = 1e-9, 1e-3  # of the range: as good as zero; share of the time spent there
 UNLIKELY = 30.0  # difference of scores: odds of three millions to one
 
 
@@ -50,8 +52,11 @@ def read_discrepancy(found: Discrepancy, library: Sequence[Form],
     if not named or recordings is None:
         laws = sum_of_laws(found.nominal.model, arguments, chosen(named), ranges)
         share = np.array([float(np.prod([e.probability for e in named.values()]))])
-        return reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
-                               laws.covariance)
+        stuck = [found.edges[k].argument for _, k, _ in named if sticks(found.edges[k])]
+        return replace(
+            reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
+                            laws.covariance),
+            caution=errors.edge_sticks(stuck) if stuck else "")
     tried = _tried(found, named, recordings, priors(library))
     share = probabilities([score for score, _, _ in tried])
     _, laws, estimate = tried[0]
@@ -62,6 +67,17 @@ def read_discrepancy(found: Discrepancy, library: Sequence[Form],
     return reading_of_laws(refitted, named, arguments, ranges, weights, share,
                            [one.label for _, one, _ in tried],
                            estimate.covariance[np.ix_(at, at)], estimate)
+
+
+def sticks(edge: Edge) -> bool:
+    """Whether a jump holds its argument at zero for a while.
+
+    How long depends on everything else, by no linear model: what such an edge says of its own law
+    is not to be trusted until the law is in the equation.
+    """
+    reach = max(abs(edge.range[0]), abs(edge.range[1]))
+    resting = float(edge.gauge.weights[np.abs(edge.gauge.a) < REST * reach].sum())
+    return edge.jump_probability > 0.5 and resting > RESTING
 
 
 def edge_curve(edge: Edge, samples: int) -> Curve:
@@ -79,8 +95,8 @@ def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
            ) -> list[tuple[float, Laws, Estimate]]:
     """Laws inside the ODE, best first: BIC less twice the log of the prior, law, estimate.
 
-    The likely laws of every edge in all combinations; then whatever is simpler than the best, one
-    edge at a time, until nothing simpler is better.
+    The likely laws of every edge in all combinations, then what is simpler than one of them: where
+    a system sticks, the linear model behind an edge misjudges a jump most of all.
     """
     from pikanid.strategies.nls import NLS
 
@@ -110,13 +126,10 @@ def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
         put_in(dict(choice))
     if not ranked():
         raise errors.SimulationFailed(errors.no_law_simulated())
-    tried = 0
-    while tried < len(results):
-        tried = len(results)
-        best = ranked()[0][1].fits
+    for _, law, _ in ranked():
         for place, edge in named.items():
-            for fit in _simpler(edge, best[place].form):
-                put_in({**best, place: fit})
+            for fit in _simpler(edge, law.fits[place].form):
+                put_in({**law.fits, place: fit})
     return ranked()
 
 
@@ -133,10 +146,11 @@ def _likely(edge: NamedEdge) -> list[FormFit]:
 
 
 def _simpler(edge: NamedEdge, form: Form) -> list[FormFit]:
-    """Laws that a form contains: its family's with fewer constants, and parts of its sum."""
-    return [c.fit for c in edge.candidates
-            if c.form is not NOTHING and c.form.count < form.count
-            and (c.form.family == form.family or set(c.form.columns) < set(form.columns))]
+    """The best laws that a form contains: relatives with fewer constants, parts of its sum."""
+    found = [c for c in edge.candidates
+             if c.form is not NOTHING and c.form.count < form.count
+             and (c.form.family == form.family or set(c.form.columns) < set(form.columns))]
+    return [c.fit for c in sorted(found, key=lambda c: c.score)[:SIMPLER]]
 
 
 def _extended(found: Discrepancy, law: Laws) -> Model:

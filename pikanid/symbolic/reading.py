@@ -50,6 +50,7 @@ class Reading:
     kan, composition, theta : the network that was read, pruned, and the formula in its places with
         all its constants
     estimate : of the model with the formula in it, where it was refitted inside an ODE
+    caution : why the formula cannot be trusted whatever its fit, or ""
     """
 
     expression: sp.Expr
@@ -72,10 +73,13 @@ class Reading:
     composition: Composition | None = field(default=None, repr=False)
     theta: Array = field(default_factory=lambda: np.empty(0), repr=False)
     estimate: Estimate | None = field(default=None, repr=False)
+    caution: str = ""
 
     @property
     def ok(self) -> bool:
         """Whether the formula says all that the network says, as far as the data can tell."""
+        if self.caution:
+            return False
         if self.p_value is not None:
             return self.p_value >= ADEQUATE
         return self.error_network <= CLOSE * self.spread
@@ -122,6 +126,8 @@ class Reading:
         where = ", ".join(f"{n} in {a:.3g} ... {b:.3g}"
                           for n, (a, b) in zip(self.inputs, self.ranges, strict=True))
         share = self.error_network / self.spread if self.spread > 0 else 0.0
+        if self.caution:
+            return self.caution
         if not self.ok:
             return (f"No simple form says what the network says over {where}: the best one found "
                     f"is off by {share:.2%} of its spread.")
