@@ -17,16 +17,17 @@ from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.locate import locate, smallest
-from pikanid.mismatch.preparation import prepared, with_refined_noise
+from pikanid.mismatch.preparation import oversampling, prepared, with_refined_noise
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
 from pikanid.mismatch.verdict import Answer, explanations, settle
-from pikanid.mismatch.whitened import Records
+from pikanid.mismatch.whitened import CERTAIN, GROSS, Records
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
+BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
 Recordings = Recording | Sequence[Recording]
 
 
@@ -79,12 +80,12 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     if detection.p_value >= alpha:
         answer = Answer("none", (), ())
     else:
-        ranked = search.run(lambda h: case.test(h).p_value > 0.05)
+        ranked = search.run(case.adequate)
         if case.relevelled(ranked[0], quiet):
             # the first level was read through the mismatch itself: now it is out of the way
             tell("noise again")
             search = case.search
-            ranked = search.grow(lambda h: case.test(h).p_value > 0.05)
+            ranked = search.grow(case.adequate)
         tell("confirmation")
         answer = settle(ranked, search.scale(), case.test, case.predicted, case.proves)
     return _diagnosis(case, detection, answer, alpha, begun)
@@ -114,6 +115,8 @@ class Case:
 
     def relevelled(self, best: Hypothesis, quiet: tuple[float, float] | None) -> bool:
         """Read the noise from what the best explanation leaves; whether that made a difference."""
+        if best.minimum.chi2 > GROSS * best.whitened.rows:
+            return False
         fit = as_estimate(best, self.before)
         new = with_refined_noise(self.records, fit, self.rate, quiet)
         if all(abs(np.log(a[o].sigma / b[o].sigma)) < 0.05 and abs(a[o].rho - b[o].rho) < 0.06
@@ -128,6 +131,12 @@ class Case:
         self.tests.clear()
         self.predictions.clear()
         return True
+
+    def adequate(self, h: Hypothesis) -> bool:
+        """Whether nothing is left in the train recordings."""
+        if h.minimum.chi2 > CERTAIN * h.whitened.rows:
+            return False
+        return self.test(h).p_value > 0.05
 
     def test(self, h: Hypothesis) -> Detection:
         """What is left in the train recordings."""
@@ -146,6 +155,18 @@ class Case:
         return self.predictions[h.key]
 
 
+    def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
+        """Whether a hypothesis is worth its effects beyond another one.
+
+        Where a misfit is left anyway, an effect always gains on the recording that it is fitted to:
+        then it has to predict the held-out recording clearly better.
+        """
+        if self.later is None or more.minimum.chi2 < CERTAIN * more.whitened.rows:
+            return True
+        old, new = self.predicted(fewer), self.predicted(more)
+        return old is None or (new is not None and new.rmse < BETTER * old.rmse)
+
+
 def _several(recordings: Recordings) -> tuple[Recording, ...]:
     return (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
 
@@ -160,20 +181,26 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
         notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
     model = _held_as_recorded(model, train)
     tell("nominal fit")
-    records = prepared(model, train, quiet, notes)
+    together = oversampling(model, train)
+    if together > 1:
+        notes.append(f"{together} neighbouring samples of the outputs count as one: nothing in "
+                     "them moves fast enough to need more.")
+    records = prepared(model, train, quiet, notes, together)
     before = NLS().fit(model, _with_sigma(records, model))
     nominal = before.fitted_model
     rate = sites(nominal, records.recordings)[0].rate
     records = with_refined_noise(records, before, rate, quiet)
     held = None
     if later is not None:
-        held = prepared(model, later, None, notes)
+        held = prepared(model, later, None, notes, together)
         held = Records(held.recordings, tuple(records.levels[0] for _ in held.recordings))
     found = sites(nominal, records.recordings)
     listed = catalogue_of(found)
     search = Search(nominal, records, listed, tell)
     base = search.base()
-    return Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
+    case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
+    search.predicts = case.predicts
+    return case
 
 
 def _check_pair(train: tuple[Recording, ...], later: tuple[Recording, ...]) -> None:

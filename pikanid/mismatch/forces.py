@@ -27,11 +27,18 @@ def term(site: Site, identifier: str, name: str, expression: str, size: Paramete
                      lambda m: m.with_term(site.v, expression), signs, variant, twin, known=known)
 
 
+def sense(view: View, v: str) -> np.ndarray:
+    """The sign (L,) of a rate, averaged over a step where it changes inside."""
+    near = 0.5 * np.abs(view.rates[v]) * np.gradient(view.t)
+    speed = view.x[v]
+    return np.asarray(np.clip(speed / np.maximum(near, 1e-300), -1.0, 1.0))
+
+
 def coulomb_friction(site: Site) -> list[Candidate]:
     """Dry friction: the same force at every speed, against the motion."""
     c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
     return [term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-                 lambda w: -np.sign(w.x[site.v]), one_sided=True)]
+                 lambda w: -sense(w, site.v), one_sided=True)]
 
 
 def quadratic_drag(site: Site) -> list[Candidate]:
@@ -50,7 +57,8 @@ def power_drag(site: Site) -> list[Candidate]:
 
     def signs(view: View) -> list[Sign]:
         v = view.x[site.v]
-        return [Sign({c.name: 1.0, n.name: e}, force=-np.sign(v) * np.abs(v) ** e, one_sided=True)
+        return [Sign({c.name: 1.0, n.name: e}, force=-sense(view, site.v) * np.abs(v) ** e,
+                     one_sided=True)
                 for e in (0.2, 0.35, 0.5, 0.7, 1.3, 1.5, 1.75, 2.3, 2.7, 3.2)]
 
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate, Sign, View
-from pikanid.mismatch.forces import INF, term
+from pikanid.mismatch.forces import INF, sense, term
 from pikanid.mismatch.site import Site
 from pikanid.model import Model
 from pikanid.model_parts import Parameter
@@ -24,7 +24,7 @@ def _product(u: str, v: str) -> Shape:
 
 
 def _half_sign(v: str, sign: int) -> Shape:
-    return lambda w: -(np.sign(w.x[v]) + sign) / 2
+    return lambda w: -(sense(w, v) + sign) / 2
 
 
 def _lever(p: str) -> Shape:
@@ -73,7 +73,8 @@ def stribeck_friction(site: Site) -> list[Candidate]:
     def signs(view: View) -> list[Sign]:
         v = view.x[site.v]
         return [Sign({c.name: 1.0, rise.name: 1.0, slow.name: s},
-                     force=-np.sign(v) * (1 + np.exp(-(v / s) ** 2)), one_sided=True)
+                     force=-sense(view, site.v) * (1 + np.exp(-(v / s) ** 2)),
+                     one_sided=True)
                 for s in (0.05, 0.15, 0.5)]
 
     return [Candidate(("stribeck_friction",), "friction that rises at low speed", text, "dynamics",

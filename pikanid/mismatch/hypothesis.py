@@ -9,9 +9,14 @@ import numpy as np
 
 from pikanid.mismatch.candidate import Candidate, Sign
 from pikanid.mismatch.least_squares import Minimum, minimise
-from pikanid.mismatch.whitened import Records, Whitened
+from pikanid.mismatch.whitened import GROSS, Records, Whitened
 from pikanid.model import Model
 
+LIMIT = 30  # iterations of a fit
+HURRIED = 12  # and of one among gross misfits
+FAR = 2.0  # times the closest χ², and that of the noise: fits above both together are given up
+WILD = 1000.0  # times both, for a start
+GLANCE = 1e4  # χ² per row that is good enough to see that
 COARSE = 5  # iterations that each of several starts gets before the best one goes on
 
 
@@ -42,9 +47,10 @@ class Hypothesis:
 
     @property
     def values(self) -> dict[str, float]:
-        """Estimates by name."""
-        free = self.whitened.problem.free
-        return {f.name: float(v) for f, v in zip(free, self.minimum.theta, strict=True)}
+        """Estimates by name; what each of several recordings has for itself, by label too."""
+        both = list(zip(self.whitened.problem.free, self.minimum.theta, strict=True))
+        return {**{f.name: float(v) for f, v in reversed(both)},
+                **{f.label: float(v) for f, v in both}}
 
     @property
     def covariance(self) -> np.ndarray:
@@ -75,8 +81,18 @@ def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
     return model
 
 
+@dataclass(frozen=True)
+class Start:
+    """Where a fit begins: parameter values by name, and those it may fall back towards, where the
+    new effects do nothing and χ² is that of the hypothesis which they extend.
+    """
+
+    values: Mapping[str, float]
+    origin: Mapping[str, float]
+
+
 def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
-           starts: Sequence[Mapping[str, float]], choices: int, limit: int = 30
+           starts: Sequence[Start | Mapping[str, float]], choices: int, closest: float = np.inf
            ) -> Hypothesis | None:
     """Refit the nominal model with effects added.
 
@@ -84,9 +100,10 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         nominal: Without effects.
         effects: To add.
         records: To fit.
-        starts: Parameter values by name to begin from; the others begin at the model's.
+        starts: From where; parameters not named begin at the model's values.
         choices: Number of effects to choose from.
-        limit: Iterations.
+        closest: χ² of the closest fit so far: one that stays far above is not carried through, and
+            simulations need not be much more accurate than it is.
 
     Returns:
         The best local fit, or None where none of the starts can be simulated.
@@ -94,26 +111,65 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     model = extended(nominal, effects)
     whitened = Whitened(model, records)
     problem = whitened.problem
+    rows = max(whitened.rows, 1)
+    reach = FAR * (closest + rows)
+    misfit = closest / rows if np.isfinite(closest) else 1.0
+    limit = LIMIT if misfit < GROSS else HURRIED
     best: Minimum | None = None
     for start in starts:
-        guess = np.array([start.get(f.name, f.guess) for f in problem.free])
-        guess = np.clip(guess, problem.lower, problem.upper)
-        if not whitened.choose_steps(guess):
+        guess = _begun(whitened, start, misfit, WILD * (closest + rows))
+        if guess is None:
             continue
         found = minimise(whitened.residual, guess, problem.lower, problem.upper,
-                         COARSE if len(starts) > 1 else limit)
+                         COARSE if len(starts) > 1 else limit, reach=reach)
         if found is not None and (best is None or found.chi2 < best.chi2):
             best = found
     if best is None:
         return None
-    if not best.converged:
-        if not whitened.choose_steps(best.theta):
+    finer = misfit > GROSS and best.chi2 < 0.25 * closest
+    if finer or (not best.converged and best.chi2 < reach):
+        if not whitened.choose_steps(best.theta, misfit=min(best.chi2 / rows, misfit)):
             return None
-        best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit)
+        best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
+                        reach=reach)
         if best is None:
             return None
     penalty = _penalty(effects, whitened.rows, choices)
     return Hypothesis(tuple(effects), model, whitened, best, penalty)
+
+
+def _begun(whitened: Whitened, start: Start | Mapping[str, float], misfit: float, wild: float
+           ) -> np.ndarray | None:
+    """θ (n,) to begin at: the start, or nearer to its origin if χ² is smaller there.
+
+    A linear step out of a large misfit goes too far: the phase of an oscillation bends.  A start
+    that has no origin and a χ² beyond `wild`, seen at a glance, is not worth finer steps.
+    """
+    problem = whitened.problem
+    values, origin = (start.values, start.origin) if isinstance(start, Start) else (start, start)
+
+    def at(named: Mapping[str, float]) -> np.ndarray:
+        return np.clip([named.get(f.label, named.get(f.name, f.guess)) for f in problem.free],
+                       problem.lower, problem.upper)
+
+    goal, home = at(values), at(origin)
+    if not np.any(goal != home):
+        if isinstance(start, Start) and not (
+                whitened.choose_steps(goal, misfit=max(misfit, GLANCE))
+                and whitened.chi2(goal) <= wild):
+            return None
+        return goal if whitened.choose_steps(goal, misfit=misfit) else None
+    best, least = None, np.inf
+    for share in (1.0, 0.25, 0.06, 0.01):
+        theta = home + share * (goal - home)
+        if not whitened.choose_steps(theta, misfit=misfit):
+            continue
+        size = whitened.chi2(theta)
+        if misfit < GROSS or (share < 1 and size > least):
+            return theta if best is None or size < least else best
+        if size < least:
+            best, least = theta, size
+    return best
 
 
 def _penalty(effects: Sequence[Candidate], rows: int, choices: int) -> float:
@@ -122,12 +178,14 @@ def _penalty(effects: Sequence[Candidate], rows: int, choices: int) -> float:
 
 
 def start_from(candidate: Candidate, sign: Sign, amplitude: float,
-               values: Mapping[str, float]) -> dict[str, float]:
-    """Parameter values at which a fit with one more effect begins."""
+               values: Mapping[str, float]) -> Start:
+    """Where a fit with one more effect begins; `values` are those of the other parameters."""
     start = {**values, **sign.start}
+    origin = dict(start)
     if sign.scales and candidate.parameters:
         size = next(iter(sign.start), candidate.parameters[0].name)
         null = next((p.value for p in candidate.parameters if p.name == size), 0.0)
         null = null if sign.null is None else sign.null
         start[size] = null + amplitude * sign.start.get(size, 1.0)
-    return start
+        origin[size] = null
+    return Start(start, origin)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pikanid.mismatch.beginning import own_beginning
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection, detect, frequency_bands, past_inputs, unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis, extended
@@ -109,7 +110,8 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     theta_hat = np.array([hypothesis.values[free[k].name] for k in shared])
     guess[shared] = theta_hat
     root = _information_root(hypothesis, [free[k].name for k in shared])
-    if not whitened.choose_steps(guess):
+    misfit = hypothesis.minimum.chi2 / max(hypothesis.whitened.rows, 1)
+    if not whitened.choose_steps(guess, misfit=misfit):
         return None
 
     def evaluate(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
@@ -121,11 +123,13 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         return (np.concatenate([at[0], root @ (theta[shared] - theta_hat)]),
                 np.vstack([at[1], prior]))
 
-    own = [k for k in range(len(free)) if k not in shared]
-    if own:
-        fixed = np.array([k in own for k in range(len(free))])
-        first = minimise(whitened.residual, guess, np.where(fixed, whitened.problem.lower, guess),
-                         np.where(fixed, whitened.problem.upper, guess), 40)
+    own = np.array([k not in shared for k in range(len(free))])
+    if own.any():
+        begun = own_beginning(whitened.problem, guess, tuple({c.site.q: c.site
+                                                              for c in candidates}.values()))
+        guess = min(guess, begun, key=whitened.chi2)
+        first = minimise(whitened.residual, guess, np.where(own, whitened.problem.lower, guess),
+                         np.where(own, whitened.problem.upper, guess), 40)
         if first is not None:
             guess = first.theta
     found = minimise(evaluate, guess, whitened.problem.lower, whitened.problem.upper, 25)

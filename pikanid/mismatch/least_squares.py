@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+PATIENCE = 6  # iterations that a fit gets to come near the best one
+SLOW = 0.7  # share of |r|² left by one iteration from which on a fit far away is given up
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray] | None]
 
 
@@ -26,10 +28,11 @@ class Minimum:
 
 
 def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np.ndarray,
-             limit: int = 30, tolerance: float = 0.02) -> Minimum | None:
+             limit: int = 30, tolerance: float = 0.02, reach: float = np.inf) -> Minimum | None:
     """Minimise |r(θ)|² within bounds; None where the start cannot be evaluated.
 
-    A parameter at a bound that the gradient pushes outwards stays there for the step.
+    A parameter at a bound that the gradient pushes outwards stays there for the step.  What is
+    still above `reach` after `PATIENCE` iterations and falls slowly is given up.
 
     >>> line = lambda q: (np.array([q[0] - 3.0]), np.ones((1, 1)))
     >>> found = minimise(line, np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -42,9 +45,10 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
         return None
     r, J = at
     best, damping = float(r @ r), 1e-3
-    for _ in range(limit):
+    for count in range(limit):
         if len(theta) == 0:
             break
+        last = best
         g = J.T @ r
         moving = ~(((theta <= lower) & (g > 0)) | ((theta >= upper) & (g < 0)))
         A = J[:, moving]
@@ -60,7 +64,7 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
                 step >= high, upper[moving], theta[moving] + step / norms))
             expected = float(best - np.sum((r + J @ (new - theta)) ** 2))
             # far from an explanation nobody needs the last digits
-            if expected < max(tolerance, 2e-5 * best):
+            if expected < max(tolerance, 2e-5 * best, 0.1 * best / len(r)):
                 return Minimum(theta, r, J, True)
             at = evaluate(new)
             if at is not None and float(at[0] @ at[0]) < best:
@@ -69,7 +73,8 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
                 damping = max(damping * (0.1 if gain > 0.5 * expected else 1.0), 1e-9)
                 break
             damping = max(damping * 8, 1e-4)
-        if not accepted:
+        hopeless = count + 1 >= PATIENCE and best > reach and best > SLOW * last
+        if not accepted or hopeless:
             return Minimum(theta, r, J, False)
     return Minimum(theta, r, J, len(theta) == 0)
 

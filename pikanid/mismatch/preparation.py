@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
+from pikanid.channel import Channel
 from pikanid.estimate import Estimate
 from pikanid.mismatch.noise_level import Level, first_level, refined, without_outliers
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 from pikanid.recording import Recording
 
+LONG = 4000  # samples below which none are put together
+FINE = 30  # samples a period that are kept
 
 def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float, float] | None,
-             notes: list[str]) -> Records:
-    """Recordings in the model's units without outliers, each output with a first noise level."""
+             notes: list[str], together: int = 1) -> Records:
+    """Recordings in the model's units without outliers, each output with a first noise level.
+
+    Where `together` is more than one, that many samples of an output become one.
+    """
     done, levels = [], []
     for recording in recordings:
         found: dict[str, Level] = {}
@@ -21,10 +31,54 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
             if count:
                 notes.append(f"Recording '{recording.name}': {count} outliers of "
                              f"'{output.name}' are left out.")
+            if together > 1:
+                recording = recording.with_channels(averaged(recording[output.name], together))
             found[output.name] = first_level(recording, output.name, quiet)
         done.append(recording)
         levels.append(found)
     return Records(tuple(done), tuple(levels))
+
+
+def oversampling(model: Model, recordings: tuple[Recording, ...]) -> int:
+    """How many samples of the outputs may become one: of records that are long, and recorded far
+    faster than anything in them moves.
+
+    Above the frequency that 99.9 % of an output's changes stay below, `FINE` samples a period are
+    kept.
+    """
+    total = sum(len(r[o].time) for r in recordings for o in model.output_names)
+    counts = [total // LONG]
+    for recording in recordings:
+        for name in model.output_names:
+            c = recording[name]
+            y = c.values[np.isfinite(c.values)]
+            steps = np.diff(c.time)
+            if len(y) < LONG // 4 or np.ptp(steps) > 0.01 * np.median(steps):
+                return 1
+            y = (y - np.linspace(y[0], y[-1], len(y))) * np.hanning(len(y))
+            power = np.cumsum(np.abs(np.fft.rfft(y)) ** 2)
+            fast = int(np.searchsorted(power, 0.999 * power[-1])) + 1
+            counts.append(int(len(y) / (FINE * fast)))
+    odd = max(min(counts), 1)
+    return odd - 1 + odd % 2
+
+
+def averaged(channel: Channel, count: int) -> Channel:
+    """A channel in which `count` (odd) neighbouring samples become one.
+
+    Each is the value, in the middle, of the parabola through them (A. Savitzky and M. J. E. Golay,
+    Anal. Chem. 36, 1964), which follows a motion to third order.
+    """
+    half = count // 2
+    k = np.arange(-half, half + 1)
+    weights = np.linalg.pinv(np.vander(k / max(half, 1), 3))[2]
+    middles = np.arange(half, len(channel.time) - half, count)
+    values = np.convolve(channel.values, weights[::-1], "valid")[middles - half]
+    sigma = channel.sigma
+    if sigma is not None:
+        sigma = np.broadcast_to(np.asarray(sigma, float), channel.time.shape)[middles] * float(
+            np.linalg.norm(weights))
+    return replace(channel, time=channel.time[middles], values=values, sigma=sigma)
 
 
 def with_refined_noise(records: Records, fit: Estimate, rate: float,

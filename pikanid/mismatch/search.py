@@ -10,9 +10,9 @@ import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import unit_columns
-from pikanid.mismatch.hypothesis import Hypothesis, fitted, start_from
+from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted, start_from
 from pikanid.mismatch.tangent import Directions, directions
-from pikanid.mismatch.whitened import Records
+from pikanid.mismatch.whitened import CERTAIN, Records
 from pikanid.model import Model
 
 SINGLES, PAIRS, MORE = 14, 8, 6  # refits of one effect, of two at once, of one more
@@ -31,12 +31,15 @@ class Search:
         records: To explain.
         candidates: Entries of the catalogue and guards.
         tell: Called with what is being done.
+        predicts: Whether the second hypothesis is worth its effects beyond the first one, as far as
+            other recordings say.
     """
 
     nominal: Model
     records: Records
     candidates: tuple[Candidate, ...]
     tell: Callable[[str], None] = lambda text: None
+    predicts: Callable[[Hypothesis, Hypothesis], bool] = lambda fewer, more: True
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
 
     @property
@@ -67,14 +70,18 @@ class Search:
             if adequate(best):
                 break
             self.tell(f"{count + 1} effects together")
-            before = best.score()
             leading = [h for h in self.ranked() if h.effects][: LEADING if count == 1 else 1]
+            near = FAR * (best.minimum.chi2 + best.whitened.rows)
+            leading = [h for h in leading if h.minimum.chi2 < near]
             for hypothesis in leading:
                 if len(hypothesis.effects) < MOST:
                     self._extend(hypothesis, MORE)
-            if self.ranked()[0].score() > before - 1e-9:
+            if self.ranked()[0] is best or (
+                    len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
-        self._exchange(self.ranked()[0])
+        best = self.ranked()[0]
+        if best.minimum.chi2 < CERTAIN * best.whitened.rows:
+            self._exchange(best)
         self._with_power_laws(self.ranked()[0])
         return self.ranked()
 
@@ -113,10 +120,17 @@ class Search:
         return sorted(every, key=lambda h: h.score(scale))
 
     def scale(self) -> float:
-        """χ² per degree of freedom of the closest fit, at least one."""
+        """What χ² counts for: that of the closest fit per degree of freedom, at least one.
+
+        What a misfit leaves is no white noise: neighbouring rows say the same, and an effect that
+        follows it gains more than its share.  The more of the residual is misfit, the more it is
+        counted by the number of independent rows instead, N / Σ ρ_k² (G. V. Bayley and J. M.
+        Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
+        """
         closest = min(self.fits.values(), key=lambda h: h.minimum.chi2)
         freedom = max(closest.whitened.rows - len(closest.minimum.theta), 1)
-        return max(1.0, closest.minimum.chi2 / freedom)
+        level = max(1.0, closest.minimum.chi2 / freedom)
+        return level * repeated(closest.minimum.r) ** (1 - 1 / level)
 
     def _extend(self, hypothesis: Hypothesis, count: int) -> None:
         present = {e.key for e in hypothesis.effects}
@@ -127,18 +141,28 @@ class Search:
         for candidate, starts in screen.singles(count):
             self._fit((*hypothesis.effects, candidate), starts)
 
-    def _fit(self, effects: Sequence[Candidate], starts: Sequence[Mapping[str, float]]
+    def _fit(self, effects: Sequence[Candidate], starts: Sequence[Start | Mapping[str, float]]
              ) -> Hypothesis:
         key = frozenset(e.key for e in effects)
         if key in self.fits:
             return self.fits[key]
         order = {c.key: k for k, c in enumerate(self.candidates)}
         ordered = sorted(effects, key=lambda e: order[e.key])
-        found = fitted(self.nominal, ordered, self.records, starts, self.choices)
+        found = fitted(self.nominal, ordered, self.records, starts, self.choices,
+                       min((h.minimum.chi2 for h in self.fits.values()), default=np.inf))
         if found is not None:
             self.fits[key] = found
             return found
         return self.fits[frozenset()]
+
+
+def repeated(r: np.ndarray) -> float:
+    """How many neighbouring rows of a residual (N,) say the same: Σ ρ_k², at least one."""
+    n = len(r)
+    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
+    rho = np.fft.irfft(spectrum)[1:max(n // 4, 2)] / max(float(r @ r), 1e-300)
+    # noise alone has ρ² = 1/N
+    return max(1.0, 1 + 2 * float(np.sum(rho**2 - 1 / n)))
 
 
 class Screen:
@@ -153,6 +177,11 @@ class Screen:
         good = self.lengths > 0
         allowed = good & ((self.z > 0) | ~self.found.one_sided)
         self.gain = np.where(allowed, self.z**2, 0.0)
+        self.names = [f.label for f in about.whitened.problem.free]
+        norms = np.maximum(np.linalg.norm(about.minimum.J, axis=0), 1e-300)
+        # what the parameters take up of each sign, as far as they are told apart
+        scaled = np.linalg.lstsq(about.minimum.J / norms, self.found.D, 1e-8)[0]
+        self.taken = scaled / norms[:, None]
 
     def best(self, candidate: int, count: int = 1) -> list[int]:
         """A candidate's most telling signs, no two neighbours."""
@@ -165,12 +194,12 @@ class Screen:
                 break
         return chosen
 
-    def singles(self, count: int) -> list[tuple[Candidate, list[dict[str, float]]]]:
+    def singles(self, count: int) -> list[tuple[Candidate, list[Start]]]:
         """The most promising candidates, with the starts of their fits."""
         several = [self.best(c, 3) for c in range(len(self.found.candidates))]
         order = sorted((k for k, s in enumerate(several) if s),
                        key=lambda k: -self.gain[several[k][0]])
-        listed: list[tuple[Candidate, list[dict[str, float]]]] = []
+        listed: list[tuple[Candidate, list[Start]]] = []
         for k in order:
             if self.gain[several[k][0]] < 3.0 and listed:
                 break
@@ -182,15 +211,20 @@ class Screen:
         known = [entry for entry in listed if entry[0].known][:count]
         return known + [entry for entry in listed if not entry[0].known][:max(count // 3, 1)]
 
-    def _start(self, candidate: Candidate, sign: int, amplitude: float) -> dict[str, float]:
-        length = self.lengths[sign]
-        return start_from(candidate, self.found.signs[sign], float(amplitude / length),
-                          self.about.values)
+    def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
+        size = float(amplitude / self.lengths[sign])
+        start = start_from(candidate, self.found.signs[sign], size, self.about.values)
+        if not self.found.signs[sign].scales:
+            return start
+        moved = {n: self.about.values[n] - size * float(d)
+                 for n, d in zip(self.names, self.taken[:, sign], strict=True)}
+        return Start({**start.values, **moved}, start.origin)
 
     def pairs(self, count: int
-              ) -> list[tuple[tuple[Candidate, Candidate], list[dict[str, float]]]]:
+              ) -> list[tuple[tuple[Candidate, Candidate], list[Start]]]:
         """The pairs that take most away together, also where neither does alone."""
-        known = np.array([c.known for c in self.found.candidates])
+        # a law of free exponent is tried later, in the place of whole ones
+        known = np.array([c.known and not c.covers for c in self.found.candidates])
         good = np.flatnonzero((self.lengths > 0) & known[self.found.owner])
         C = self.units[:, good].T @ self.units[:, good]
         z, owner = self.z[good], self.found.owner[good]
@@ -202,7 +236,7 @@ class Screen:
         bad = (rest < 1e-4) | (owner[:, None] == owner[None, :]) | (
             sided[:, None] & (first <= 0)) | (sided[None, :] & (first.T <= 0))
         gain = np.triu(np.where(bad, 0.0, gain), 1)
-        listed: list[tuple[tuple[Candidate, Candidate], list[dict[str, float]]]] = []
+        listed: list[tuple[tuple[Candidate, Candidate], list[Start]]] = []
         taken: set[tuple[int, int]] = set()
         for flat in np.argsort(-gain, axis=None, kind="stable")[:4000]:
             i, j = divmod(int(flat), len(z))
@@ -216,5 +250,9 @@ class Screen:
             start = self._start(a, int(good[i]), first[i, j])
             other = self._start(b, int(good[j]), first[j, i])
             own = {p.name for p in b.parameters}
-            listed.append(((a, b), [{**start, **{n: v for n, v in other.items() if n in own}}]))
+            values, origin = ({**x, **{n: v for n, v in y.items() if n in own}} for x, y in (
+                (start.values, other.values), (start.origin, other.origin)))
+            for n, now in self.about.values.items():
+                values[n] = start.values[n] + other.values[n] - now
+            listed.append(((a, b), [Start(values, origin)]))
         return listed

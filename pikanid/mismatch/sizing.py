@@ -115,7 +115,7 @@ def sized(candidate: Candidate, screen: Screen, own: np.ndarray, wanted: float, 
     tried: list[tuple[float, float]] = []
     best: Sized | None = None
     for _ in range(TRIES):
-        values = start_from(candidate, sign, amplitude, {})
+        values = dict(start_from(candidate, sign, amplitude, {}).values)
         if not scaling and name:
             values[name] = sign.start[name] * amplitude
         at = _shown(candidate, values, base, excitation, sigma)

@@ -21,6 +21,8 @@ from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 
 TOGETHER = 100  # signs integrated at once
+STABLE = 1.5  # rate times step that the Runge-Kutta method follows well enough
+MOST_PARTS = 64  # of a step
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Tangent:
         field = VectorField(self.model)
         self.fx, self.fp = field.rhs_jacobians(self.t, self.x, self.u, p)
         self.hx, _ = field.output_jacobians(self.t, self.x, self.u, p)
-        self.fu = self._by_input(field)
+        self.thirds = self._thirds(field, grid.V)
         seen = grid.seen
         counts = np.diff(seen.first)
         self.stop = np.empty(grid.rows, int)
@@ -79,18 +81,33 @@ class Tangent:
         self.output[seen.row] = seen.output
         self.view = self._view(field, whitened.records.recordings[r], experiment.held)
 
-    def _by_input(self, field: VectorField) -> np.ndarray:
+    def _thirds(self, field: VectorField, slopes: np.ndarray
+                ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """(∂f/∂x (L-1, n, n), ∂f/∂u (L-1, n, m)) at the left end, the middle and the right end of
+        each step, the inputs as they run in it; the middle state from a cubic through both ends.
+        """
+        t, x, h = self.t, self.x, np.diff(self.t)[:, None]
+        left, right = self.u[:-1], self.u[:-1] + slopes[:-1] * h
+        f0 = field.rhs(t[:-1], x[:-1], left, self.p)
+        f1 = field.rhs(t[1:], x[1:], right, self.p)
+        middle = 0.5 * (x[:-1] + x[1:]) + h / 8 * (f0 - f1)
+        places = [(t[:-1], x[:-1], left), (0.5 * (t[:-1] + t[1:]), middle, 0.5 * (left + right)),
+                  (t[1:], x[1:], right)]
+        return [(field.rhs_jacobians(at, state, u, self.p)[0], self._by_input(field, at, state, u))
+                for at, state, u in places]
+
+    def _by_input(self, field: VectorField, t: np.ndarray, x: np.ndarray, u: np.ndarray
+                  ) -> np.ndarray:
         """∂f/∂u (L, n, m) by differences: exact where f is linear in u."""
         columns = []
-        for j in range(self.u.shape[1]):
-            size = max(float(np.abs(self.u[:, j]).max(initial=0.0)), 1e-3) * 1e-4
-            up, down = self.u.copy(), self.u.copy()
+        for j in range(u.shape[1]):
+            size = max(float(np.abs(u[:, j]).max(initial=0.0)), 1e-3) * 1e-4
+            up, down = u.copy(), u.copy()
             up[:, j] += size
             down[:, j] -= size
-            columns.append((field.rhs(self.t, self.x, up, self.p)
-                            - field.rhs(self.t, self.x, down, self.p)) / (2 * size))
-        n = self.x.shape[1]
-        return np.stack(columns, axis=2) if columns else np.zeros((len(self.t), n, 0))
+            columns.append((field.rhs(t, x, up, self.p)
+                            - field.rhs(t, x, down, self.p)) / (2 * size))
+        return np.stack(columns, axis=2) if columns else np.zeros((len(t), x.shape[1], 0))
 
     def _view(self, field: VectorField, recording: Recording, held: Sequence[HeldInput]) -> View:
         names = self.model.state_names
@@ -125,7 +142,7 @@ class Tangent:
     def _columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
         L, n, m = len(self.t), self.x.shape[1], len(listed)
         force, start = np.zeros((L, n, m)), np.zeros((n, m))
-        held = np.zeros((L, n, m))
+        held = [np.zeros((L - 1, n, m)) for _ in self.thirds]
         seen = np.zeros((L, len(self.model.outputs), m))
         places = {s: i for i, s in enumerate(self.model.state_names)}
         inputs = {i: j for j, i in enumerate(self.model.input_names)}
@@ -133,7 +150,8 @@ class Tangent:
             if sign.force is not None:
                 force[:, places[candidate.site.v], k] += sign.force
             for name, du in sign.push.items():
-                held[:, :, k] += self.fu[:, :, inputs[name]] * du[:, None]
+                for block, (_, fu) in zip(held, self.thirds, strict=True):
+                    block[:, :, k] += fu[:, :, inputs[name]] * du[:-1, None]
             if sign.seen is not None:
                 o = self.model.output_names.index(candidate.site.output.name)
                 seen[:, o, k] += sign.seen
@@ -143,18 +161,51 @@ class Tangent:
         y = np.einsum("lqn,lnm->lqm", self.hx, state) + seen
         return y[self.stop, self.output]
 
-    def _integrated(self, force: np.ndarray, held: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """δx (L, n, m): exponential steps with the mean f_x; forces in straight lines or held."""
+    def _integrated(self, force: np.ndarray, held: Sequence[np.ndarray], start: np.ndarray
+                    ) -> np.ndarray:
+        """δx (L, n, m) by the classical Runge-Kutta method: over dozens of periods small errors of
+        phase would look like damping.  Forces in cubics between stops, inputs held.
+        """
         h = np.diff(self.t)[:, None, None]
-        A = 0.5 * (self.fx[1:] + self.fx[:-1]) * h
-        eye = np.eye(A.shape[1])
-        A2 = A @ A
-        over = eye + A + A2 / 2 + A2 @ A / 6 + A2 @ A2 / 24
-        whole = h * (eye + A / 2 + A2 / 6)
-        later = h * (eye / 2 + A / 6 + A2 / 24)
-        gain = ((whole - later) @ force[:-1] + later @ force[1:] + whole @ held[:-1])
+        A = [h * fx for fx, _ in self.thirds]
+        F = [h * (f + u) for f, u in zip(
+            (force[:-1], _middle(force), force[1:]), held, strict=True)]
+        few = A[0][::max(len(h) // 50, 1)]
+        fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))
+        # states that forget within a step need shorter ones
+        parts = min(max(int(np.ceil(fastest / STABLE)), 1), MOST_PARTS)
+        over, gain = np.broadcast_to(np.eye(A[0].shape[1]), A[0].shape), np.zeros_like(F[0])
+        for k in range(parts):
+            shares = (k + np.array([0.0, 0.5, 1.0])) / parts
+            one, more = _stepped(*([_parabola(X, s) / parts for s in shares] for X in (A, F)))
+            over, gain = one @ over, one @ gain + more
         out = np.empty((len(self.t), *start.shape))
         out[0] = start
         for k in range(len(h)):
             out[k + 1] = over[k] @ out[k] + gain[k]
         return out
+
+
+def _parabola(X: Sequence[np.ndarray], s: float) -> np.ndarray:
+    """The parabola through values at the left end, the middle and the right end, at share s."""
+    return np.asarray((1 - s) * (1 - 2 * s) * X[0] + 4 * s * (1 - s) * X[1]
+                      + s * (2 * s - 1) * X[2])
+
+
+def _stepped(A: Sequence[np.ndarray], F: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """One Runge-Kutta step of x' = A x + F over unit time: x becomes Φ x + g, for all steps."""
+    eye = np.eye(A[0].shape[1])
+    B = A[1] @ (eye + A[0] / 2)
+    C = A[1] @ (eye + B / 2)
+    over = eye + (A[0] + 2 * B + 2 * C + A[2] @ (eye + C)) / 6
+    second = A[1] @ F[0] / 2 + F[1]
+    third = A[1] @ second / 2 + F[1]
+    return over, (F[0] + 2 * second + 2 * third + A[2] @ third + F[2]) / 6
+
+
+def _middle(rows: np.ndarray) -> np.ndarray:
+    """Values (L-1, ...) between neighbouring rows (L, ...), by cubics where there are four."""
+    between = 0.5 * (rows[:-1] + rows[1:])
+    if len(rows) > 3:
+        between[1:-1] += (rows[1:-2] - rows[:-3] + rows[2:-1] - rows[3:]) / 16
+    return between

@@ -12,11 +12,14 @@ from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut
 from pikanid.mismatch.result import Explanation, NamedEffect, Verdict, values_of
+from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 SHARP = 0.12  # standard error from which on an exponent says that it is a whole number
-PART = 0.3  # of the nominal held-out RMSE that may remain where only part is explained
+PART = 0.5  # of the nominal held-out RMSE that may remain where only part is explained
+ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
+PREDICTED = 12  # hypotheses of which that is found out
 ADEQUATE = 0.01  # p-value below which a hypothesis leaves something unexplained
 Test = Callable[[Hypothesis], Detection]
 Predict = Callable[[Hypothesis], HeldOut | None]
@@ -71,9 +74,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if not known or (outside and _handicapped(outside[0], scale) < _handicapped(known[0], scale)
                      + 2.0):
         rest = tuple(h for h in near if h not in given) + tuple(given)
-        most = _largest_part(base, tried, scale, predict) if not given else None
-        if most is not None:
-            return Answer("unconfirmed", (most,), tuple(h for h in rest if h is not most)[:5], {},
+        most = _largest_part(base, tried, scale, predict) if not given else ()
+        if most:
+            return Answer("unconfirmed", most, tuple(h for h in rest if h not in most)[:5], {},
                           reasons)
         return Answer("unnamed", (), rest[:5], {}, reasons)
     merged, twins = _merged(known)
@@ -83,17 +86,25 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
 
 
 def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
-                  predict: Predict) -> Hypothesis | None:
-    """The best known hypothesis, if it predicts held-out data far better than nothing does, though
-    not down to the noise: part of what is missing, given as unconfirmed.
+                  predict: Predict) -> tuple[Hypothesis, ...]:
+    """The smallest known hypotheses that predict held-out data as well as any, and far better than
+    nothing does, though not down to the noise: part of what is missing, given as unconfirmed.
     """
-    best = min((h for h in tried if h.known), key=lambda h: h.score(scale), default=None)
-    if best is None or best is not min(tried, key=lambda h: _handicapped(h, scale)):
-        return None
-    now, nominal = predict(best), predict(base)
-    if now is None or nominal is None or now.rmse > PART * nominal.rmse:
-        return None
-    return best
+    known = sorted((h for h in tried if h.known), key=lambda h: h.score(scale))[:PREDICTED]
+    closest = min(tried, key=lambda h: _handicapped(h, scale))
+    nominal = predict(base)
+    if not known or nominal is None or (
+            not closest.known and scale < GROSS
+            and known[0].score(scale) > _handicapped(closest, scale)):
+        return ()
+    found = {h.key: p.rmse for h in known if (p := predict(h)) is not None}
+    lowest = min(found.values(), default=np.inf)
+    if lowest > PART * nominal.rmse:
+        return ()
+    good = [h for h in known if found.get(h.key, np.inf) <= ALIKE * lowest]
+    fewest = min(len(h.effects) for h in good)
+    return tuple(sorted((h for h in good if len(h.effects) == fewest),
+                        key=lambda h: found[h.key])[:3])
 
 
 def _handicapped(h: Hypothesis, scale: float) -> float:

@@ -14,6 +14,9 @@ from pikanid.recording import Recording
 from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.simulator import Response, Steps
 
+CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
+GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
+
 
 @dataclass(frozen=True)
 class Records:
@@ -41,18 +44,24 @@ class Whitened:
         self.steps: list[Steps] = []
         self.rows = self.problem.n_samples
 
-    def choose_steps(self, theta: np.ndarray, share: float = 0.05) -> bool:
-        """Steps whose error stays below a share of the noise; False where nothing can be run."""
+    def choose_steps(self, theta: np.ndarray, share: float = 0.05, misfit: float = 1.0) -> bool:
+        """Steps whose error stays below a share of the noise; False where nothing can be run.
+
+        Where a misfit of many times the noise is left anyway (`misfit`, χ² per row), a fifth of
+        that share of the misfit is allowed instead.
+        """
         found = []
+        finest = 64 if misfit < GROSS else 16
         for r, simulator in enumerate(self.simulators):
             sigma = min(level.sigma for level in self.records.levels[r].values())
+            allowed = share * sigma * max(1.0, 0.2 * misfit**0.5)
             try:
                 steps = simulator.choose_steps(
-                    self.problem.parameters(theta, r), share * sigma, "explicit",
-                    finest=self._spacing(r) / 64)
+                    self.problem.parameters(theta, r), allowed, "explicit",
+                    finest=self._spacing(r) / finest)
             except errors.SimulationFailed:
                 return False
-            if steps.error > 20 * share * sigma:
+            if steps.error > 20 * allowed:
                 return False
             found.append(steps)
         self.steps = found
@@ -79,6 +88,16 @@ class Whitened:
             parts.append(self.whiten(r, response.y - self.measured(r)))
             jacobians.append(self.whiten(r, J))
         return np.concatenate(parts), np.concatenate(jacobians)
+
+    def chi2(self, theta: np.ndarray) -> float:
+        """Sum of squares of the whitened residual, without derivatives; infinite if it fails."""
+        total = 0.0
+        for r, simulator in enumerate(self.simulators):
+            response = simulator.run(self.problem.parameters(theta, r), steps=self.steps[r])
+            if not response.finished:
+                return np.inf
+            total += float(np.sum(self.whiten(r, response.y - self.measured(r)) ** 2))
+        return total
 
     def measured(self, r: int) -> np.ndarray:
         """All samples of recording r (rows,)."""
