@@ -108,7 +108,8 @@ def test_all_strategies_side_by_side(
     assert content["schema_version"] == 1
 
 
-def test_all_reports_what_cannot_be_used(run: Run) -> None:
+def test_all_reports_what_cannot_be_used(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pikanid.strategies.pinn_fit.NEWTON_STEPS", 25)
     assert run("simulate", "--model", "pendulum", "--set", "theta_0=1", "--sigma", "0.1deg",
                "--out", "p.csv")[0] == 0
     # No strategy but NLS can estimate a delay.

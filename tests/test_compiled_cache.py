@@ -14,13 +14,13 @@ from pikanid import systems
 from pikanid.model import Model, Parameter
 from pikanid.simulation import compiled as compiler
 
+pytestmark = pytest.mark.compiled
+
 PROCESS = """
 import json, sys
 from pikanid import excitation, systems
 from pikanid.simulation import simulate
 from pikanid.simulation.compiled import compiled
-
-pytestmark = pytest.mark.compiled
 model = systems.sloshing().with_values(l_theta=float(sys.argv[1]))
 peak = float(abs(simulate(model, excitation.two_pulse(1.0, 0.02))["theta"].values).max())
 module = compiled(model)

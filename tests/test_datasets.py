@@ -133,7 +133,8 @@ def test_silverbox_is_cut_officially() -> None:
 
 
 @pytest.mark.usefixtures("recordings_folder")
-@pytest.mark.parametrize("ball", datasets.BALLS)
+@pytest.mark.parametrize("ball", [
+    datasets.BALLS[0], *(pytest.param(b, marks=pytest.mark.slow) for b in datasets.BALLS[1:])])
 def test_balls_fall(ball: str) -> None:
     for drop in (1, 2):
         rec = datasets.falling_balls(ball.lower().replace(" ", "_"), drop)  # type: ignore[arg-type]

@@ -152,6 +152,7 @@ def test_implicit_steps_switch_at_the_same_instants(name: str) -> None:
     assert found.slope_error < 1e-3
 
 
+@pytest.mark.compiled
 def test_compiled_friction_is_the_interpreted_one() -> None:
     """What numba makes of the kernels is what Python makes of them."""
     term, recording = TERMS["coulomb"], drive("pulses")

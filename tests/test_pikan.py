@@ -186,8 +186,10 @@ BLAST = {"name": "blast", "states": {"x": {"initial": 1.0}},
          "equations": {"x": "k*exp(300*x**2)"}, "outputs": {"x": {"expression": "x"}}}
 
 
-@pytest.mark.parametrize("options", [{}, {"width": (1, 3, 1)}, {"protocol": "paper"}])
-@pytest.mark.parametrize("name", ["tank", "blast"])
+@pytest.mark.parametrize(("name", "options"), [
+    ("tank", {}), ("tank", {"width": (1, 3, 1)}), ("tank", {"protocol": "paper"}),
+    pytest.param("blast", {}, marks=pytest.mark.slow), ("blast", {"width": (1, 3, 1)}),
+    ("blast", {"protocol": "paper"})])
 def test_a_model_that_is_not_finite_on_the_way(name: str, options: dict[str, object]) -> None:
     """Noise around an empty tank asks for the root of a negative number; exp overflows."""
     t = np.arange(0, 2.2, 0.02)
