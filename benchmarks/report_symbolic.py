@@ -38,7 +38,7 @@ from pikanid.symbolic import extract
 from pikanid.writing import atomically
 
 SEEDS, PYKAN_SEEDS = 20, 2
-FEYNMAN_SEEDS = 3
+FEYNMAN_SEEDS = 1
 
 
 class Page:

@@ -27,6 +27,7 @@ from pikanid.symbolic.library import NOTHING, Form
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.naming import name_curve, priors
 from pikanid.symbolic.reading import Reading, probabilities
+from pikanid.symbolic.saved import REST, RESTING
 from pikanid.symbolic.search import shortlist
 from pikanid.symbolic.significance import Contribution
 
@@ -34,7 +35,6 @@ DRAWN = 120  # points of an edge that are compared
 TRIED = 4  # laws an edge that are put into the equation
 MOST = 16  # combinations of them
 SIMPLER = 2  # laws that one contains, put into the equation beside it
-REST, RESTING = 1e-9, 1e-3  # of the range: as good as zero; share of the time spent there
 UNLIKELY = 30.0  # difference of scores: odds of three millions to one
 
 

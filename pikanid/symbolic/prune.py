@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pikanid import errors
-from pikanid.approximators.kan.edges import edges_of, plain, without_edge
+from pikanid.approximators.kan.edges import edges_of, groups_of, plain, without_edge
 from pikanid.approximators.kan.train import PointFit, fit_points
 from pikanid.symbolic.numeric import Array
 from pikanid.symbolic.significance import Contribution, contributions
@@ -34,8 +34,9 @@ def prune(kan: Any, x: Array, y: Array, *, alpha: float = 0.01, refit: bool = Tr
     """Remove edges whose contribution is not significant at level α.
 
     The least significant edge goes first; the others are fitted again before the next is judged.
-    A removal that the data resist (the residual grows significantly) is taken back.  The last edge
-    stays.
+    A removal that the data resist (the residual grows significantly) is taken back.  Behind more
+    than one layer every other edge is then tried, the faintest first, since its part may be one
+    that the rest can take over.  The last edge stays.
 
     Parameters
     ----------
@@ -67,7 +68,36 @@ def prune(kan: Any, x: Array, y: Array, *, alpha: float = 0.01, refit: bool = Tr
             continue
         fit = smaller
         removed.append(weakest)
+    if len(groups_of(fit.network.plan)) > 1:
+        fit, spare = _without_spare(fit, x, y, alpha)
+        removed += spare
     return Pruned(fit.kan, fit, tuple(removed))
+
+
+def _without_spare(fit: PointFit, x: np.ndarray, y: np.ndarray, alpha: float
+                   ) -> tuple[PointFit, list[Contribution]]:
+    """Edges that the others can do without, once they are fitted again.
+
+    Where layers or factors can share a law in many ways, every edge may have its part in it and yet
+    none be needed.
+    """
+    removed: list[Contribution] = []
+    tried: set[tuple[int, int, int | None]] = set()
+    while len(edges_of(fit.network)) > 1:
+        left = [c for c in contributions(fit, x) if c.target is not None
+                and (c.layer, c.source, c.target) not in tried]
+        if not left:
+            break
+        weakest = min(left, key=lambda c: c.size)
+        tried.add((weakest.layer, weakest.source, weakest.target))
+        assert weakest.target is not None
+        smaller = fit_points(without_edge(
+            fit.kan, weakest.layer, weakest.source, weakest.target), x, y)
+        if not _worse(smaller, fit, alpha):
+            fit = smaller
+            removed.append(weakest)
+            tried = set()
+    return fit, removed
 
 
 def _worse(smaller: PointFit, larger: PointFit, alpha: float) -> bool:

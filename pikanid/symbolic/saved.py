@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import sympy as sp
@@ -19,6 +20,7 @@ from pikanid.symbolic.reading import Reading
 from pikanid.symbolic.significance import Contribution
 
 DRAWN = 120
+REST, RESTING = 1e-9, 1e-3  # of the range: as good as zero; share of the samples spent there
 
 
 def read_estimate(estimate: Estimate, library: Sequence[Form]) -> Reading:
@@ -53,8 +55,20 @@ def read_estimate(estimate: Estimate, library: Sequence[Form]) -> Reading:
     ranges = [e.range for e in named.values()]
     laws = sum_of_laws(estimate.model, arguments, chosen(named), ranges)
     share = np.array([float(np.prod([e.probability for e in named.values()]))])
-    return reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
-                           laws.covariance)
+    stuck = [p.argument for p in plans if p.step and _rests(estimate, p.argument)]
+    return replace(
+        reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
+                        laws.covariance),
+        caution=errors.edge_sticks(stuck) if stuck else "")
+
+
+def _rests(estimate: Estimate, argument: str) -> bool:
+    """Whether the fitted motion stays where an argument is zero; taken for granted where unseen."""
+    names = estimate.model.state_names
+    if argument not in names:
+        return True
+    a = np.concatenate([np.abs(p.x[:, names.index(argument)]) for p in estimate.trajectories])
+    return bool(np.mean(a < REST * a.max()) > RESTING)
 
 
 def _plans(estimate: Estimate) -> list[EdgePlan]:

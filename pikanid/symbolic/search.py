@@ -83,12 +83,17 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
         prior = sum(np.log(priors[form.name]) for _, form, _ in it.edges)
         return Ranked(fit, fit.score - 2.0 * float(prior))
 
-    def changed(best: Ranked | None, other: Composition, place: Place) -> Ranked | None:
+    def changed(best: Ranked | None, other: Composition, place: Place, fit: FormFit
+                ) -> Ranked | None:
         """Another form in one place: from the constants of the others as they are, or as named."""
         fits = {p: _of(lists[p], other.forms[p]) for p in lists}
         fresh = ranked(other, _start(other, fits, offsets))
         if best is None or (place[0] < len(groups) - 1 and fresh and fresh.score < best.score):
             return fresh
+        if best.fit.composition.forms[place] is NOTHING:
+            own = np.concatenate([fit.amplitudes, fit.inside])
+            theta = best.fit.composition.carried(best.fit.theta, other, place, own)
+            return _best(fresh, ranked(other, theta))
         return _best(fresh, followed(best, other, place))
 
     def followed(best: Ranked, other: Composition, place: Place) -> Ranked | None:
@@ -106,7 +111,7 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
                 for fit in lists[place]:
                     other = now.swapped(place, fit.form)
                     if _key(other) not in made:
-                        made[_key(other)] = changed(best, other, place)
+                        made[_key(other)] = changed(best, other, place, fit)
                     trial = made[_key(other)]
                     if trial and (best is None or trial.score < best.score - 1e-6):
                         best, now, improved = trial, trial.fit.composition, True
@@ -119,7 +124,7 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
             for place in sorted(best.fit.composition.forms, reverse=True):
                 own = best.fit.composition.forms[place]
                 for fit in lists[place]:
-                    if not 1 < fit.form.count < own.count:
+                    if fit.form.count >= own.count:
                         continue
                     other = best.fit.composition.swapped(place, fit.form)
                     simpler = _best(simpler, followed(best, other, place))
@@ -139,7 +144,7 @@ def follow(old: Refit, other: Composition, place: Place, x: Array) -> Array | No
     layer, i, s = place
     form = other.forms[place]
     own = next((theta_at for p, _, theta_at in old.composition.edges if p == place), None)
-    if own is None or form is NOTHING:
+    if own is None:
         return None
     made, theta = old.composition, old.theta
     u = made.stages(theta, x)[layer][0][:, i]

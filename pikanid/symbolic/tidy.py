@@ -38,7 +38,7 @@ def _zeroes(made: Composition) -> list[int]:
     offsets = [first + s for layer, first in enumerate(made.offsets)
                for s in range(made.subnodes(layer))]
     shifts = [at.start + len(form.columns) + k for _, form, at in made.edges
-              for k, knob in enumerate(form.knobs) if knob.kind == "location"]
+              for k, knob in enumerate(form.knobs) if knob.kind in ("location", "below", "above")]
     return [*offsets[:-1], *shifts, offsets[-1]]
 
 
