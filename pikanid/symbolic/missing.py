@@ -35,6 +35,7 @@ DRAWN = 120  # points of an edge that are compared
 TRIED = 4  # laws an edge that are put into the equation
 MOST = 16  # combinations of them
 SIMPLER = 2  # laws that one contains, put into the equation beside it
+STEEP = 0.4  # least exponent of a law that steps can follow through zero
 NEAR = 1e-6  # of a parameter's range: at its end
 UNLIKELY = 30.0  # difference of scores: odds of three millions to one
 
@@ -138,7 +139,7 @@ def _likely(edge: NamedEdge) -> list[FormFit]:
     """The laws worth a fit inside the ODE, the best of every family; at least the best one."""
     scores = {c.form.name: c.score for c in edge.candidates}
     laws = [f for f in shortlist(edge) if f.form is not NOTHING]
-    # at its limit a form is another one's, and may be too steep to simulate
+    # near its limit a form is another one's, and may be too steep to simulate
     laws = [f for f in laws if not _at_limit(f, edge)] or laws
     first = min(laws, key=lambda f: scores[f.form.name])
     # an edge knows its law by a linear model: where none fits, that says less than it claims
@@ -149,9 +150,11 @@ def _likely(edge: NamedEdge) -> list[FormFit]:
 
 
 def _at_limit(fit: FormFit, edge: NamedEdge) -> bool:
-    """Whether a parameter inside has gone as far as it may."""
+    """Whether a parameter inside has gone as far as it may, or a power is all but a jump."""
     curve = edge.curve
     for knob, value in zip(fit.form.knobs, fit.inside, strict=True):
+        if knob.kind == "exponent" and value < STEEP:
+            return True
         low, high = knob.limits(curve.low, curve.high, len(curve.x))
         if min(value - low, high - value) < NEAR * (high - low):
             return True
