@@ -10,10 +10,12 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.estimate import Estimate
+from pikanid.mismatch.advice import advice
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.catalogue import candidates as catalogue_of
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
+from pikanid.mismatch.force_shape import force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.locate import locate, smallest
@@ -21,12 +23,13 @@ from pikanid.mismatch.preparation import oversampling, prepared, with_refined_no
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
-from pikanid.mismatch.verdict import Answer, explanations, settle
-from pikanid.mismatch.whitened import CERTAIN, GROSS, Records
+from pikanid.mismatch.verdict import WORTH, Answer, explanations, settle
+from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
+SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
 BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
 Recordings = Recording | Sequence[Recording]
 
@@ -76,11 +79,17 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
                    quiet, tell)
     tell("noise and detection")
     detection = case.test(case.base)
-    search = case.search
     if detection.p_value >= alpha:
         answer = Answer("none", (), ())
     else:
+        search = case.begin_search()
         ranked = search.run(case.adequate)
+        if search.records is not case.records:
+            tell("whole recordings")
+            explained = not ranked[0].far
+            search = case.resumed(search)
+            # what nothing explained in part is not explained in whole
+            ranked = search.grow(case.adequate) if explained else search.ranked()
         if case.relevelled(ranked[0], quiet):
             # the first level was read through the mismatch itself: now it is out of the way
             tell("noise again")
@@ -113,9 +122,24 @@ class Case:
         """Natural frequency of the first coordinate [rad/s]."""
         return self.sites[0].rate
 
+    def begin_search(self) -> Search:
+        """A search on as much of the recordings as can be searched in a minute."""
+        short = self.records.beginning(SEARCHED)
+        if short is self.records:
+            return self.search
+        return self.resumed(self.search, short)
+
+    def resumed(self, search: Search, records: Records | None = None) -> Search:
+        """A search with what it has found, on other records: by default on all."""
+        self.search = search.carried_over(records or self.records)
+        self.base = self.search.base()
+        self.tests.clear()
+        self.predictions.clear()
+        return self.search
+
     def relevelled(self, best: Hypothesis, quiet: tuple[float, float] | None) -> bool:
         """Read the noise from what the best explanation leaves; whether that made a difference."""
-        if best.minimum.chi2 > GROSS * best.whitened.rows:
+        if best.far:
             return False
         fit = as_estimate(best, self.before)
         new = with_refined_noise(self.records, fit, self.rate, quiet)
@@ -123,20 +147,15 @@ class Case:
                for a, b in zip(self.records.levels, new.levels, strict=True) for o in a):
             return False
         self.records = new
-        self.search = self.search.carried_over(new)
-        self.base = self.search.base()
+        self.resumed(self.search)
         if self.later is not None:
             self.later = Records(self.later.recordings,
                                  tuple(new.levels[0] for _ in self.later.recordings))
-        self.tests.clear()
-        self.predictions.clear()
         return True
 
     def adequate(self, h: Hypothesis) -> bool:
         """Whether nothing is left in the train recordings."""
-        if h.minimum.chi2 > CERTAIN * h.whitened.rows:
-            return False
-        return self.test(h).p_value > 0.05
+        return not h.far and self.test(h).p_value > 0.05
 
     def test(self, h: Hypothesis) -> Detection:
         """What is left in the train recordings."""
@@ -154,17 +173,17 @@ class Case:
                                                self.rate)
         return self.predictions[h.key]
 
-
     def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
         """Whether a hypothesis is worth its effects beyond another one.
 
         Where a misfit is left anyway, an effect always gains on the recording that it is fitted to:
         then it has to predict the held-out recording clearly better.
         """
-        if self.later is None or more.minimum.chi2 < CERTAIN * more.whitened.rows:
+        if self.later is None or not more.far:
             return True
-        old, new = self.predicted(fewer), self.predicted(more)
-        return old is None or (new is not None and new.rmse < BETTER * old.rmse)
+        old, new, nominal = (self.predicted(h) for h in (fewer, more, self.base))
+        return old is None or nominal is None or (
+            new is not None and new.rmse < min(BETTER * old.rmse, old.rmse - WORTH * nominal.rmse))
 
 
 def _several(recordings: Recordings) -> tuple[Recording, ...]:
@@ -186,7 +205,10 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
         notes.append(f"{together} neighbouring samples of the outputs count as one: nothing in "
                      "them moves fast enough to need more.")
     records = prepared(model, train, quiet, notes, together)
-    before = NLS().fit(model, _with_sigma(records, model))
+    short = records.beginning(SEARCHED)
+    before = NLS().fit(model, _with_sigma(short, model))
+    if short is not records:
+        before = NLS(starts=1).fit(before.fitted_model, _with_sigma(records, model))
     nominal = before.fitted_model
     rate = sites(nominal, records.recordings)[0].rate
     records = with_refined_noise(records, before, rate, quiet)
@@ -237,10 +259,15 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, alpha: float, b
               + (f", correlation {level.rho:.2f} between neighbours" if level.rho else ", white")
               + f", from {level.source}."
               for levels in case.records.levels[:1] for o, level in levels.items()]
+    shape = (None if answer.verdict == "none" else
+             force_shape(case.base, case.sites[0], case.candidates))
     return Diagnosis(
-        answer.verdict, detection.p_value, alpha, locate(case.base, best, answer, case.sites),
+        answer.verdict, detection.p_value, alpha,
+        locate(case.base, best, answer, case.sites, shape, alpha),
         given, rejected, case.before, after, proof, tuple(levels), tuple(case.notes),
-        smallest(case.base, case.candidates), seconds=time.perf_counter() - begun)
+        smallest(case.base, case.candidates),
+        advice(answer.verdict, given, case.records, case.rate, case.proves),
+        time.perf_counter() - begun, shape)
 
 
 def _proof(case: Case, best: Hypothesis) -> Proof | None:

@@ -9,6 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     import matplotlib.figure
 
+    from pikanid.mismatch.force_shape import ForceShape
     from pikanid.mismatch.result import Diagnosis
 
 BEFORE, AFTER, DATA, LOUD = "#c2410c", "#1d4ed8", "#9ca3af", "#fde68a"
@@ -16,13 +17,19 @@ BEFORE, AFTER, DATA, LOUD = "#c2410c", "#1d4ed8", "#9ca3af", "#fde68a"
 
 def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
     """Residual of the nominal and of the extended model over time, loud stretches shaded; below,
-    with a held-out recording, its prediction before and after and what each leaves.
+    with a held-out recording, its prediction before and after and what each leaves; at the bottom
+    the missing force over states and inputs, with its 95 % band.
     """
     from matplotlib.figure import Figure
 
     rows = 1 if dx.held_out is None else 3
-    figure = Figure(figsize=(9.0, 2.6 * rows), layout="constrained")
-    axes = np.atleast_1d(figure.subplots(rows, 1))
+    figure = Figure(figsize=(9.0, 2.6 * (rows + (dx.shape is not None))), layout="constrained")
+    upper: matplotlib.figure.FigureBase = figure
+    if dx.shape is not None:
+        upper, lower = figure.subfigures(
+            2, 1, squeeze=False, height_ratios=[rows, 1.1])[:, 0]
+        _shape(lower, dx.shape)
+    axes = np.atleast_1d(upper.subplots(rows, 1))
     _train(axes[0], dx)
     if dx.held_out is not None:
         proof = dx.held_out
@@ -56,3 +63,17 @@ def _train(axis: matplotlib.axes.Axes, dx: Diagnosis) -> None:
         axis.axvspan(start, stop, color=LOUD, alpha=0.6, lw=0,
                      label="louder than noise" if k == 0 else None)
     axis.set(ylabel=fit.unit or "residual", title="What the model leaves of the recording")
+
+
+def _shape(figure: matplotlib.figure.FigureBase, shape: ForceShape) -> None:
+    figure.suptitle("Missing force, without what the free parameters can do (to first order)",
+                    fontsize="medium")
+    axes = np.atleast_1d(figure.subplots(1, len(shape.edges)))
+    for axis, edge in zip(axes, shape.edges, strict=True):
+        axis.fill_between(edge.grid, edge.values - 1.96 * edge.std, edge.values + 1.96 * edge.std,
+                          color=AFTER, alpha=0.2, lw=0)
+        axis.plot(edge.grid, edge.values, color=AFTER, lw=1.2)
+        axis.axhline(0.0, color=DATA, lw=0.8)
+        axis.set_xlabel(f"{edge.argument}   ({100 * edge.own:.0f} % explained by it alone)")
+        axis.grid(alpha=0.2)
+    axes[0].set_ylabel(shape.unit)

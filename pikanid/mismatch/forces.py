@@ -223,7 +223,11 @@ def disturbance(site: Site) -> list[Candidate]:
         span = view.t[-1] - view.t[0]
         found = []
         for width in (0.01 * span, 0.025 * span):
-            for centre in np.arange(view.t[0] + width, view.t[-1] - width, width):
+            centres = np.arange(view.t[0] + width, view.t[-1] - width, width)
+            if site.rate:
+                # forces half a period apart ring alike: those in quadrature must be there too
+                centres = np.sort(np.concatenate([centres, centres + 0.5 * np.pi / site.rate]))
+            for centre in centres:
                 phase = np.clip((view.t - centre) / (2 * width), -0.5, 0.5)
                 found.append(Sign({a.name: 1.0, at.name: float(centre), w.name: 2 * width},
                                   force=0.5 * (1 + np.cos(2 * np.pi * phase))))

@@ -9,7 +9,7 @@ import numpy as np
 
 from pikanid.mismatch.candidate import Candidate, Sign
 from pikanid.mismatch.least_squares import Minimum, minimise
-from pikanid.mismatch.whitened import GROSS, Records, Whitened
+from pikanid.mismatch.whitened import CERTAIN, GROSS, Records, Whitened
 from pikanid.model import Model
 
 LIMIT = 30  # iterations of a fit
@@ -46,17 +46,27 @@ class Hypothesis:
         return all(e.known for e in self.effects)
 
     @property
+    def far(self) -> bool:
+        """Whether so much is left that no test is needed to see it."""
+        return self.minimum.chi2 > CERTAIN * max(self.whitened.rows, 1)
+
+    @property
     def values(self) -> dict[str, float]:
-        """Estimates by name; what each of several recordings has for itself, by label too."""
+        """Estimates by name; the first recording's where each has its own."""
         both = list(zip(self.whitened.problem.free, self.minimum.theta, strict=True))
-        return {**{f.name: float(v) for f, v in reversed(both)},
-                **{f.label: float(v) for f, v in both}}
+        return {f.name: float(v) for f, v in reversed(both)}
+
+    @property
+    def point(self) -> dict[str, float]:
+        """Where another fit may begin: estimates by name, and by label for every recording."""
+        both = zip(self.whitened.problem.free, self.minimum.theta, strict=True)
+        return {**self.values, **{f.label: float(v) for f, v in both}}
 
     @property
     def covariance(self) -> np.ndarray:
         """(n, n) of the estimates; infinite variances become very large ones."""
         J = self.minimum.J
-        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-150)
         _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
         inverse = vt.T / np.maximum(s, 1e-9 * s[0] if len(s) else 1.0) ** 2 @ vt
         return np.asarray(inverse / np.outer(norms, norms))

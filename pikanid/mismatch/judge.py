@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +26,7 @@ class HeldOut:
 
     Attributes:
         rmse: Of the residual, in the output's unit.
-        detection: Tests of what is left, with the parameters' uncertainty forgiven.
+        tested: Makes `detection`.
         chi2: Of the residual with that forgiveness.
         evidence: -2 ln of the probability density of the recording, given the fit (up to a
             constant that all hypotheses share).
@@ -32,12 +34,17 @@ class HeldOut:
     """
 
     rmse: float
-    detection: Detection
+    tested: Callable[[], Detection]
     chi2: float
     evidence: float
     t: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
+
+    @functools.cached_property
+    def detection(self) -> Detection:
+        """Tests of what is left, with the parameters' uncertainty forgiven."""
+        return self.tested()
 
 
 def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
@@ -133,18 +140,25 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         if first is not None:
             guess = first.theta
     found = minimise(evaluate, guess, whitened.problem.lower, whitened.problem.upper, 25)
-    if found is None:
+    if found is None or not np.isfinite(found.J).all():
         return None
-    tests = residual_tests(whitened, found.theta, found.r, found.J, candidates, rate)
+    tests = functools.partial(residual_tests, whitened, found.theta, found.r, found.J, candidates,
+                              rate)
     plain = guess
     responses = whitened.responses(plain)
     gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
     rmse = float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
-    _, big = np.linalg.slogdet(found.J.T @ found.J)
-    _, small = np.linalg.slogdet(root.T @ root) if len(shared) else (1.0, 0.0)
+    big, small = _volume(found.J), _volume(root)
     samples = whitened.problem.experiments[0].samples[0]
-    return HeldOut(rmse, tests, found.chi2, found.chi2 + float(big - small), samples.t, samples.y,
+    return HeldOut(rmse, tests, found.chi2, found.chi2 + big - small, samples.t, samples.y,
                    responses[0].y[: len(samples.t)])
+
+
+def _volume(J: np.ndarray) -> float:
+    """ln det JᵀJ."""
+    if J.shape[1] == 0:
+        return 0.0
+    return float(2 * np.sum(np.log(np.maximum(np.abs(np.diag(np.linalg.qr(J, mode="r"))), 1e-300))))
 
 
 def _information_root(hypothesis: Hypothesis, names: list[str]) -> np.ndarray:

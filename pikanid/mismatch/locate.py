@@ -10,6 +10,7 @@ import numpy as np
 
 from pikanid.mismatch.candidate import Candidate, Channel
 from pikanid.mismatch.detect import unit_columns
+from pikanid.mismatch.force_shape import ForceShape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.result import Value, Where
 from pikanid.mismatch.site import Site
@@ -20,8 +21,13 @@ WINDOWS = 40
 CLEAR = 5.0  # standard errors from which on an effect counts as detectable
 
 
-def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[Site]) -> Where:
-    """The place of a mismatch, as far as the answer and the nominal residual tell."""
+def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[Site],
+           shape: ForceShape | None, alpha: float) -> Where:
+    """The place of a mismatch, as far as the answer and the nominal residual tell.
+
+    Without an answer the shape of the missing force says what it depends on, and whether a static
+    law can be all that is missing.
+    """
     site = sites[0]
     channels: set[Channel] = {e.channel for h in answer.given for e in h.effects}
     ambiguous = any(len(ids) > 1 for table in answer.twins.values() for ids in table.values())
@@ -31,9 +37,11 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[S
     # what the new terms are made of
     states = tuple(n for n in site.model.state_names
                    if any(n in e.expression for e in best.effects)) if answer.given else ()
-    static = None
+    static: bool | None = None
     if answer.given:
         static = all(e.channel == "dynamics" and e.ids[0] in STATIC for e in best.effects)
+    elif shape is not None:
+        states, static = shape.depends_on(alpha), shape.static_law
     spans = () if answer.verdict == "none" else loud_windows(base)
     return Where(channel, site.v, states, spans, static)
 

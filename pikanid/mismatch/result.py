@@ -15,6 +15,8 @@ from pikanid.model_parts import Parameter
 if TYPE_CHECKING:
     import matplotlib.figure
 
+    from pikanid.mismatch.force_shape import ForceShape
+
 Verdict = Literal["none", "named", "set", "unconfirmed", "unnamed"]
 
 
@@ -105,6 +107,7 @@ class Diagnosis:
         undetectable_below: Size of each effect that could not have been seen.
         next_experiment: A sentence; empty where none is needed.
         seconds: Of the whole diagnosis.
+        shape: The missing force over each state and input, to first order; None without a mismatch.
     """
 
     verdict: Verdict
@@ -121,6 +124,7 @@ class Diagnosis:
     undetectable_below: Mapping[str, Value] = field(default_factory=dict)
     next_experiment: str = ""
     seconds: float = 0.0
+    shape: ForceShape | None = None
 
     @property
     def mismatch(self) -> bool:

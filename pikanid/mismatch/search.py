@@ -12,12 +12,13 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import unit_columns
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted, start_from
 from pikanid.mismatch.tangent import Directions, directions
-from pikanid.mismatch.whitened import CERTAIN, Records
+from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
 SINGLES, PAIRS, MORE = 14, 8, 6  # refits of one effect, of two at once, of one more
 LEADING = 3  # single effects that a second one is added to
-CARRIED = 12  # hypotheses refitted where the noise level changes
+CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
+TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
 Adequate = Callable[[Hypothesis], bool]
 
@@ -80,7 +81,7 @@ class Search:
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
         best = self.ranked()[0]
-        if best.minimum.chi2 < CERTAIN * best.whitened.rows:
+        if not best.far:
             self._exchange(best)
         self._with_power_laws(self.ranked()[0])
         return self.ranked()
@@ -89,7 +90,7 @@ class Search:
         """Put others in the place of each effect of a hypothesis: rivals that no path led to."""
         for effect in best.effects if len(best.effects) > 1 else ():
             rest = tuple(e for e in best.effects if e is not effect)
-            without = self._fit(rest, [best.values])
+            without = self._fit(rest, [best.point])
             if without.key == frozenset(e.key for e in rest):
                 self._extend(without, MORE)
 
@@ -97,9 +98,11 @@ class Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
         new = dataclasses.replace(self, records=records, fits={})
         new.base()
-        for h in self.ranked()[:CARRIED]:
-            if h.effects:
-                new._fit(h.effects, [h.values])
+        ranked = self.ranked()
+        near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
+        for h in ranked[: FEW if ranked[0].far else CARRIED]:
+            if h.effects and h.minimum.chi2 < near:
+                new._fit(h.effects, [h.point])
         return new
 
     def _with_power_laws(self, best: Hypothesis) -> None:
@@ -111,7 +114,7 @@ class Search:
                     power = dict.fromkeys([other.parameters[1].name],
                                           {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8))
                     size = {other.parameters[0].name: best.values[effect.parameters[0].name]}
-                    self._fit((*rest, other), [{**best.values, **size, **power}])
+                    self._fit((*rest, other), [{**best.point, **size, **power}])
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
@@ -138,7 +141,8 @@ class Search:
         others = [c for c in self.candidates if c.fits and c.key not in present
                   and (not c.twin or c.twin not in groups)]
         screen = Screen(hypothesis, others)
-        for candidate, starts in screen.singles(count):
+        least = TELLING * hypothesis.minimum.chi2 if hypothesis.far else 0.0
+        for candidate, starts in screen.singles(count, least):
             self._fit((*hypothesis.effects, candidate), starts)
 
     def _fit(self, effects: Sequence[Candidate], starts: Sequence[Start | Mapping[str, float]]
@@ -194,14 +198,16 @@ class Screen:
                 break
         return chosen
 
-    def singles(self, count: int) -> list[tuple[Candidate, list[Start]]]:
-        """The most promising candidates, with the starts of their fits."""
+    def singles(self, count: int, least: float = 0.0) -> list[tuple[Candidate, list[Start]]]:
+        """The most promising candidates, with the starts of their fits; χ² has to fall by at
+        `least` so much to first order.
+        """
         several = [self.best(c, 3) for c in range(len(self.found.candidates))]
         order = sorted((k for k, s in enumerate(several) if s),
                        key=lambda k: -self.gain[several[k][0]])
         listed: list[tuple[Candidate, list[Start]]] = []
         for k in order:
-            if self.gain[several[k][0]] < 3.0 and listed:
+            if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < 3.0 and listed):
                 break
             candidate = self.found.candidates[k]
             signs = several[k] if len(candidate.parameters) > 1 or not self.found.signs[
@@ -213,10 +219,10 @@ class Screen:
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
         size = float(amplitude / self.lengths[sign])
-        start = start_from(candidate, self.found.signs[sign], size, self.about.values)
+        start = start_from(candidate, self.found.signs[sign], size, self.about.point)
         if not self.found.signs[sign].scales:
             return start
-        moved = {n: self.about.values[n] - size * float(d)
+        moved = {n: self.about.point[n] - size * float(d)
                  for n, d in zip(self.names, self.taken[:, sign], strict=True)}
         return Start({**start.values, **moved}, start.origin)
 
@@ -252,7 +258,7 @@ class Screen:
             own = {p.name for p in b.parameters}
             values, origin = ({**x, **{n: v for n, v in y.items() if n in own}} for x, y in (
                 (start.values, other.values), (start.origin, other.origin)))
-            for n, now in self.about.values.items():
+            for n, now in self.about.point.items():
                 values[n] = start.values[n] + other.values[n] - now
             listed.append(((a, b), [Start(values, origin)]))
         return listed

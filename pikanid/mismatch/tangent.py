@@ -114,10 +114,9 @@ class Tangent:
         y = field.outputs(self.t, self.x, self.u, self.p)
         f = field.rhs(self.t, self.x, self.u, self.p)
         rate = np.einsum("lqn,ln->lq", self.hx, f)
-        known = {h.name for h in held}
         extra = {}
         for name in recording.names:
-            if name not in known and name not in self.model.output_names:
+            if name not in self.model.output_names:
                 c = recording[name]
                 if np.all(np.isfinite(c.values)):
                     extra[name] = HeldInput(name, c.time, c.values, "zero").at(self.t)

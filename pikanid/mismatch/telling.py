@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def lines_of(dx: Diagnosis) -> list[str]:
-    """Verdict, where, what, proof and notes, line by line."""
+    """Verdict, where, what, proof, what to do next and notes, line by line."""
     lines = [dx.sentence()]
     if dx.mismatch:
         place = dx.where.channel if dx.where.channel != "undecided" else "channel undecided"
@@ -29,4 +29,6 @@ def lines_of(dx: Diagnosis) -> list[str]:
         p = dx.held_out
         lines.append(f"Proof: held-out RMSE {p.rmse_before:.3g} -> {p.rmse_after:.3g} {p.unit} "
                      f"(noise {p.noise:.3g}), p = {p.p_value:.2g}")
+    if dx.next_experiment:
+        lines.append(f"Next: {dx.next_experiment}")
     return [*lines, *dx.noise, *dx.notes]

@@ -19,7 +19,8 @@ GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rar
 SHARP = 0.12  # standard error from which on an exponent says that it is a whole number
 PART = 0.5  # of the nominal held-out RMSE that may remain where only part is explained
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
-PREDICTED = 12  # hypotheses of which that is found out
+WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
+PREDICTED = 8  # hypotheses of which that is found out
 ADEQUATE = 0.01  # p-value below which a hypothesis leaves something unexplained
 Test = Callable[[Hypothesis], Detection]
 Predict = Callable[[Hypothesis], HeldOut | None]
@@ -101,7 +102,8 @@ def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
     lowest = min(found.values(), default=np.inf)
     if lowest > PART * nominal.rmse:
         return ()
-    good = [h for h in known if found.get(h.key, np.inf) <= ALIKE * lowest]
+    enough = max(ALIKE * lowest, lowest + WORTH * nominal.rmse)
+    good = [h for h in known if found.get(h.key, np.inf) <= enough]
     fewest = min(len(h.effects) for h in good)
     return tuple(sorted((h for h in good if len(h.effects) == fewest),
                         key=lambda h: found[h.key])[:3])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,25 @@ class Records:
 
     recordings: tuple[Recording, ...]
     levels: tuple[dict[str, Level], ...]
+
+    def beginning(self, rows: int) -> Records:
+        """The same with about so many rows in all, each recording cut alike, from its start."""
+        total = sum(len(r[o].time) for r, found in zip(self.recordings, self.levels, strict=True)
+                    for o in found)
+        share = rows / max(total, 1)
+        return self if share >= 1 else Records(
+            tuple(_cut(r, r.start + share * (r.stop - r.start)) for r in self.recordings),
+            self.levels)
+
+
+def _cut(recording: Recording, stop: float) -> Recording:
+    short = []
+    for name in recording.names:
+        c = recording[name]
+        n = max(int(np.searchsorted(c.time, stop, "right")), 2)
+        sigma = c.sigma if c.sigma is None or np.ndim(c.sigma) == 0 else np.asarray(c.sigma)[:n]
+        short.append(replace(c, time=c.time[:n], values=c.values[:n], sigma=sigma))
+    return recording.with_channels(*short)
 
 
 class Whitened:
