@@ -51,7 +51,9 @@ def sensor_gain(site: Site) -> list[Candidate]:
 
 
 def sensor_nonlinearity(site: Site) -> list[Candidate]:
-    """The sensor bends: y + k y³."""
+    """The sensor bends: y + k y³; without a rest its zero is anywhere."""
+    if not site.rate:
+        return []
     k = Parameter(site.name("k_y3"), 0.0, f"1/({site.output.unit or '1'})^2")
     o = site.output.name
     return [_sensor(site, "sensor_nonlinearity", "a cubic error of the sensor", k,

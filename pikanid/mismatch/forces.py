@@ -67,7 +67,11 @@ def power_drag(site: Site) -> list[Candidate]:
 
 
 def amplitude_damping(site: Site) -> list[Candidate]:
-    """Viscous damping that grows with the square of the amplitude."""
+    """Viscous damping that grows with the square of the amplitude, where there is a rest to swing
+    about.
+    """
+    if not site.rate:
+        return []
     c = Parameter(site.name("c2"), 0.0, f"1/(s*({site.unit})^2)", (0.0, INF))
     return [term(site, "amplitude_damping", "damping that grows with amplitude",
                  f"-{c.name}*{site.q}**2*{site.v}", c,
@@ -76,6 +80,8 @@ def amplitude_damping(site: Site) -> list[Candidate]:
 
 def cubic_stiffness(site: Site) -> list[Candidate]:
     """A restoring force that bends: hardening or softening."""
+    if not site.rate:
+        return []
     k = Parameter(site.name("k3"), 0.0, f"1/(s^2*({site.unit})^2)")
     return [term(site, "cubic_stiffness", "cubic stiffness", f"-{k.name}*{site.q}**3", k,
                  lambda w: -w.x[site.q] ** 3, one_sided=False)]
@@ -156,6 +162,9 @@ def hysteresis(site: Site) -> list[Candidate]:
         return model.with_state(State(z), loop).with_term(site.v, f"-{b.name}*{z}")
 
     def signs(view: View) -> list[Sign]:
+        v = view.x[site.v]
+        if np.all(v >= 0) or np.all(v <= 0):
+            return []  # without a return there is no loop
         top = float(np.abs(view.x[site.q]).max(initial=1e-9))
         found = []
         for share in (0.02, 0.06, 0.15, 0.4):
@@ -222,7 +231,11 @@ def disturbance(site: Site) -> list[Candidate]:
     def signs(view: View) -> list[Sign]:
         span = view.t[-1] - view.t[0]
         found = []
+        step = float(np.median(np.diff(view.t)))
         for width in (0.01 * span, 0.025 * span):
+            if width < 4 * step:
+                # what is no longer than a few samples could be anything
+                continue
             centres = np.arange(view.t[0] + width, view.t[-1] - width, width)
             if site.rate:
                 # forces half a period apart ring alike: those in quadrature must be there too

@@ -37,6 +37,8 @@ def _through(u: str, text: str) -> Callable[[Model], Model]:
 
 def even_stiffness(site: Site) -> list[Candidate]:
     """-k q²: not the same on both sides."""
+    if not site.rate:
+        return []
     k = Parameter(site.name("k_even"), 0.0, f"1/(s^2*{site.unit})")
     return [term(site, "even_stiffness", "a stiffness that differs between the sides",
                  f"-{k.name}*{site.q}**2", k, lambda w: -w.x[site.q] ** 2, one_sided=False,
@@ -45,6 +47,8 @@ def even_stiffness(site: Site) -> list[Candidate]:
 
 def quintic_stiffness(site: Site) -> list[Candidate]:
     """-k q⁵."""
+    if not site.rate:
+        return []
     k = Parameter(site.name("k5"), 0.0, f"1/(s^2*({site.unit})^4)")
     return [term(site, "quintic_stiffness", "quintic stiffness", f"-{k.name}*{site.q}**5", k,
                  lambda w: -w.x[site.q] ** 5, one_sided=False, known=False)]
