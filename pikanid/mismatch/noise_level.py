@@ -138,8 +138,9 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
             p = np.abs(np.fft.rfft(values - values.mean())) ** 2 / len(values)
             spectra.append((np.linspace(0, np.pi, len(p))[1:], p[1:], 1.0))
             source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
-    sigma, rho, spread = _whittle(spectra)
-    if level.source == "given":
+    given = level.sigma if level.source == "given" else None
+    sigma, rho, spread = _whittle(spectra, given)
+    if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)
     return Level(sigma, rho, spread, h, source)
 
@@ -152,16 +153,17 @@ def noise_stretch(channel: Channel) -> tuple[float, float] | None:
     return model.start, model.stop
 
 
-def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]]) -> tuple[float, float, float]:
-    """(σ, ρ, relative standard error of the power at low frequencies)."""
+def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float | None
+             ) -> tuple[float, float, float]:
+    """(σ, ρ, relative standard error of the power at low frequencies); σ may be `given`."""
     grid = np.linspace(0.0, 0.95, 191)
     costs, scales = [], []
     total = sum(w * len(p) for _, p, w in spectra)
     for rho in grid:
         shapes = [1.0 / (1 - 2 * rho * np.cos(o) + rho**2) for o, _, _ in spectra]
-        scale = sum(w * np.sum(_calm(p / s)) for (_, p, w), s in zip(
-            spectra, shapes, strict=True)) / total
-        costs.append(total * np.log(scale) + sum(
+        power = sum(w * np.sum(_calm(p / s)) for (_, p, w), s in zip(spectra, shapes, strict=True))
+        scale = power / total if given is None else given**2 * (1 - rho**2)
+        costs.append(total * np.log(scale) + power / scale + sum(
             w * np.sum(np.log(s)) for (_, _, w), s in zip(spectra, shapes, strict=True)))
         scales.append(scale)
     best = int(np.argmin(costs))
