@@ -103,7 +103,10 @@ def burg(series: Array, order: int) -> AR:
     sigma = innovation / float(np.sqrt(max(1 - float(a @ rho[1 : order + 1]), 1e-12)))
     lags = np.abs(np.subtract.outer(np.arange(order), np.arange(order)))
     covariance = (
-        innovation**2 / sigma**2 * np.linalg.inv(rho[lags]) / n if order else np.empty((0, 0))
+        # a still or perfectly predictable series makes Γ singular
+        innovation**2 / sigma**2 * np.linalg.pinv(rho[lags], hermitian=True) / n
+        if order
+        else np.empty((0, 0))
     )
     effective = 1 + 2 * float(np.sum(rho[1:] ** 2))
     return AR(a, innovation, covariance, sigma, sigma * float(np.sqrt(effective / (2 * n))))

@@ -9,16 +9,19 @@ import pytest
 
 from pikanid import errors, excitation, systems
 from pikanid.mismatch import diagnose
+from pikanid.mismatch.beginning import own_beginning
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.catalogue import candidates
 from pikanid.mismatch.detect import detect, frequency_bands, past_inputs, unit_columns
 from pikanid.mismatch.hypothesis import extended
 from pikanid.mismatch.least_squares import minimise
 from pikanid.mismatch.noise_level import Level, refined, without_outliers
+from pikanid.mismatch.preparation import averaged, oversampling
 from pikanid.mismatch.site import sites
 from pikanid.mismatch.tangent import directions
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
+from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation import simulate
 
@@ -182,3 +185,53 @@ def test_the_hidden_force_is_named(term: str, name: str, value: float, expected:
     ids = {i for h in dx.hypotheses for e in h.effects for i in e.ids}
     assert dx.verdict in ("named", "set") and expected in ids and len(dx.hypotheses) <= 2
     assert dx.held_out is not None and dx.held_out.rmse_after < 1.1 * SIGMA
+
+
+def test_neighbouring_samples_become_one_without_bias() -> None:
+    rng = np.random.default_rng(3)
+    t = np.arange(9000) * 0.001
+    model = systems.pendulum()
+    y = np.sin(8 * t) + 0.01 * rng.standard_normal(9000)
+    recording = Recording.from_arrays(t, {"theta": y}, {"theta": "rad"}, sigma={"theta": 0.01})
+    assert oversampling(model, (recording,)) in (3, 5)
+    one = averaged(recording["theta"], 5)
+    gap = one.values - np.sin(8 * one.time)
+    assert one.sigma is not None
+    assert np.std(gap) == pytest.approx(float(np.mean(one.sigma)), rel=0.1)
+    assert abs(np.mean(gap)) < 4 * 0.01 / np.sqrt(9000)
+
+
+def test_a_motion_begins_where_its_data_begin() -> None:
+    t = np.arange(400) * 0.01
+    model = systems.pendulum()
+    recording = Recording.from_arrays(t, {"theta": 0.3 * np.cos(6.3 * t + 0.7)}, {"theta": "rad"})
+    problem = Problem(model, recording)
+    found = own_beginning(problem, problem.guess, sites(model, (recording,)))
+    begun = dict(zip((f.name for f in problem.free), found, strict=True))
+    assert begun["theta_0"] == pytest.approx(0.3 * np.cos(0.7), abs=0.005)
+    assert begun["theta_dot_0"] == pytest.approx(-0.3 * 6.3 * np.sin(0.7), abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_friction_and_a_damping_that_grows_are_found_in_the_real_pendulum(
+        recordings_folder: object) -> None:
+    # the recording holds more than any catalogue: what is found is given as unconfirmed
+    import diagnosis_real
+
+    (row,) = diagnosis_real.single_pendulum()
+    assert row.verdict in ("named", "set", "unconfirmed")
+    assert any("coulomb_friction" in h and ("quadratic_drag" in h or "amplitude_damping" in h)
+               for h in row.hypotheses)
+    assert row.after < 0.5 * row.before
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_drag_is_found_on_light_balls_only(recordings_folder: object) -> None:
+    import diagnosis_real
+
+    light, heavy = diagnosis_real.falling_balls(["Whiffle Ball 1", "Bowling Ball"])
+    assert any("power_drag" in h or "quadratic_drag" in h for h in light.hypotheses)
+    assert light.after < 0.2 * light.before
+    assert heavy.verdict not in ("named", "set")
