@@ -1,9 +1,9 @@
 """Are laws named rightly, nothing named nothing, and whole networks read as what they learned?
 
-Usage: python benchmarks/report_symbolic.py FOLDER [SEEDS] [PYKAN_SEEDS]
+Usage: python benchmarks/report_symbolic.py FOLDER [SEEDS] [PYKAN_SEEDS] [stored]
 
 Writes FOLDER/symbolic.md and its figures.  Every case is kept in build/symbolic, so that a run that
-was cut off goes on where it stopped; a part whose cases are all there costs nothing.  Genetic
+was cut off goes on where it stopped; "stored" writes the report of what is there.  Genetic
 programming runs beside where pyoperon and gplearn are installed.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -30,7 +31,7 @@ from symbolic_feynman import (
 )
 from symbolic_friction import NAMES, run_friction
 from symbolic_networks import INPUTS, NETWORKS, NOISE, data, run_network, run_pykan_network, train
-from symbolic_store import collected
+from symbolic_store import collected as collected_or_stored
 
 from pikanid.plots import new_figure, save_figure, tidy
 from pikanid.reporting.sheet import Sheet
@@ -39,6 +40,8 @@ from pikanid.writing import atomically
 
 SEEDS, PYKAN_SEEDS = 20, 2
 FEYNMAN_SEEDS = 1
+STORED = "stored" in sys.argv
+collected = partial(collected_or_stored, stored=STORED)
 
 
 class Page:
@@ -58,6 +61,11 @@ class Page:
 
     def markdown(self) -> str:
         return "\n\n".join(self.parts) + "\n"
+
+
+def middle(values: Sequence[float], form: str = ".1f") -> str:
+    """The median, "-" of nothing."""
+    return format(float(np.median(values)), form) if len(values) else "-"
 
 
 def count(results: Sequence[dict[str, Any]], key: str) -> str:
@@ -118,11 +126,11 @@ def networks(page: Page, seeds: int, pykan_seeds: int) -> None:
                           [(network.label, s) for s in range(pykan_seeds)])
         false = sum(r["ok"] and not r["exact"] for r in mine)
         rows.append((network.label, str(list(network.width)), count(mine, "exact"), str(false),
-                     f"{100 * np.median([r['error'] for r in mine]):.2f} %",
-                     f"{np.median([r['seconds'] for r in mine]):.1f}",
+                     middle([r["error"] for r in mine], ".2%"),
+                     middle([r["seconds"] for r in mine]),
                      "; ".join(str(r["names"]) for r in other),
-                     f"{100 * np.median([r['error'] for r in other]):.2f} %",
-                     f"{np.median([r['seconds'] for r in other]):.0f}"))
+                     middle([r["error"] for r in other], ".2%"),
+                     middle([r["seconds"] for r in other], ".0f")))
     page.heading("Whole networks")
     page.text(f"KANs trained on 1000 points with {100 * NOISE:g} % of noise, the best of three "
                "starts, then read; pykan's `auto_symbolic` and its own refit on the same models "
@@ -131,12 +139,14 @@ def networks(page: Page, seeds: int, pykan_seeds: int) -> None:
                "spread.")
     page.table(("law", "width", "exact form", "wrong but ok", "error, median", "CPU s to read",
                  "pykan's names, layer by layer", "its error", "its CPU s"), rows)
+    page.text(f"{NETWORKS[1].label} as it was read from the network of seed 0, every edge with "
+              "its 95 % band:")
+    page.text("![network of two layers](figures/symbolic_network.png)")
+    if STORED and (page.folder / "figures" / "symbolic_network.png").exists():
+        return
     shown, x, _, y = data(NETWORKS[1].label, 0)
     reading = extract(train(shown.width, x, y).kan, x, y, inputs=INPUTS)
     save_figure(reading.plot(), page.folder / "figures" / "symbolic_network.png")
-    page.text(f"{shown.label} as it was read from the network of seed 0, every edge with its 95 % "
-              "band:")
-    page.text("![network of two layers](figures/symbolic_network.png)")
 
 
 def drawn(shown: Sequence[tuple[str, dict[str, Any]]]) -> Figure:
@@ -172,8 +182,8 @@ def friction(page: Page, seeds: int) -> None:
         rows.append((label, NAMES[label], count(found, "found"), count(found, "ode_exact"),
                      ", ".join(others), str(false[0]), count(found, "edge_exact"), str(false[1]),
                      f"{np.sqrt(np.mean(np.square(z))):.2f}" if z else "",
-                     f"{np.median([r['seconds'] for r in found]):.1f}",
-                     f"{np.median([r['reading_seconds'] for r in found]):.1f}"))
+                     middle([r["seconds"] for r in found]),
+                     middle([r["reading_seconds"] for r in found])))
     page.heading("Laws missing in an ODE")
     page.text("A slosh model that lacks a law of 100 Cramér-Rao bounds of its coefficient, 20 s at "
               "σ = 0.1°, even seeds driven by planar-motor moves with rests between, odd seeds by "
@@ -212,17 +222,18 @@ def feynman(page: Page, seeds: int) -> None:
             marks.append(count(found, "recovered"))
         false = sum(r["ok"] and not r["recovered"] for r in own)
         rows.append((formula.number, formula.text, count(own, "recovered"), str(false),
-                     f"`{own[0]['formula']}`", count(other, "recovered"), *marks))
+                     f"`{own[0]['formula']}`" if own else "-", count(other, "recovered"), *marks))
     page.heading("Twelve formulas of the Feynman lectures")
     told = "; ".join(f"{name} {version(name)} {count(genetic[name], 'recovered')}"
                      for name in genetic)
     page.text(
         f"Formulas and ranges of Udrescu & Tegmark, AI Feynman, Science Advances 6, eaay2631, "
-        f"2020, table 4; 1000 points, 1 % of noise, seeds 0 to {seeds - 1}, one seed for the "
-        f"others. The network is [n, one product of n sums, 1], or a single edge. Recovered means: "
-        f"within 1 % of the spread on a box half as wide again, where no point was. Here "
-        f"{count(mine, 'recovered')}, median {np.median([r['seconds'] for r in mine]):.0f} CPU s "
-        f"to read; pykan's `auto_symbolic` with its refit, on the same networks, "
+        f"2020, table 4; 1000 points, 1 % of noise, {seeds} seed{'s' * (seeds > 1)} a formula, one "
+        f"for the others. The network is [n, one product of n sums, 1], or a single edge. "
+        f"Recovered means: within 1 % of the spread on a box half as wide again, where no point "
+        f"was. Here {count(mine, 'recovered')}, median "
+        f"{middle([r['seconds'] for r in mine], '.0f')} CPU s to read; pykan's `auto_symbolic` "
+        f"with its refit, on the same networks, "
         f"{count(theirs, 'recovered')}. "
         + (f"Genetic programming on the points themselves, without a network: {told}; pyoperon "
            f"with {SECONDS} s of one thread a formula, gplearn with 40 generations of 1000. "
@@ -246,5 +257,5 @@ def main(folder: Path, seeds: int, pykan_seeds: int) -> None:
 
 
 if __name__ == "__main__":
-    numbers = [int(a) for a in sys.argv[2:4]]
+    numbers = [int(a) for a in sys.argv[2:4] if a != "stored"]
     main(Path(sys.argv[1]), *[*numbers, *(SEEDS, PYKAN_SEEDS)[len(numbers):]])

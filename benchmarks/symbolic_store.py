@@ -11,8 +11,11 @@ BUILD = Path("build") / "symbolic"
 
 
 def collected(part: str, function: Callable[..., dict[str, Any]],
-              cases: Sequence[tuple[Any, ...]]) -> list[dict[str, Any]]:
-    """The result of every case, from the file of an earlier run where it is there."""
+              cases: Sequence[tuple[Any, ...]], stored: bool = False) -> list[dict[str, Any]]:
+    """The result of every case, from the file of an earlier run where it is there.
+
+    With `stored` only those are given that are there already.
+    """
     BUILD.mkdir(parents=True, exist_ok=True)
     path = BUILD / f"{part}.jsonl"
     known: dict[str, dict[str, Any]] = {}
@@ -22,9 +25,10 @@ def collected(part: str, function: Callable[..., dict[str, Any]],
             known[json.dumps(entry["case"])] = entry["result"]
     for case in cases:
         key = json.dumps(list(case))
-        if key in known:
+        if key in known or stored:
             continue
         known[key] = function(*case)
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps({"case": list(case), "result": known[key]}) + "\n")
-    return [known[json.dumps(list(case))] for case in cases]
+    keys = [json.dumps(list(case)) for case in cases]
+    return [known[key] for key in keys if key in known]

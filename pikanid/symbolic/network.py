@@ -29,10 +29,11 @@ from pikanid.symbolic.numeric import Array
 from pikanid.symbolic.prune import prune
 from pikanid.symbolic.reading import CLOSE, Reading, probabilities
 from pikanid.symbolic.refit import Refit, covariance
-from pikanid.symbolic.search import search
+from pikanid.symbolic.search import Ranked, search
 from pikanid.symbolic.significance import Contribution, contributions
 from pikanid.symbolic.tidy import tidied
 
+COMPETE = 3  # readings that are tidied before the best is chosen
 DRAWN = 120  # points of an edge that are compared
 TRUE_TO = 0.01  # of its spread: how far a network without data is believed
 
@@ -75,11 +76,23 @@ def read_network(kan: Any, x: Array | None = None, y: Array | None = None, *,
     found = search(groups, formulas, named, offsets, x, y_own, weights, exact)
     if not found:
         raise errors.BadSetting(errors.nothing_read())
+    found = _tidied_first(found, x, y_own, exact)
     share = probabilities([r.score for r in found])
-    best = tidied(found[0].fit, x, y_own, exact)
-    return _reading(best, fit, x, y_own, y is not None, names, named,
+    return _reading(found[0].fit, fit, x, y_own, y is not None, names, named,
                     (*contributions(fit, x), *removed), share,
                     [_label(r.fit) for r in found], units)
+
+
+def _tidied_first(found: Sequence[Ranked], x: Array, y: Array, exact: float) -> list[Ranked]:
+    """Those that compete, without the constants that they do not need, ranked again.
+
+    An offset that one form needs and another has at zero would count against both alike.
+    """
+    reach = found[0].score + 2.0 * float(np.log(len(x)))
+    close = [r for r in found[:COMPETE] if r.score <= reach]
+    done = [Ranked(fit, r.score + fit.score - r.fit.score)
+            for r in close for fit in [tidied(r.fit, x, y, exact)]]
+    return sorted([*done, *found[len(close):]], key=lambda r: r.score)
 
 
 def _alone(kan: Any, x: Array) -> tuple[PointFit, tuple[Contribution, ...]]:
