@@ -32,6 +32,8 @@ from pikanid.strategies.nls import NLS
 SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
 BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
 Recordings = Recording | Sequence[Recording]
+ASIDE = 0.3  # of a recording that is set aside where there is no held-out one
+LEAST = 300  # samples of an output that must be there for that
 
 
 def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
@@ -47,7 +49,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         model: Nominal model with a second-order coordinate (a state that is the rate of another).
         train: Recording, or several, to explain.
         held_out: Recording, or several, with another excitation, to prove it on.  Without one the
-            verdict is at most "unconfirmed".
+            end of the recording is set aside, and the verdict is at most "unconfirmed".
         alpha: Rate of false alarms.
         quiet: Start and stop [s] of a stretch known to show noise only.
         tell: Called with what is being done.
@@ -96,7 +98,8 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
             search = case.search
             ranked = search.grow(case.adequate)
         tell("confirmation")
-        answer = settle(ranked, search.scale(), case.test, case.predicted, case.proves)
+        answer = settle(ranked, search.scale(), case.test, case.predicted,
+                        case.later is not None, case.proves)
     return _diagnosis(case, detection, answer, alpha, begun)
 
 
@@ -197,7 +200,7 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     if later is not None:
         _check_pair(train, later)
     else:
-        notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
+        train, later = _set_aside(train, model, notes)
     model = _held_as_recorded(model, train)
     tell("nominal fit")
     together = oversampling(model, train)
@@ -223,6 +226,28 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
     search.predicts = case.predicts
     return case
+
+
+def _set_aside(train: tuple[Recording, ...], model: Model, notes: list[str]
+               ) -> tuple[tuple[Recording, ...], tuple[Recording, ...] | None]:
+    """Recordings without their ends, and the same with nothing but their ends to be seen.
+
+    Hypotheses that cannot even predict how the same run goes on are refused; a run driven the same
+    way proves no more than that.
+    """
+    notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
+    if min(len(r[o].time) for r in train for o in model.output_names) < LEAST:
+        return train, None
+    kept, ends = [], []
+    for r in train:
+        cut = r.start + (1 - ASIDE) * (r.stop - r.start)
+        kept.append(r.window(r.start, cut))
+        unseen = [replace(r[o], values=np.where(r[o].time < cut, np.nan, r[o].values))
+                  for o in model.output_names]
+        ends.append(r.with_channels(*unseen))
+    notes.append(f"The last {100 * ASIDE:.0f} % of the recording are set aside: what is found has "
+                 "to predict them.")
+    return tuple(kept), tuple(ends)
 
 
 def _check_pair(train: tuple[Recording, ...], later: tuple[Recording, ...]) -> None:

@@ -41,14 +41,15 @@ class Answer:
 
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
-           proves: bool) -> Answer:
+           checked: bool, proves: bool) -> Answer:
     """Choose what is given.
 
     Args:
         ranked: All hypotheses, best first.
         scale: That divides χ².
         test, predict: Adequacy on the train and on the held-out recordings.
-        proves: Whether there are held-out recordings.
+        checked: Whether there is anything held out.
+        proves: Whether that is a recording of its own.
     """
     reasons: dict[frozenset[str], str] = {}
     tried = [h for h in ranked if h.effects]
@@ -63,12 +64,12 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     for h in near:
         if test(h).p_value < ADEQUATE:
             reasons[h.key] = "leaves something unexplained in the recording"
-        elif proves and ((prediction := predict(h)) is None
+        elif checked and ((prediction := predict(h)) is None
                          or prediction.detection.p_value < ADEQUATE):
             reasons[h.key] = "does not predict the held-out recording"
         else:
             given.append(h)
-    if proves and len(given) > 1:
+    if checked and len(given) > 1:
         given = _by_evidence(given, predict, scale, reasons)
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
