@@ -248,6 +248,9 @@ def main(folder: Path, seeds: int, pykan_seeds: int) -> None:
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     page = Page("Reading networks", folder)
     page.text(f"With {provenance()}. Times are CPU times of one thread.")
+    if STORED:
+        page.text("Written of the cases that are stored so far: of every count the second number "
+                  "says how many these are.")
     edges(page, seeds, pykan_seeds)
     nulls(page)
     networks(page, seeds, pykan_seeds)
