@@ -14,7 +14,6 @@ from pikanid.model import Model
 from pikanid.recording import Recording
 
 LONG = 4000  # samples below which none are put together
-ENOUGH = 2000  # samples that are kept at least
 FINE = 30  # samples a period that are kept
 
 def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float, float] | None,
@@ -48,13 +47,13 @@ def oversampling(model: Model, recordings: tuple[Recording, ...]) -> int:
     kept.
     """
     total = sum(len(r[o].time) for r in recordings for o in model.output_names)
-    counts = [total // ENOUGH if total > LONG else 1]
+    counts = [total // LONG]
     for recording in recordings:
         for name in model.output_names:
             c = recording[name]
             y = c.values[np.isfinite(c.values)]
             steps = np.diff(c.time)
-            if len(y) < ENOUGH // 2 or np.ptp(steps) > 0.01 * np.median(steps):
+            if len(y) < LONG // 4 or np.ptp(steps) > 0.01 * np.median(steps):
                 return 1
             y = (y - np.linspace(y[0], y[-1], len(y))) * np.hanning(len(y))
             power = np.cumsum(np.abs(np.fft.rfft(y)) ** 2)

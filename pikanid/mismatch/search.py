@@ -139,7 +139,8 @@ class Search:
         present = {e.key for e in hypothesis.effects}
         groups = {e.twin for e in hypothesis.effects if e.twin}
         others = [c for c in self.candidates if c.fits and c.key not in present
-                  and (not c.twin or c.twin not in groups)]
+                  and (not c.twin or c.twin not in groups)
+                  and not (c.absent and hypothesis.far)]
         screen = Screen(hypothesis, others)
         least = TELLING * hypothesis.minimum.chi2 if hypothesis.far else 0.0
         for candidate, starts in screen.singles(count, least):

@@ -92,7 +92,9 @@ def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
     """The smallest known hypotheses that predict held-out data as well as any, and far better than
     nothing does, though not down to the noise: part of what is missing, given as unconfirmed.
     """
-    known = sorted((h for h in tried if h.known), key=lambda h: h.score(scale))[:PREDICTED]
+    # what happens once takes up much of any misfit, and no other recording can confirm it
+    lasting = [h for h in tried if h.known and not any(e.absent for e in h.effects)]
+    known = sorted(lasting, key=lambda h: h.score(scale))[:PREDICTED]
     closest = min(tried, key=lambda h: _handicapped(h, scale))
     nominal = predict(base)
     if not known or nominal is None or (
