@@ -18,12 +18,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import diagnosis_alarms
+import diagnosis_real
 import numpy as np
 from provenance import provenance
 
 from pikanid.concealed.generate import generate
 from pikanid.concealed.score import Score, Share, judge, reliability, tally
 from pikanid.concealed.seal import Settings
+from pikanid.errors import DatasetUnavailable
+from pikanid.writing import atomically
 
 DEGREE = math.pi / 180
 
@@ -43,7 +47,6 @@ SETS = (
     Set("rich", "rich", 0.1 * DEGREE, 20261),
     Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20262),
     Set("rich_1deg", "rich", 1.0 * DEGREE, 20263),
-    Set("clean", "rich", 0.1 * DEGREE, 20264, {"nothing": 1.0}),
 )
 
 
@@ -53,6 +56,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path("build/diagnosis"))
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--alarms", type=int, default=400, help="clean recordings of each noise")
     parser.add_argument("--only", choices=[s.name for s in SETS], action="append")
     parser.add_argument("--out", type=Path, default=Path("reports/diagnosis.md"))
     given = parser.parse_args()
@@ -60,7 +64,21 @@ def main() -> None:
     parts = ["# Diagnoses of concealed recordings\n", provenance(), INTRODUCTION]
     for one in chosen:
         parts.append(_section(one, list(_diagnosed(one, given.work, given.cases, given.workers))))
-    given.out.write_text("\n".join(parts))
+    if not given.only:
+        parts += [diagnosis_alarms.section(given.alarms, given.work, given.workers), _real()]
+    atomically(given.out, "\n".join(parts).encode())
+
+
+def _real() -> str:
+    """Rows of the recordings that are there."""
+    rows, missing = [], []
+    for make in diagnosis_real.RECORDINGS.values():
+        try:
+            rows += make()
+        except DatasetUnavailable as reason:
+            missing.append(f"Left out: {reason}")
+    return "\n".join(["\n## Real recordings, each with only its nominal model\n",
+                      diagnosis_real.table(rows) if rows else "", *missing]) + "\n"
 
 
 INTRODUCTION = """

@@ -50,7 +50,7 @@ def _module(structure: Structure, method: Method) -> types.ModuleType:
     model = structure.model
     source = compiler._source(model, method)
     source = source.replace("from numba import njit\n", "")
-    source = source.replace("np.zeros(1, WORK)[0]", "fields_of(WORK)")
+    source = source.replace("np.zeros(1, WORK)", "[fields_of(WORK)]")
     made = types.ModuleType("interpreted")
     made.__dict__.update(njit=_plain, fields_of=_fields)
     exec(compile(source, f"<{model.name}>", "exec"), made.__dict__)

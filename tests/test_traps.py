@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import time
+from pathlib import Path
 
 import interpreted
 import numpy as np
@@ -12,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 import pikanid as pk
-from pikanid import errors, excitation, systems
+from pikanid import errors, excitation, simulation, systems
 from pikanid.model import Model, Parameter
 from pikanid.problem import Problem, bind
 from pikanid.recording import Recording
@@ -195,3 +197,13 @@ def test_models_are_data_never_code() -> None:
     with pytest.raises(errors.BadModel):
         Model.from_dict({"states": {"x": {}}, "outputs": {"x": {"expression": "x"}},
                          "equations": {"x": "__import__('shutil').rmtree('/tmp/none')"}})
+
+
+def test_no_record_outlives_the_array_it_lies_in() -> None:
+    """`np.zeros(1, record)[0]` leaves numba with a pointer into memory that is free again."""
+    kernels = sorted((Path(simulation.__file__).parent / "kernels").glob("*.py"))
+    assert len(kernels) > 5
+    for kernel in kernels:
+        taken = [node.lineno for node in ast.walk(ast.parse(kernel.read_text()))
+                 if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Call)]
+        assert taken == [], kernel.name

@@ -54,7 +54,7 @@ def switch_inputs(t, i, x, S, U, V, gap, dtau_in, delayed, p, mode, act, w):
 
 
 @called
-def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode, w, seen,
+def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode, work, seen,
         X, Y, J):
     """Integrate over the stops T, recording observations; returns (status, stop reached).
 
@@ -63,6 +63,10 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
     dtau_* (channels, A) how each delay depends on the estimated parameters.
     Status 0: done; 1: not finite; 2: endless switching.
     """
+    w = work[0]
+    for i in range(N):
+        w.eye[i, i] = 1.0
+        w.constant[i] = P
     n, A = N, len(act)
     x, S = w.x, w.S
     for r in range(n):
@@ -101,10 +105,10 @@ WORK = work_dtype(N, M, P, Q, K, STAGES, *BUFFERS)
 @njit(cache=True, error_model="numpy")
 def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first, output,
               row, inside, X, Y, J):
-    """`run` with its scratch; the only function of a model that Python calls."""
-    w = np.zeros(1, WORK)[0]
-    for i in range(N):
-        w.eye[i, i] = 1.0
-        w.constant[i] = P
-    return run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, np.ones(K), w,
+    """`run` with its scratch; the only function of a model that Python calls.
+
+    The scratch goes there as an array: a record does not keep the memory alive that it lies in.
+    """
+    work = np.zeros(1, WORK)
+    return run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, np.ones(K), work,
                Seen(first, output, row, inside), X, Y, J)
