@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from pikanid.commands.options import quantity
+from pikanid.commands.options import Quiet, quantity
 
 EXAMPLES = """Examples:
 
@@ -42,7 +42,7 @@ def conceal(
         help="makes an open set, for development: anybody can make it again")] = None,
     workers: Annotated[int | None, typer.Option(
         metavar="N", min=1, show_default=False, help="processes; by default one a core")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Write recordings that hide an effect each, and a sealed file that says which."""
     from pikanid.concealed.deck import DEFAULT_MIX, parse_mix

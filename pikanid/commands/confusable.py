@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from pikanid.commands.options import adjusted, check_outputs
+from pikanid.commands.options import (
+    Duration,
+    ModelName,
+    Quiet,
+    Rate,
+    Sigma,
+    Values,
+    adjusted,
+    check_outputs,
+)
 from pikanid.commands.simulate import excited, sigmas
 
 EXAMPLES = """Examples:
@@ -18,29 +27,22 @@ EXAMPLES = """Examples:
 
 
 def confusable(
-    model: Annotated[str, typer.Option(
-        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
-        show_default=False)],
+    model: ModelName,
     excitation: Annotated[str, typer.Option(
         "--excitation", "-e", metavar="NAME|FILE",
         help="the experiment: two_pulse, free_decay, move, planar_moves, or a recording of inputs",
     )] = "two_pulse",
-    sigma: Annotated[list[str], typer.Option(
-        metavar="[NAME=]VALUE", show_default=False,
-        help="standard deviation of the noise, as 0.1deg or theta=0.1deg")] = [],  # noqa: B006
-    set_: Annotated[list[str], typer.Option(
-        "--set", metavar="NAME=VALUE", help="value of a parameter", show_default=False)] = [],  # noqa: B006
-    duration: Annotated[float, typer.Option(
-        metavar="S", help="of a built-in excitation [s]")] = 5.0,
-    rate: Annotated[float, typer.Option(
-        metavar="HZ", help="sampling rate of a built-in excitation")] = 100.0,
+    sigma: Sigma = [],  # noqa: B006
+    set_: Values = [],  # noqa: B006
+    duration: Duration = 5.0,
+    rate: Rate = 100.0,
     strength: Annotated[float, typer.Option(
         metavar="N", help="how many σ strong effects are made before they are compared")] = 30.0,
     quick: Annotated[bool, typer.Option(
         "--quick", help="first order only: nothing is refitted")] = False,
     json_: Annotated[str | None, typer.Option(
         "--json", metavar="FILE", help="write JSON (- for standard output)")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Say which effects an experiment could detect, from which size, and which it confuses."""
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [model, excitation])

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from pikanid.commands.options import assignments, check_outputs, quantity
+from pikanid.commands.options import Quiet, Sigma, assignments, check_outputs, quantity
 from pikanid.commands.simulate import sigmas
 
 EXAMPLES = """Examples:
@@ -26,9 +26,7 @@ def design(
     out: Annotated[str, typer.Option(
         "--out", "-o", metavar="FILE", show_default=False,
         help="profile to run (.csv, .csv.gz, .tsv, .parquet)")],
-    sigma: Annotated[list[str], typer.Option(
-        metavar="[NAME=]VALUE", show_default=False,
-        help="standard deviation of the noise, as 0.1deg or theta=0.1deg")] = [],  # noqa: B006
+    sigma: Sigma = [],  # noqa: B006
     recorded: Annotated[list[str], typer.Option(
         metavar="FILE", show_default=False, help="what was recorded before")] = [],  # noqa: B006
     candidate: Annotated[list[str], typer.Option(
@@ -48,7 +46,7 @@ def design(
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of random profiles")] = 0,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", help="figure to write (.png, .svg, .pdf)")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Choose the next experiment among feasible ones, and write it ready to run."""
     check_outputs({"--out": (out, [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".pq"]),

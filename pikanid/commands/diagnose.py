@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pikanid.commands.identify import prepared
-from pikanid.commands.options import adjusted, assignments, check_outputs, quantity
+from pikanid.commands.options import (
+    Columns,
+    ModelName,
+    Quiet,
+    Sigma,
+    Stride,
+    Units,
+    Values,
+    adjusted,
+    assignments,
+    check_outputs,
+    quantity,
+)
 
 if TYPE_CHECKING:
     from pikanid.mismatch import Diagnosis
@@ -28,9 +40,7 @@ def diagnose(
     train: Annotated[list[str], typer.Argument(
         metavar="TRAIN...", help="recordings to explain: CSV, Excel, Parquet, MAT or NPZ",
         show_default=False)],
-    model: Annotated[str, typer.Option(
-        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
-        show_default=False)],
+    model: ModelName,
     held_out: Annotated[list[str], typer.Option(
         metavar="OTHER", show_default=False,
         help="recording of another experiment, to prove it on")] = [],  # noqa: B006
@@ -38,24 +48,15 @@ def diagnose(
         "--json", metavar="FILE", help="write diagnosis.json (- for standard output)")] = None,
     report: Annotated[str | None, typer.Option(
         metavar="FILE.html", help="write a page for people")] = None,
-    sigma: Annotated[list[str], typer.Option(
-        metavar="[NAME=]VALUE", show_default=False,
-        help="standard deviation of the noise; found out by default")] = [],  # noqa: B006
+    sigma: Sigma = [],  # noqa: B006
     quiet_until: Annotated[str | None, typer.Option(
         metavar="TIME", help="nothing moves before, as 2s")] = None,
     alpha: Annotated[float, typer.Option(help="rate of false alarms")] = 0.01,
-    set_: Annotated[list[str], typer.Option(
-        "--set", metavar="NAME=VALUE", show_default=False,
-        help="guess of a free parameter, or value of a fixed one")] = [],  # noqa: B006
-    column: Annotated[list[str], typer.Option(
-        metavar="NAME=COLUMN", show_default=False,
-        help="column of the file that holds a signal; t=COLUMN for time")] = [],  # noqa: B006
-    unit: Annotated[list[str], typer.Option(
-        metavar="NAME=UNIT", show_default=False,
-        help="unit of a signal, where the file does not say")] = [],  # noqa: B006
-    decimate: Annotated[int, typer.Option(
-        metavar="N", min=1, help="use every N-th sample of the outputs")] = 1,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+    set_: Values = [],  # noqa: B006
+    column: Columns = [],  # noqa: B006
+    unit: Units = [],  # noqa: B006
+    decimate: Stride = 1,
+    quiet: Quiet = False,
 ) -> int:
     """Find out which physics a model leaves out, and prove it on another recording."""
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pikanid import errors
-from pikanid.commands.options import check_outputs
+from pikanid.commands.options import Quiet, check_outputs
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,7 +35,7 @@ def equivalence(
     quick: Annotated[bool, typer.Option("--quick", help="a third of the settings")] = False,
     seed: Annotated[int, typer.Option(
         metavar="N", min=0, help="of coefficients, parameters and noise")] = 0,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Compare the training loss of a pykan KAN with the objective of iPDA, term by term."""
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [])

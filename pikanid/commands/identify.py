@@ -10,7 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pikanid import errors
-from pikanid.commands.options import adjusted, assignments, check_outputs, quantity
+from pikanid.commands.options import (
+    Columns,
+    ModelName,
+    Quiet,
+    Sigma,
+    Stride,
+    Units,
+    Values,
+    adjusted,
+    assignments,
+    check_outputs,
+    quantity,
+)
 from pikanid.strategies import STRATEGIES
 
 if TYPE_CHECKING:
@@ -36,39 +48,28 @@ def identify(
     recordings: Annotated[list[str], typer.Argument(
         metavar="RECORDING...", help="CSV, Excel, Parquet, MAT or NPZ; several are fitted jointly",
         show_default=False)],
-    model: Annotated[str, typer.Option(
-        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
-        show_default=False)],
+    model: ModelName,
     strategy: Annotated[str, typer.Option(
         "--strategy", "-s", metavar="|".join([*STRATEGIES, ALL]), help="how to fit")] = "nls",
     protocol: Annotated[str, typer.Option(
         metavar="default|paper",
         help="settings: the best known, or those of the paper")] = "default",
-    sigma: Annotated[list[str], typer.Option(
-        metavar="[NAME=]VALUE", show_default=False,
-        help="standard deviation of the noise, as 0.1deg or theta=0.1deg")] = [],  # noqa: B006
-    set_: Annotated[list[str], typer.Option(
-        "--set", metavar="NAME=VALUE", show_default=False,
-        help="guess of a free parameter, or value of a fixed one")] = [],  # noqa: B006
+    sigma: Sigma = [],  # noqa: B006
+    set_: Values = [],  # noqa: B006
     fix: Annotated[list[str], typer.Option(
         metavar="NAME[=VALUE]", help="do not estimate", show_default=False)] = [],  # noqa: B006
     free: Annotated[list[str], typer.Option(
         metavar="NAME", show_default=False,
         help="estimate a parameter, or the initial value of a state")] = [],  # noqa: B006
-    column: Annotated[list[str], typer.Option(
-        metavar="NAME=COLUMN", show_default=False,
-        help="column of the file that holds a signal; t=COLUMN for time")] = [],  # noqa: B006
-    unit: Annotated[list[str], typer.Option(
-        metavar="NAME=UNIT", show_default=False,
-        help="unit of a signal, where the file does not say")] = [],  # noqa: B006
+    column: Columns = [],  # noqa: B006
+    unit: Units = [],  # noqa: B006
     rate: Annotated[float | None, typer.Option(
         metavar="HZ", help="sampling rate, where the file has no times")] = None,
     sheet: Annotated[str | None, typer.Option(
         metavar="NAME", help="sheet of a workbook, by name or number from 0")] = None,
     start: Annotated[float | None, typer.Option("--from", metavar="S", help="start [s]")] = None,
     stop: Annotated[float | None, typer.Option("--to", metavar="S", help="end [s]")] = None,
-    decimate: Annotated[int, typer.Option(
-        metavar="N", min=1, help="use every N-th sample of the outputs")] = 1,
+    decimate: Stride = 1,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the starting points")] = 0,
     json_: Annotated[str | None, typer.Option(
         "--json", metavar="FILE", help="write the result as JSON (- for standard output)")] = None,
@@ -77,7 +78,7 @@ def identify(
     save: Annotated[str | None, typer.Option(
         metavar="FILE",
         help="keep the whole estimate (.json, .json.gz), for Estimate.load")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Estimate a model's parameters from recordings, with standard errors and a verdict."""
     _check_choice("--strategy", strategy, [*STRATEGIES, ALL])

@@ -1,4 +1,6 @@
-"""What people write behind options: assignments, quantities with units, places to write to."""
+"""Options that commands share, and what people write behind them: assignments, quantities with
+units, places to write to.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +9,37 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from pikanid import errors
 
 if TYPE_CHECKING:
     from pikanid.model import Model
+
+ModelName = Annotated[str, typer.Option(
+    "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
+    show_default=False)]
+Sigma = Annotated[list[str], typer.Option(
+    "--sigma", metavar="[NAME=]VALUE", show_default=False,
+    help="standard deviation of the noise, as 0.1deg or theta=0.1deg")]
+Values = Annotated[list[str], typer.Option(
+    "--set", metavar="NAME=VALUE", show_default=False,
+    help="guess of a free parameter, or value of a fixed one")]
+Columns = Annotated[list[str], typer.Option(
+    "--column", metavar="NAME=COLUMN", show_default=False,
+    help="column of the file that holds a signal; t=COLUMN for time")]
+Units = Annotated[list[str], typer.Option(
+    "--unit", metavar="NAME=UNIT", show_default=False,
+    help="unit of a signal, where the file does not say")]
+Stride = Annotated[int, typer.Option(
+    "--decimate", metavar="N", min=1, help="use every N-th sample of the outputs")]
+Duration = Annotated[float, typer.Option(
+    "--duration", metavar="S", help="of a built-in excitation [s]")]
+Rate = Annotated[float, typer.Option(
+    "--rate", metavar="HZ", help="sampling rate of a built-in excitation")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")]
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 

@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pikanid import errors
-from pikanid.commands.options import adjusted, assignments, check_outputs, quantity
+from pikanid.commands.options import (
+    Columns,
+    Duration,
+    ModelName,
+    Quiet,
+    Rate,
+    Sigma,
+    Values,
+    adjusted,
+    assignments,
+    check_outputs,
+    quantity,
+)
 
 if TYPE_CHECKING:
     from pikanid.model import Model
@@ -27,29 +39,20 @@ A file given as --excitation holds the inputs; the outputs are sampled at its ti
 
 
 def simulate(
-    model: Annotated[str, typer.Option(
-        "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
-        show_default=False)],
+    model: ModelName,
     out: Annotated[str, typer.Option(
         "--out", "-o", metavar="FILE", show_default=False,
         help="recording to write (.csv, .csv.gz, .tsv, .parquet)")],
     excitation: Annotated[str, typer.Option(
         "--excitation", "-e", metavar=f"{'|'.join(BUILT_IN)}|FILE",
         help="what drives the model")] = "two_pulse",
-    sigma: Annotated[list[str], typer.Option(
-        metavar="[NAME=]VALUE", show_default=False,
-        help="standard deviation of the noise, as 0.1deg or theta=0.1deg; none by default")] = [],  # noqa: B006
+    sigma: Sigma = [],  # noqa: B006
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the noise")] = 0,
-    set_: Annotated[list[str], typer.Option(
-        "--set", metavar="NAME=VALUE", help="value of a parameter", show_default=False)] = [],  # noqa: B006
-    duration: Annotated[float, typer.Option(
-        metavar="S", help="of a built-in excitation [s]")] = 5.0,
-    rate: Annotated[float, typer.Option(
-        metavar="HZ", help="sampling rate of a built-in excitation")] = 100.0,
-    column: Annotated[list[str], typer.Option(
-        metavar="NAME=COLUMN", show_default=False,
-        help="column of the excitation's file that holds an input")] = [],  # noqa: B006
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
+    set_: Values = [],  # noqa: B006
+    duration: Duration = 5.0,
+    rate: Rate = 100.0,
+    column: Columns = [],  # noqa: B006
+    quiet: Quiet = False,
 ) -> int:
     """Simulate a model and write what would be recorded."""
     check_outputs({"--out": (out, [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".pq"])},

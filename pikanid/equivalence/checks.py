@@ -44,7 +44,7 @@ def run_checks(
         ),
         ("uniqueness", partial(uniqueness, seed)),
         ("KAN handed over", partial(delivered_curve, seed)),
-        ("deep KANs", partial(tangent_step, seed)),
+        ("deep KANs", partial(tangent_step, seed, quick=quick)),
         ("negative controls", partial(controls, seed)),
         ("degree 2 at the end", partial(quadratic_at_the_end, seed)),
     ]

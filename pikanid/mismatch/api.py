@@ -19,7 +19,13 @@ from pikanid.mismatch.force_shape import force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.locate import locate, smallest
-from pikanid.mismatch.preparation import oversampling, prepared, with_refined_noise
+from pikanid.mismatch.preparation import (
+    check_pair,
+    oversampling,
+    prepared,
+    set_aside,
+    with_refined_noise,
+)
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
@@ -32,8 +38,6 @@ from pikanid.strategies.nls import NLS
 SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
 BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
 Recordings = Recording | Sequence[Recording]
-ASIDE = 0.3  # of a recording that is set aside where there is no held-out one
-LEAST = 300  # samples of an output that must be there for that
 
 
 def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
@@ -198,9 +202,9 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     notes: list[str] = []
     proves = later is not None
     if later is not None:
-        _check_pair(train, later)
+        check_pair(train, later)
     else:
-        train, later = _set_aside(train, model, notes)
+        train, later = set_aside(train, model, notes)
     model = _held_as_recorded(model, train)
     tell("nominal fit")
     together = oversampling(model, train)
@@ -226,38 +230,6 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
     search.predicts = case.predicts
     return case
-
-
-def _set_aside(train: tuple[Recording, ...], model: Model, notes: list[str]
-               ) -> tuple[tuple[Recording, ...], tuple[Recording, ...] | None]:
-    """Recordings without their ends, and the same with nothing but their ends to be seen.
-
-    Hypotheses that cannot even predict how the same run goes on are refused; a run driven the same
-    way proves no more than that.
-    """
-    notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
-    if min(len(r[o].time) for r in train for o in model.output_names) < LEAST:
-        return train, None
-    kept, ends = [], []
-    for r in train:
-        cut = r.start + (1 - ASIDE) * (r.stop - r.start)
-        kept.append(r.window(r.start, cut))
-        unseen = [replace(r[o], values=np.where(r[o].time < cut, np.nan, r[o].values))
-                  for o in model.output_names]
-        ends.append(r.with_channels(*unseen))
-    notes.append(f"The last {100 * ASIDE:.0f} % of the recording are set aside: what is found has "
-                 "to predict them.")
-    return tuple(kept), tuple(ends)
-
-
-def _check_pair(train: tuple[Recording, ...], later: tuple[Recording, ...]) -> None:
-    for a in train:
-        for b in later:
-            missing = [n for n in a.names if n not in b]
-            if missing:
-                raise errors.BadRecording(errors.held_out_channels(b.name, missing))
-            if all(np.array_equal(a[n].values, b[n].values, equal_nan=True) for n in a.names):
-                raise errors.BadRecording(errors.held_out_same(a.name, b.name))
 
 
 def _held_as_recorded(model: Model, train: tuple[Recording, ...]) -> Model:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pikanid import errors
 from pikanid.channel import Channel
 from pikanid.estimate import Estimate
 from pikanid.mismatch.noise_level import Level, first_level, refined, without_outliers
@@ -15,6 +16,9 @@ from pikanid.recording import Recording
 
 LONG = 4000  # samples below which none are put together
 FINE = 30  # samples a period that are kept
+ASIDE = 0.3  # of a recording that is set aside where there is no held-out one
+LEAST = 300  # samples of an output that must be there for that
+
 
 def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float, float] | None,
              notes: list[str], together: int = 1) -> Records:
@@ -93,3 +97,40 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
             new[name] = refined(level, recording[name], f.t, f.residual, rate, quiet)
         levels.append(new)
     return Records(records.recordings, tuple(levels))
+
+
+def set_aside(train: tuple[Recording, ...], model: Model, notes: list[str]
+               ) -> tuple[tuple[Recording, ...], tuple[Recording, ...] | None]:
+    """Recordings without their ends, and the same with nothing but their ends to be seen.
+
+    Hypotheses that cannot even predict how the same run goes on are refused; a run driven the same
+    way proves no more than that.
+    """
+    notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
+    if min(len(r[o].time) for r in train for o in model.output_names) < LEAST:
+        return train, None
+    kept, ends = [], []
+    for r in train:
+        cut = r.start + (1 - ASIDE) * (r.stop - r.start)
+        kept.append(r.window(r.start, cut))
+        unseen = [replace(r[o], values=np.where(r[o].time < cut, np.nan, r[o].values))
+                  for o in model.output_names]
+        ends.append(r.with_channels(*unseen))
+    notes.append(f"The last {100 * ASIDE:.0f} % of the recording are set aside: what is found has "
+                 "to predict them.")
+    return tuple(kept), tuple(ends)
+
+
+def check_pair(train: tuple[Recording, ...], later: tuple[Recording, ...]) -> None:
+    """Refuse held-out recordings that lack a channel of the train ones, or are the same.
+
+    Raises:
+        BadRecording: If one does, or is.
+    """
+    for a in train:
+        for b in later:
+            missing = [n for n in a.names if n not in b]
+            if missing:
+                raise errors.BadRecording(errors.held_out_channels(b.name, missing))
+            if all(np.array_equal(a[n].values, b[n].values, equal_nan=True) for n in a.names):
+                raise errors.BadRecording(errors.held_out_same(a.name, b.name))
