@@ -97,14 +97,16 @@ def off(value: np.ndarray, truth: np.ndarray) -> float:
 
 
 def run_feynman(number: str, seed: int) -> dict[str, Any]:
-    """Trained and read by this package."""
+    """Trained and read by this package, on y over its standard deviation."""
     formula = next(f for f in FORMULAS if f.number == number)
     x, y = points(formula, seed)
+    size = float(y.std())
+    y = y / size
     fit = train(formula, x, y)
     begun = time.process_time()
     reading = extract(fit.kan, x, y)
     there, truth = beyond(formula)
-    error = off(reading(there), truth)
+    error = off(size * reading(there), truth)
     return {"recovered": reading.ok and error < RECOVERED, "ok": reading.ok,
             "error": error if np.isfinite(error) else None,
             "formula": str(reading.expression), "seconds": time.process_time() - begun}
@@ -116,6 +118,8 @@ def run_feynman_pykan(number: str, seed: int) -> dict[str, Any]:
 
     formula = next(f for f in FORMULAS if f.number == number)
     x, y = points(formula, seed)
+    size = float(y.std())
+    y = y / size
     kan = train(formula, x, y).kan
     kan.save_act = True
     kan(torch.from_numpy(x[:200]))
@@ -127,7 +131,7 @@ def run_feynman_pykan(number: str, seed: int) -> dict[str, Any]:
             log=1000)
     there, truth = beyond(formula)
     with torch.no_grad():
-        error = off(kan(torch.from_numpy(there)).numpy()[:, 0], truth)
+        error = off(size * kan(torch.from_numpy(there)).numpy()[:, 0], truth)
     return {"recovered": error < RECOVERED, "error": error if np.isfinite(error) else None,
             "seconds": time.process_time() - begun}
 

@@ -42,9 +42,10 @@ def project(J: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 def unit_columns(D: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """D without what J explains, in unit columns, and the lengths left (m,); 0 where nothing is."""
-    before = np.linalg.norm(D, axis=0)
-    rest = project(J, D)
-    length = np.linalg.norm(rest, axis=0)
+    with np.errstate(over="ignore", invalid="ignore"):  # a sign without bounds tells nothing
+        before = np.linalg.norm(D, axis=0)
+        rest = project(J, D)
+        length = np.linalg.norm(rest, axis=0)
     good = np.isfinite(length) & (length > 1e-4 * before) & (before > 0)
     scaled = np.where(good, rest / np.where(good, length, 1.0), 0.0)
     return scaled, np.where(good, length, 0.0)

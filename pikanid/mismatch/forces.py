@@ -224,7 +224,7 @@ def _half_derivative(t: np.ndarray, z: np.ndarray) -> np.ndarray:
 def disturbance(site: Site) -> list[Candidate]:
     """A force that acts once, for a short time."""
     a = Parameter(site.name("peak"), 0.0, f"{site.unit}/s^2")
-    at = Parameter(site.name("t_peak"), 0.0, "s")
+    at = Parameter(site.name("t_peak"), sum(site.span) / 2, "s", site.span)
     w = Parameter(site.name("width"), 0.3, "s", (0.01, 10.0))
     text = f"{a.name}/2*(1 + cos(2*pi*clip((t - {at.name})/{w.name}, -0.5, 0.5)))"
 

@@ -20,6 +20,7 @@ LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
+NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
 
 
@@ -58,10 +59,12 @@ class Search:
         self.tell("single effects")
         for candidate, starts in screen.singles(SINGLES):
             self._fit((candidate,), starts)
+        self._simplify()
         if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
             for pair, starts in screen.pairs(PAIRS):
                 self._fit(pair, starts)
+            self._simplify()
         return self.grow(adequate)
 
     def grow(self, adequate: Adequate) -> list[Hypothesis]:
@@ -80,11 +83,37 @@ class Search:
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
+        self._simplify()
         best = self.ranked()[0]
         if not best.far:
             self._exchange(best)
-        self._with_power_laws(self.ranked()[0])
+            self._simplify()
+        scale = self.scale()
+        ranked = self.ranked()
+        for h in ranked[:NEAR]:
+            if h.score(scale) < ranked[0].score(scale) + CLOSE:
+                self._with_power_laws(h)
         return self.ranked()
+
+    def _simplify(self) -> None:
+        """Leave each effect of the best hypothesis out, or put a law that it contains in its place,
+        the fit going on where it stood: what led there may have been no more than a way out of a
+        local minimum.
+        """
+        for _ in range(MOST):
+            best = self.ranked()[0]
+            for effect in best.effects:
+                rest = tuple(e for e in best.effects if e is not effect)
+                if rest:
+                    self._fit(rest, [best.point], again=True)
+                for simple in self.candidates:
+                    if simple.key in effect.covers and simple.key not in best.key:
+                        size = best.values[effect.parameters[0].name]
+                        self._fit((*rest, simple), [
+                            {**best.point, simple.parameters[0].name: size * share}
+                            for share in (1.0, 2.0)], again=True)
+            if self.ranked()[0] is best:
+                break
 
     def _exchange(self, best: Hypothesis) -> None:
         """Put others in the place of each effect of a hypothesis: rivals that no path led to."""
@@ -146,19 +175,20 @@ class Search:
         for candidate, starts in screen.singles(count, least):
             self._fit((*hypothesis.effects, candidate), starts)
 
-    def _fit(self, effects: Sequence[Candidate], starts: Sequence[Start | Mapping[str, float]]
-             ) -> Hypothesis:
+    def _fit(self, effects: Sequence[Candidate], starts: Sequence[Start | Mapping[str, float]],
+             again: bool = False) -> Hypothesis:
         key = frozenset(e.key for e in effects)
-        if key in self.fits:
-            return self.fits[key]
+        known = self.fits.get(key)
+        if known is not None and not again:
+            return known
         order = {c.key: k for k, c in enumerate(self.candidates)}
         ordered = sorted(effects, key=lambda e: order[e.key])
         found = fitted(self.nominal, ordered, self.records, starts, self.choices,
                        min((h.minimum.chi2 for h in self.fits.values()), default=np.inf))
-        if found is not None:
+        if found is not None and (known is None or found.minimum.chi2 < known.minimum.chi2):
             self.fits[key] = found
             return found
-        return self.fits[frozenset()]
+        return known or self.fits[frozenset()]
 
 
 def repeated(r: np.ndarray) -> float:

@@ -25,6 +25,7 @@ class Site:
         extra: Recorded channels that the model does not use.
         rate: Natural frequency at the guesses [rad/s]; 0 without a restoring force.
         rest: Whether the model starts in equilibrium.
+        span: First and last time [s] of the first recording.
         suffix: Distinguishes names where a model has several coordinates.
     """
 
@@ -36,6 +37,7 @@ class Site:
     extra: tuple[str, ...]
     rate: float
     rest: bool
+    span: tuple[float, float]
     suffix: str = ""
 
     @property
@@ -100,7 +102,8 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
     force = _at_rest(model, a)
     starts = [s.initial for s in model.states if s.name in (q, v)]
     return Site(model, q, v, output, inputs, extra, k**0.5 if k > 0 else 0.0,
-                sp.simplify(force) == 0 and all(e == 0 for e in starts), suffix)
+                sp.simplify(force) == 0 and all(e == 0 for e in starts),
+                (first.start, first.stop), suffix)
 
 
 def _moves(recording: Recording, name: str) -> bool:

@@ -16,6 +16,7 @@ from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
+RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
 SHARP = 0.12  # standard error from which on an exponent says that it is a whole number
 PART = 0.5  # of the nominal held-out RMSE that may remain where only part is explained
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
@@ -57,7 +58,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if not tried or tried[0].score(scale) >= base.score(scale):
         return Answer("unnamed", (), tuple(tried[:3]))
     lowest = min(_handicapped(h, scale) for h in tried)
-    near = [h for h in tried if _handicapped(h, scale) < lowest + WITHIN]
+    near = [h for h in tried if _handicapped(h, scale) < lowest + WITHIN
+            or (not h.known and h.score(scale) < lowest + RIVAL)]
     near = _parsimonious(_integer_laws(near), scale)
     near += [h for h in _open_exponents(near, tried) if h not in near]
     given = []
@@ -73,8 +75,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         given = _by_evidence(given, predict, scale, reasons)
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
-    if not known or (outside and _handicapped(outside[0], scale) < _handicapped(known[0], scale)
-                     + 2.0):
+    if not known or (outside and min(h.score(scale) for h in outside)
+                     < min(h.score(scale) for h in known) + RIVAL):
         rest = tuple(h for h in near if h not in given) + tuple(given)
         most = _largest_part(base, tried, scale, predict) if not given else ()
         if most:

@@ -129,7 +129,8 @@ class Simulator:
             np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active]), p, active,
             *grid.seen, X, Y, J)
         # a sum is finite only if everything in it is, and costs a fifth of looking at each
-        finite = status == 0 and math.isfinite(Y.sum()) and math.isfinite(J.sum())
+        with np.errstate(invalid="ignore", over="ignore"):
+            finite = status == 0 and math.isfinite(Y.sum()) and math.isfinite(J.sum())
         return Response(Y, J, grid.T, X, finite, float(grid.T[stop]), int(status))
 
     def _moved(self, p: np.ndarray, active: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
