@@ -52,7 +52,7 @@ def quadratic_drag(site: Site) -> list[Candidate]:
 def power_drag(site: Site) -> list[Candidate]:
     """Drag with an exponent of its own, other than 0, 1 and 2."""
     c = Parameter(site.name("c_n"), 0.0, f"({site.unit})/s^2", (0.0, INF))
-    n = Parameter(site.name("n"), 1.5, "", (0.15, 4.0))
+    n = Parameter(site.name("n"), 1.5, "", (0.2, 4.0))
     text = f"-{c.name}*signed_power({site.v}, {n.name})"
 
     def signs(view: View) -> list[Sign]:
@@ -154,7 +154,9 @@ def wall_impact(site: Site) -> list[Candidate]:
 def hysteresis(site: Site) -> list[Candidate]:
     """A force with memory: Bouc-Wen."""
     b = Parameter(site.name("b_z"), 0.0, f"{site.unit}/s^2", (0.0, INF))
-    d = Parameter(site.name("z_yield"), 0.01, site.unit, (1e-4, INF))
+    # a loop narrower than that is dry friction, and as hard to simulate as a wall
+    least = max(0.01 * site.swing, 1e-4)
+    d = Parameter(site.name("z_yield"), max(0.01, least), site.unit, (least, INF))
     z = site.name("z")
 
     def extend(model: Model) -> Model:

@@ -15,7 +15,8 @@ from pikanid.mismatch.tangent import Directions, directions
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
-SINGLES, PAIRS, MORE = 14, 8, 6  # refits of one effect, of two at once, of one more
+SINGLES, PAIRS = 14, 8  # refits of one effect, of two at once
+MORE, LATER = 6, 4  # of one more beside one, beside two or three
 LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
@@ -79,13 +80,13 @@ class Search:
             leading = [h for h in leading if h.minimum.chi2 < near]
             for hypothesis in leading:
                 if len(hypothesis.effects) < MOST:
-                    self._extend(hypothesis, MORE)
+                    self._extend(hypothesis, MORE if count == 1 else LATER)
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
         self._simplify()
         best = self.ranked()[0]
-        if not best.far:
+        if adequate(best):
             self._exchange(best)
             self._simplify()
         scale = self.scale()

@@ -26,6 +26,7 @@ class Site:
         rate: Natural frequency at the guesses [rad/s]; 0 without a restoring force.
         rest: Whether the model starts in equilibrium.
         span: First and last time [s] of the first recording.
+        swing: Half the range of the output there, in its unit.
         suffix: Distinguishes names where a model has several coordinates.
     """
 
@@ -38,6 +39,7 @@ class Site:
     rate: float
     rest: bool
     span: tuple[float, float]
+    swing: float
     suffix: str = ""
 
     @property
@@ -103,7 +105,15 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
     starts = [s.initial for s in model.states if s.name in (q, v)]
     return Site(model, q, v, output, inputs, extra, k**0.5 if k > 0 else 0.0,
                 sp.simplify(force) == 0 and all(e == 0 for e in starts),
-                (first.start, first.stop), suffix)
+                (first.start, first.stop), _swing(first, output.name), suffix)
+
+
+def _swing(recording: Recording, name: str) -> float:
+    import numpy as np
+
+    values = recording[name].values
+    seen = values[np.isfinite(values)]
+    return float(np.ptp(seen)) / 2 if len(seen) else 0.0
 
 
 def _moves(recording: Recording, name: str) -> bool:

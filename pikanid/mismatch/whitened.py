@@ -15,6 +15,7 @@ from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.simulator import Response, Steps
 
 CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
+FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
 GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
 
 
