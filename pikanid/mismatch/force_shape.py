@@ -6,15 +6,15 @@ out, so that nothing of a nominal term is found a second time (the gauge).  Seco
 the coefficients are held down by as much as generalised cross-validation asks (Eilers and Marx,
 Stat. Sci. 11, 1996).
 
-The edges show where in state space something is missing.  What they cannot explain is no force that
-depends on state and input of the moment: a lag, a hidden mode, memory, something that happens once.
-To first order, that is: where the mismatch is so large that the motion itself is another one, what
-is left may also be of second order, and nothing is said.
+The edges show where in state space something is missing.  Where nothing is left beside them, a force
+that depends on state and input of the moment can be all of it.  What is left may be a lag, a hidden
+mode, memory, something that happens once, or of second order: then nothing is said.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -32,7 +32,6 @@ GRID = 101  # points at which an edge is drawn
 GAUGE = 1e-3  # of a coefficient's sign: less is left when the free parameters can do the same
 LINEAR = 0.05  # of a straight line's sign: with less left the line is the free parameters' own
 ADEQUATE = 0.01
-MOST = 0.98  # of the misfit explained: what is left may be of second order
 OWN = 0.1  # of what all edges explain: so much must be an edge's alone to count
 
 
@@ -57,7 +56,7 @@ class ForceShape:
 
     edges: tuple[Edge, ...]
     unit: str
-    static_law: bool | None
+    static_law: Literal[True] | None
 
     def depends_on(self, alpha: float) -> tuple[str, ...]:
         """Arguments whose edge the others cannot replace."""
@@ -99,10 +98,7 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
                           float(gain / max(everything[0], 1e-300)),
                           float(chi2.sf(gain, freedom)) if freedom > 0 else 1.0))
     left = residual_tests(whitened, fit.theta, fit.r, np.hstack([fit.J, D]), candidates, site.rate)
-    excess = float(target @ target) - len(target)
-    static: bool | None = left.p_value >= ADEQUATE
-    if not static and everything[0] > MOST * excess:
-        static = None
+    static: Literal[True] | None = True if left.p_value >= ADEQUATE else None
     return ForceShape(tuple(edges), f"{site.unit}/s^2", static)
 
 

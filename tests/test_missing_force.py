@@ -1,0 +1,61 @@
+"""The shape of a missing force, the end set aside, and what to record next."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid import excitation, systems
+from pikanid.mismatch import api
+from pikanid.mismatch.force_shape import ForceShape, force_shape
+from pikanid.model import Model, Parameter
+
+SIGMA = 0.1 * np.pi / 180
+FRICTION = systems.sloshing().with_term(
+    "theta_dot", "-c*sign(theta_dot)", [Parameter("c", 0.5)])
+
+
+def recording(truth: Model, seed: int = 3) -> pk.Recording:
+    return pk.simulate(truth, excitation.planar_moves(10, 20.0, seed=seed), sigma=SIGMA, seed=seed)
+
+
+def shape(truth: Model) -> ForceShape:
+    opened = api._opened(systems.sloshing(), (recording(truth),), None, None, lambda text: None)
+    return force_shape(opened.base, opened.sites[0], opened.candidates)
+
+
+@pytest.mark.parametrize(("term", "argument"), [
+    ("-0.2*sign(theta_dot)", "theta_dot"), ("-abs(theta_dot)*theta_dot", "theta_dot"),
+    ("-30*theta**3", "theta")])
+def test_a_static_law_is_found_over_its_own_state(term: str, argument: str) -> None:
+    found = shape(systems.sloshing().with_term("theta_dot", term))
+    assert found.depends_on(0.01) == (argument,)
+    assert [e.argument for e in found.edges] == ["theta", "theta_dot", "u_x"]
+
+
+def test_a_lag_is_not_taken_for_a_static_law() -> None:
+    lagging = systems.sloshing().map_input("u_x", [Parameter("tau", 0.004)], lag="tau")
+    assert shape(lagging).static_law is None
+
+
+def test_nothing_missing_has_no_shape() -> None:
+    found = shape(systems.sloshing())
+    assert found.depends_on(0.01) == () and found.static_law
+
+
+def test_edge_of_drag_bends_against_the_motion() -> None:
+    """Without its straight line, -v|v| rises on the left and falls on the right of its middle."""
+    edge = shape(systems.sloshing().with_term("theta_dot", "-abs(theta_dot)*theta_dot")).edges[1]
+    left, right = edge.values[0], edge.values[-1]
+    assert left > 0 and right < -5 * edge.std[-1]
+
+
+def test_without_held_out_the_end_has_to_be_predicted() -> None:
+    dx = pk.diagnose(systems.sloshing(), recording(FRICTION))
+    assert dx.verdict == "unconfirmed"
+    assert dx.hypotheses[0].effects[0].ids == ("coulomb_friction",)
+    assert dx.held_out is not None and dx.held_out.rmse_after < 0.3 * dx.held_out.rmse_before
+    assert dx.held_out.t.min() >= 13.9  # of 20 s
+    assert "held-out" in dx.next_experiment and dx.shape is not None
+    assert len(dx.plot().subfigs) == 2
