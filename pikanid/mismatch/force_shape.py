@@ -6,9 +6,9 @@ out, so that nothing of a nominal term is found a second time (the gauge).  Seco
 the coefficients are held down by as much as generalised cross-validation asks (Eilers and Marx,
 Stat. Sci. 11, 1996).
 
-The edges show where in state space something is missing.  Where nothing is left beside them, a force
-that depends on state and input of the moment can be all of it.  What is left may be a lag, a hidden
-mode, memory, something that happens once, or of second order: then nothing is said.
+The edges show where in state space something is missing.  Where nothing is left beside them, a
+force that depends on state and input of the moment can be all of it.  What is left may be a lag, a
+hidden mode, memory, something that happens once, or of second order: then nothing is said.
 """
 
 from __future__ import annotations
