@@ -110,7 +110,7 @@ def test_progress_counts_every_part(quick: bool, monkeypatch: pytest.MonkeyPatch
     for module, name in ((controls, "uniqueness"), (controls, "controls"),
                          (controls, "quadratic_at_the_end"), (deep, "tangent_step"),
                          (delivery, "delivered_curve")):
-        monkeypatch.setattr(module, name, lambda seed: ())
+        monkeypatch.setattr(module, name, lambda seed, **options: ())
     parts: list[str] = []
     checks.run_checks(quick=quick, progress=parts.append)
     assert len(parts) == count_parts(quick)

@@ -118,6 +118,7 @@ def covered(by_evidence: bool, draws: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("by_evidence", [False, True])
+@pytest.mark.slow
 def test_bands_cover_as_often_as_they_say(by_evidence: bool) -> None:
     share = covered(by_evidence, 100)
     assert 0.95 - 3 * share.std() / 100**0.5 <= share.mean() <= 0.985

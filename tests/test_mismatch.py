@@ -114,6 +114,7 @@ def gaussian_case(seed: int, lift: float = 0.0, spread: float = 0.0) -> float:
                   past_inputs(t, [(t, u)], 15.0), spread).p_value
 
 
+@pytest.mark.slow
 def test_false_alarms_are_as_rare_as_promised() -> None:
     p = np.array([gaussian_case(seed) for seed in range(150)])
     # 10 % asked for; the weighted union of three tests may only be below: 27 is mean + 3.3 σ

@@ -34,6 +34,7 @@ def test_a_static_law_is_found_over_its_own_state(term: str, argument: str) -> N
     assert [e.argument for e in found.edges] == ["theta", "theta_dot", "u_x"]
 
 
+@pytest.mark.slow
 def test_a_lag_is_not_taken_for_a_static_law() -> None:
     lagging = systems.sloshing().map_input("u_x", [Parameter("tau", 0.004)], lag="tau")
     assert shape(lagging).static_law is None
@@ -44,6 +45,7 @@ def test_nothing_missing_has_no_shape() -> None:
     assert found.depends_on(0.01) == () and found.static_law
 
 
+@pytest.mark.slow
 def test_edge_of_drag_bends_against_the_motion() -> None:
     """Without its straight line, -v|v| rises on the left and falls on the right of its middle."""
     edge = shape(systems.sloshing().with_term("theta_dot", "-abs(theta_dot)*theta_dot")).edges[1]

@@ -194,6 +194,7 @@ def test_natural_frequency() -> None:
 # --- the next experiment -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_best_profile_is_the_one_that_a_refit_would_choose() -> None:
     offered = profiles(2.35, duration=10.0, draws=1)[:6]
     models = {"friction": friction(0.3), "drag": drag(0.3)}

@@ -55,6 +55,7 @@ def test_dry_friction_on_both_axes() -> None:
     assert found.slope_error < 1e-4
 
 
+@pytest.mark.slow
 def test_block_on_a_block_on_the_ground() -> None:
     """Two friction surfaces that carry each other's force, sticking singly and together."""
     model = Model.from_dict({
@@ -142,6 +143,7 @@ def test_endless_switching_ends_with_a_sentence(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("name", ["coulomb", "stop", "belt"])
+@pytest.mark.slow
 def test_implicit_steps_switch_at_the_same_instants(name: str) -> None:
     term = TERMS[name]
     recording = drive(term.drive, duration=0.8)

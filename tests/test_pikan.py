@@ -167,6 +167,7 @@ def test_inputs_that_change_at_every_sample() -> None:
         PIKAN(width=(1, 3, 1)).fit(guessed(), rich(10.0))
 
 
+@pytest.mark.slow
 def test_a_grid_that_cannot_follow_the_switches_is_owned_up_to() -> None:
     est = PIKAN(grid=160).fit(guessed(), rich(4.0))
     assert est.adequacy.verdict == "misfit" and est.warnings

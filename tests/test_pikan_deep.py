@@ -19,6 +19,7 @@ pytestmark = pytest.mark.kan
 
 
 @pytest.mark.parametrize("degrees", [0.1, 1.0])
+@pytest.mark.slow
 def test_as_good_as_nls(degrees: float) -> None:
     ratio, _ = versus_nls(PIKAN(width=(1, 5, 1)), 1, degrees, range(2))
     assert np.all(ratio <= 1.05)
@@ -78,6 +79,7 @@ def test_other_shapes(options: dict[str, object]) -> None:
     assert np.allclose(std(est), std(nls), rtol=0.05)
 
 
+@pytest.mark.slow
 def test_deterministic_for_a_seed() -> None:
     # one λ for all: on so coarse a grid the λ at which a network locks depends on its seed
     fits = [PIKAN(width=(1, 3, 1), grid=80, lam=1e5, seed=seed).fit(guessed(), slosh(0.1))

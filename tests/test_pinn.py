@@ -46,6 +46,7 @@ def test_default_agrees_with_nls() -> None:
     assert est.ok and est.warnings == ()
 
 
+@pytest.mark.slow
 def test_gradient_descent_with_either_balance() -> None:
     nls = pk.NLS().fit(decay(), recorded())
     for balance in ("none", "gradnorm"):

@@ -70,6 +70,7 @@ def test_order_four() -> None:
     assert np.all((orders > 3.5) & (orders < 4.6))
 
 
+@pytest.mark.slow
 def test_chemical_kinetics_conserve_mass() -> None:
     """Robertson's reaction, nine decades of time scales; reference values: Hairer & Wanner II."""
     t = np.array([0.0, 0.4, 4.0])

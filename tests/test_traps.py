@@ -122,6 +122,7 @@ def test_wrong_optima_of_a_plain_optimiser_are_caught_by_chi_square(length: floa
     assert ours.value("l_theta") == pytest.approx(0.045, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_true_local_minimum_is_never_reported_as_success() -> None:
     """Dry friction has several: from μ = 1 the best fit nearby is wrong, its gradient zero."""
     truth = MODEL.with_term("theta_dot", "-mu*sign(theta_dot)", [Parameter("mu", 2.0)])

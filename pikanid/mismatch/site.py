@@ -111,6 +111,8 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
 def _swing(recording: Recording, name: str) -> float:
     import numpy as np
 
+    if name not in recording:
+        return 0.0  # an experiment that is only planned
     values = recording[name].values
     seen = values[np.isfinite(values)]
     return float(np.ptp(seen)) / 2 if len(seen) else 0.0

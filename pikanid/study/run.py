@@ -5,10 +5,10 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
+from multiprocessing.pool import AsyncResult
 
 from pikanid import errors
 from pikanid.strategies import STRATEGIES
@@ -83,7 +83,7 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
             step(f"slosh, {scenario.label}, {name}")
             task = pending.get((scenario, name))
             singles.append(slosh.Result(scenario, name, None, errors.left_out_as_slow())
-                           if task is None else task.result())
+                           if task is None else task.get())
     order = {(s, n): k for k, (s, n) in enumerate(product(slosh.SCENARIOS, strategies))}
     singles.sort(key=lambda r: order[r.scenario, r.strategy])
     return Study(tuple(singles), tuple(spreads), tuple(real), swing, missing, seeds,
@@ -92,15 +92,10 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
 
 @contextmanager
 def _meanwhile(jobs: Sequence[tuple[slosh.Scenario, str]]
-               ) -> Iterator[dict[tuple[slosh.Scenario, str], Future[slosh.Result]]]:
+               ) -> Iterator[dict[tuple[slosh.Scenario, str], AsyncResult[slosh.Result]]]:
     """Fits that one other process makes in the meantime; an interruption ends it."""
     if not jobs:
         yield {}
         return
-    pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
-    try:
-        yield {job: pool.submit(slosh.fit, *job, SEED) for job in jobs}
-        pool.shutdown()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        yield {job: pool.apply_async(slosh.fit, (*job, SEED)) for job in jobs}
