@@ -1,6 +1,7 @@
 """How good are diagnoses?  Open sets of concealed recordings, scored: `reports/diagnosis.md`.
 
-    python benchmarks/report_diagnosis.py [--work build/diagnosis] [--cases 60] [--workers 2]
+    python benchmarks/report_diagnosis.py [FOLDER] [--work build/diagnosis] [--cases 60]
+        [--workers 2] [--only rich ...] [--alarms 400]
 
 Every set is made from its seed, every diagnosis is kept in the work folder: an interrupted run goes
 on where it stopped.  Nothing of the truth reaches a diagnosis.
@@ -53,20 +54,23 @@ SETS = (
 def main() -> None:
     """Make the sets, diagnose, score, write the report."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("reports"))
     parser.add_argument("--work", type=Path, default=Path("build/diagnosis"))
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--alarms", type=int, default=400, help="clean recordings of each noise")
+    parser.add_argument("--alarms", type=int, default=400,
+                        help="clean recordings of each noise; 0 for none")
     parser.add_argument("--only", choices=[s.name for s in SETS], action="append")
-    parser.add_argument("--out", type=Path, default=Path("reports/diagnosis.md"))
     given = parser.parse_args()
     chosen = [s for s in SETS if not given.only or s.name in given.only]
     parts = ["# Diagnoses of concealed recordings\n", provenance(), INTRODUCTION]
     for one in chosen:
         parts.append(_section(one, list(_diagnosed(one, given.work, given.cases, given.workers))))
+    if given.alarms:
+        parts.append(diagnosis_alarms.section(given.alarms, given.work, given.workers))
     if not given.only:
-        parts += [diagnosis_alarms.section(given.alarms, given.work, given.workers), _real()]
-    atomically(given.out, "\n".join(parts).encode())
+        parts.append(_real())
+    atomically(given.folder / "diagnosis.md", "\n".join(parts).encode())
 
 
 def _real() -> str:
