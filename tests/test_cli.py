@@ -108,6 +108,7 @@ def test_all_strategies_side_by_side(
     assert content["schema_version"] == 1
 
 
+@pytest.mark.slow
 def test_all_reports_what_cannot_be_used(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pikanid.strategies.pinn_fit.NEWTON_STEPS", 25)
     assert run("simulate", "--model", "pendulum", "--set", "theta_0=1", "--sigma", "0.1deg",

@@ -26,8 +26,8 @@ def shape(truth: Model) -> ForceShape:
 
 
 @pytest.mark.parametrize(("term", "argument"), [
-    ("-0.2*sign(theta_dot)", "theta_dot"), ("-abs(theta_dot)*theta_dot", "theta_dot"),
-    ("-30*theta**3", "theta")])
+    ("-0.2*sign(theta_dot)", "theta_dot"), ("-30*theta**3", "theta"),
+    pytest.param("-abs(theta_dot)*theta_dot", "theta_dot", marks=pytest.mark.slow)])
 def test_a_static_law_is_found_over_its_own_state(term: str, argument: str) -> None:
     found = shape(systems.sloshing().with_term("theta_dot", term))
     assert found.depends_on(0.01) == (argument,)

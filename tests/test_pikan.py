@@ -189,7 +189,8 @@ BLAST = {"name": "blast", "states": {"x": {"initial": 1.0}},
 
 @pytest.mark.parametrize(("name", "options"), [
     ("tank", {}), ("tank", {"width": (1, 3, 1)}), ("tank", {"protocol": "paper"}),
-    pytest.param("blast", {}, marks=pytest.mark.slow), ("blast", {"width": (1, 3, 1)}),
+    pytest.param("blast", {}, marks=pytest.mark.slow),
+    pytest.param("blast", {"width": (1, 3, 1)}, marks=pytest.mark.slow),
     ("blast", {"protocol": "paper"})])
 def test_a_model_that_is_not_finite_on_the_way(name: str, options: dict[str, object]) -> None:
     """Noise around an empty tank asks for the root of a negative number; exp overflows."""
