@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -97,5 +98,7 @@ def _meanwhile(jobs: Sequence[tuple[slosh.Scenario, str]]
     if not jobs:
         yield {}
         return
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
+    # More threads of its BLAS, which reads that on import, would slow down the fits timed here.
+    with multiprocessing.get_context("spawn").Pool(
+            1, os.putenv, ("OMP_NUM_THREADS", "1")) as pool:
         yield {job: pool.apply_async(slosh.fit, (*job, SEED)) for job in jobs}
