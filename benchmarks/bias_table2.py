@@ -72,4 +72,4 @@ def estimate(choice: Choice, recording: Recording) -> np.ndarray:
         grid = KanGrid(paper_intervals(problem), PAPER_DEGREE, exact_switches=False,
                        quadrature="sum", count=samples, base="silu")
     schedule = [Fixed(choice.lam, choice.warmup)]
-    return relax(setup, grid, lambda noise: schedule, refine=False).theta  # type: ignore[arg-type]
+    return relax(setup, grid, lambda noise: schedule, refine=False).theta  # type: ignore[arg-type]  # list

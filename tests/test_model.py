@@ -226,7 +226,7 @@ OPERATIONS = {
 }
 
 
-@settings(max_examples=12)
+@settings(max_examples=25)
 @given(st.lists(st.sampled_from(sorted(OPERATIONS)), max_size=5))
 def test_chains_of_operations_mean_what_they_mean_one_by_one(chain: list[str]) -> None:
     """A map of an input acts on the recorded signal first; what was mapped before comes after."""

@@ -64,7 +64,7 @@ class Layout:
     """
 
     def __init__(self, part: Part):
-        self.networks: list[Network] = list(part.approximators)  # type: ignore[arg-type]
+        self.networks: list[Network] = list(part.approximators)  # type: ignore[arg-type]  # by its builder
         near, far = [], []
         self.starts = [table.part.start for table in part.physics.tops]
         for network, table in zip(self.networks, part.physics.tops, strict=True):

@@ -117,7 +117,7 @@ def _quick(cells: Sequence[object], decimal: str) -> Array | None:
     """All cells at once, where all of them are plainly numbers or empty text."""
     try:
         if decimal == ",":
-            if any("." in cell for cell in cells):  # type: ignore[operator]
+            if any("." in cell for cell in cells):  # type: ignore[operator]  # caught below
                 return None
             cells = [cell.replace(",", ".") for cell in cells]  # type: ignore[attr-defined]
         values = np.array([float(cell) if cell != "" else np.nan for cell in cells])  # type: ignore[arg-type]

@@ -90,7 +90,7 @@ class RelaxedFit:
         columns = []
         for i, q in zip(chains.root, chains.order, strict=True):
             spline, own = part.approximators[i], part.physics.tops[i].part
-            columns.append(spline.basis(t, q) @ c[own])  # type: ignore[union-attr]
+            columns.append(spline.basis(t, q) @ c[own])  # type: ignore[union-attr]  # linear
         return np.column_stack(columns)
 
 

@@ -165,7 +165,8 @@ NOTHING = Form("nothing", "nothing", ())
 def _form(name: str, family: str, columns: str, knobs: str = "", powers: Sequence[int | None] = ()
           ) -> Form:
     """A form from text: columns separated by ";", knobs as "name kind, name kind"."""
-    inside = tuple(Knob(*entry.strip().split(" ", 1)) for entry in knobs.split(",") if entry)  # type: ignore[arg-type]
+    inside = tuple(Knob(*entry.strip().split(" ", 1))  # type: ignore[arg-type]  # kinds of the table
+                   for entry in knobs.split(",") if entry)
     names = {"x", *(k.name for k in inside)}
     parts = tuple(parse(text, names, name) for text in columns.split(";"))
     return Form(name, family, parts, inside, tuple(powers) or (0,) * len(parts))
