@@ -42,7 +42,24 @@ MODELS = {
         "states": {"h": {"unit": "m", "initial": "free"}, "v": {"unit": "m/s", "initial": "free"}},
         "parameters": {"g": {"unit": "m/s^2", "value": 9.81}},
         "equations": {"h": "v", "v": "-g"},
-        "outputs": {"h": {"unit": "m", "expression": "h"}}}}
+        "outputs": {"h": {"unit": "m", "expression": "h"}}},
+    # The first mode of the water in an upright, round vessel, in both horizontal directions, after
+    # H. Lamb, Hydrodynamics, 1932, for radius R and filling H: omega^2 = g xi/R tanh(xi H/R), and
+    # a steady acceleration a raises the surface by c a at the wall, c = 2 R/((xi^2 - 1) g), with
+    # xi = 1.8412.  What is seen is the highest point of the surface; the little square keeps its
+    # slope finite at rest.
+    "slosh": {
+        "name": "upright slosh mode",
+        "states": {"q_x": {"unit": "mm", "initial": 0.0}, "v_x": {"unit": "mm/s", "initial": 0.0},
+                   "q_y": {"unit": "mm", "initial": 0.0}, "v_y": {"unit": "mm/s", "initial": 0.0}},
+        "inputs": {"a_x": {"unit": "m/s^2", "hold": "first"},
+                   "a_y": {"unit": "m/s^2", "hold": "first"}},
+        "parameters": {"omega": {"unit": "rad/s", "guess": 19.1, "bounds": [14.3, 23.9]},
+                       "zeta": {"guess": 0.01, "bounds": [0.0, 0.3]},
+                       "c": {"unit": "mm*s^2/m", "guess": 4.18, "bounds": [2.09, 8.36]}},
+        "equations": {"q_x": "v_x", "v_x": "-omega**2*(q_x + c*a_x) - 2*zeta*omega*v_x",
+                      "q_y": "v_y", "v_y": "-omega**2*(q_y + c*a_y) - 2*zeta*omega*v_y"},
+        "outputs": {"h": {"unit": "mm", "expression": "sqrt(q_x**2 + q_y**2 + 0.1**2)"}}}}
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from typing import Literal
 
 import numpy as np
 
+from pikanid import alignment, errors, kinematics
 from pikanid import datasets_origins as origins
-from pikanid import errors
 from pikanid.channel import Channel
 from pikanid.datasets_origins import Origin
 from pikanid.reading import csv, mat, spreadsheet
@@ -53,6 +53,7 @@ BALLS = (
     "Orange Whiffle Ball",
 )
 SLOSH_MOTIONS = tuple(origins.SLOSH_CHECKSUMS)
+_COMMANDED = 0.02  # [s] window of derivatives: a commanded pose has no noise
 
 
 def single_pendulum(
@@ -196,6 +197,32 @@ def slosh_lar(name: str = "LE_2D_0m_5s_900deg") -> Recording:
     )
     note = "The heights lag behind the motion by an unknown 6 to 20 s: estimate the delay."
     return replace(carried.with_channels(h), notes=(note,))
+
+
+def slosh_lar_forced(name: str = "LE_2D_0m_5s_900deg") -> Recording:
+    """A run of `slosh_lar` made ready for a model: accelerations, tilt, and heights on one clock.
+
+    Channels: ``a_x``, ``a_y`` [m/s^2], the horizontal acceleration of the tool in fixed axes (the
+    liquid hardly turns with a round vessel); ``tilt_x``, ``tilt_y`` [rad] about these axes;
+    ``spin`` [rad/s] about the vertical; all at 500 Hz.  ``h`` [mm] while the tool moves: afterwards
+    the cameras do not see the highest point any more.  The delay of the video comes from the
+    energies of height, acceleration and tilt (`pikanid.alignment.energy_delay`), with no model.
+
+    Args:
+        name: One of `SLOSH_MOTIONS`.
+
+    Raises:
+        DatasetUnavailable: If a file is neither at hand nor to be had.
+    """
+    raw = kinematics.attitude_angles(slosh_lar(name))
+    raw = kinematics.with_acceleration(raw, {"a_x": "x", "a_y": "y"}, "savgol", _COMMANDED)
+    turn = kinematics.derivative(raw["heading"], 1, "savgol", _COMMANDED)
+    raw = raw.with_channels(replace(turn, name="spin"))
+    late = alignment.energy_delay(raw, "h", (("a_x", "a_y"), ("tilt_x", "tilt_y")))
+    begin, end = alignment.moving(raw, ("x", "y", "z", "tilt_x", "tilt_y", "heading"))
+    kept = raw.without("x", "y", "z", *kinematics.QUATERNION, "heading").shift("h", -late)
+    note = f"The heights lagged {late:.3f} s behind the motion, by the energies of both."
+    return replace(kept.window(begin, end), notes=(note,))
 
 
 def _content(origin: Origin) -> bytes:

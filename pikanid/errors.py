@@ -351,6 +351,17 @@ def pose_times(where: str) -> str:
     return f"'{where}': the channels of the pose do not share one time base."
 
 
+def nothing_moves(where: str, names: Sequence[str]) -> str:
+    return f"'{where}': nothing moves in {_listed(names)}."
+
+
+def signal_short(where: str, name: str, span: float, motion: float) -> str:
+    return (
+        f"'{where}': '{name}' lasts {span:.3g} s, and the motion {motion:.3g} s: it must cover the "
+        f"whole motion."
+    )
+
+
 def noise_short(name: str, n: int) -> str:
     return (
         f"Channel '{name}' has only {n} samples to estimate its noise from; give sigma yourself, "

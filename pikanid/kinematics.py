@@ -228,6 +228,36 @@ def acceleration_along_body(
     return _with_vector(recording, time, turned, names)
 
 
+def attitude_angles(
+    recording: Recording,
+    quaternion: Sequence[str] = QUATERNION,
+    names: Sequence[str] = ("tilt_x", "tilt_y", "heading"),
+) -> Recording:
+    """A recording with the angles by which a body's axis leans, and by which it has turned [rad].
+
+    With the body's axis u in fixed axes: tilt_x = atan2(-u_y, u_z) about the fixed x axis, tilt_y =
+    atan2(u_x, u_z) about the fixed y axis; heading is the twist about the vertical, 2 atan2(q_z,
+    q_w), continued over full turns.
+
+    Args:
+        recording: With four channels of an attitude quaternion on one time base.
+        quaternion: Their names, scalar last.
+        names: Of the three new channels.
+
+    >>> quarter = {"qx": [0, 0.6], "qy": [0, 0], "qz": [0, 0], "qw": [1, 0.8]}     # about x
+    >>> attitude_angles(Recording.from_arrays([0, 1], quarter))["tilt_x"].values.round(4).tolist()
+    [0.0, 1.287]
+    """
+    time, q = _stacked(recording, quaternion)
+    lean = to_body(np.array([0.0, 0.0, 1.0]), q * [-1.0, -1.0, -1.0, 1.0])
+    heading = np.unwrap(2 * np.arctan2(q[:, 2], q[:, 3]))
+    angles = (np.arctan2(-lean[:, 1], lean[:, 2]), np.arctan2(lean[:, 0], lean[:, 2]), heading)
+    # what is left of an axis that does not turn is rounding
+    return recording.with_channels(*(
+        Channel(name, time, np.round(angle, 12) + 0.0, "rad", hold="first")
+        for name, angle in zip(names, angles, strict=True)))
+
+
 def _stacked(recording: Recording, names: Sequence[str]) -> tuple[Array, Array]:
     parts = [recording.as_input(key) for key in names]
     if any(not np.array_equal(ch.time, parts[0].time) for ch in parts):

@@ -22,7 +22,7 @@ ROWS = (
     ("errors", "version"),
     ("units", "expressions", "expression_functions"),
     ("approximators",),
-    ("model", "channel", "resampling", "kinematics", "reading", "writing", "recording",
+    ("model", "channel", "resampling", "kinematics", "alignment", "reading", "writing", "recording",
      "half_derivative", "excitation"),
     ("noise",),
     ("systems", "datasets", "tracking"),

@@ -15,12 +15,14 @@ TWINS = {"input_delay": ["sensor_delay"], "sensor_delay": ["input_delay"]}
 
 
 def case(*ids: str, kind: str = "single", nameable: bool = True, near: str = "",
-         rival: tuple[str, ...] = (), distance: float = 9.0, nominal: float = 40.0) -> dict:
+         rival: tuple[str, ...] = (), distance: float = 9.0, nominal: float = 40.0,
+         seen: tuple[float, ...] = ()) -> dict:
     effects = [{"id": i, "twins": TWINS.get(i, []), "near": near,
                 "kind": kind if kind in ("near", "outside") else "catalogue"} for i in ids]
     return {"id": "001", "class": kind if ids else "nothing", "nameable": nameable and bool(ids),
             "effects": effects, "base": {"l_theta": {"value": 0.045}, "d_theta": {"value": 0.15}},
             "visibility": {"nominal": nominal, "best_rival": list(rival),
+                           "effects": list(seen or [nominal] * len(ids)),
                            "best_rival_distance": distance}}
 
 
@@ -55,6 +57,12 @@ FRICTION, PAIR = case("coulomb_friction"), case("coulomb_friction", "input_delay
     (case("coulomb_friction", "input_delay", kind="pair",
           rival=("coulomb_friction",), distance=1.0),
      answer(["coulomb_friction"]), "wrong", "indistinguishable"),
+    (case("coulomb_friction", "input_delay", kind="pair", seen=(30.0, 1.0)),
+     answer(["coulomb_friction"]), "visible", ""),
+    (case("coulomb_friction", "input_delay", kind="pair", seen=(30.0, 1.0)),
+     answer(["input_delay"]), "wrong", "part"),
+    (case("coulomb_friction", "input_delay", kind="pair", seen=(1.0, 1.0)),
+     answer(["coulomb_friction"]), "wrong", "part"),
     (case("coulomb_friction", rival=("quadratic_drag",), distance=4.1),
      answer(["quadratic_drag"]), "wrong", "other"),
     (case("hard_stop", kind="near", near="wall_impact"), answer(["wall_impact"]), "wrong", "near"),
@@ -97,12 +105,14 @@ def test_tally_counts_what_it_says() -> None:
         judge(faint, answer()),
         judge(case("coulomb_friction", nameable=False, rival=("quadratic_drag",), distance=1.0),
               answer(["quadratic_drag"])),
+        judge(case("coulomb_friction", "input_delay", kind="pair", nameable=False,
+                   seen=(30.0, 1.0)), answer(["coulomb_friction"])),
         judge(case(), answer(verdict="unnamed")),
         judge(case(), answer())]
     counts = {name: (share.count, share.n) for name, share in tally(scores).items()}
     assert counts == {
-        "right": (1, 3), "wrong": (2, 7), "wrong_of_answers": (2, 3), "wrong_but_knowable": (1, 7),
-        "formula": (0, 7), "false_alarm": (1, 2), "missed": (1, 4),
+        "right": (1, 3), "wrong": (2, 8), "wrong_strictly": (3, 8), "wrong_of_answers": (2, 4),
+        "wrong_but_knowable": (1, 8), "formula": (0, 8), "false_alarm": (1, 2), "missed": (1, 5),
         "parameters_within_3_std": (0, 0), "held_out_within_1.1_noise": (0, 1)}
 
 

@@ -286,7 +286,7 @@ def test_classifier_on_metadata_would_see_a_hint() -> None:
 def test_metadata_carry_no_hint(excitation: str, cases: int, tmp_path: Path,
                                 monkeypatch: pytest.MonkeyPatch) -> None:
     # How visible an effect is does not enter its files: left out, to be quick.
-    monkeypatch.setattr(case, "visibility", lambda *a: Visibility(0.0, (), 0.0, 0.05, 0.1))
+    monkeypatch.setattr(case, "visibility", lambda *a: Visibility(0.0, (), 0.0, (), 0.05, 0.1))
     settings = Settings(cases, excitation, 1e-3, dict(DEFAULT_MIX))
     generate(tmp_path / "d", tmp_path / "t.json", settings, seed=4, workers=1)
     truth = json.loads((tmp_path / "t.json").read_text())

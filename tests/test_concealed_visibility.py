@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -34,9 +36,9 @@ def effect(identifier: str) -> Effect:
     return variants(identifier)[0]
 
 
-def seen(rig: Rig, *hidden: str) -> Visibility:
+def seen(rig: Rig, *hidden: str, sizes: Sequence[Mapping[str, float]] = ()) -> Visibility:
     return visibility(measured(rig, two_pulse()), two_pulse(), NOISE, Rig(),
-                      [effect(identifier) for identifier in hidden], SCALES)
+                      [effect(identifier) for identifier in hidden], SCALES, sizes)
 
 
 def test_distance_of_a_linear_model_is_that_of_its_projection() -> None:
@@ -100,9 +102,12 @@ def test_delay_is_told_from_everything_but_its_twin_and_lags() -> None:
 
 
 def test_half_of_a_pair_is_a_rival() -> None:
-    faint = seen(Rig(coulomb=2.0, offset=1e-5), "coulomb_friction", "sensor_offset")
+    faint = seen(Rig(coulomb=2.0, offset=1e-5), "coulomb_friction", "sensor_offset",
+                 sizes=[{"c": 2.0}, {"b": 1e-5}])
     assert "coulomb_friction" in faint.rival
     assert faint.distance < 1.0
+    friction, offset = faint.effects
+    assert offset < 1.0 < 5.0 < friction
 
 
 def test_a_variant_is_no_half_of_the_other(monkeypatch: pytest.MonkeyPatch) -> None:

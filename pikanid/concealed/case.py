@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,6 +72,7 @@ class _Hidden:
     train: Rig | Tank
     held_out: Rig | Tank
     effects: list[dict[str, object]]
+    sizes: Sequence[Mapping[str, float]] = ()
 
 
 def make(order: Order) -> Case:
@@ -109,7 +110,8 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     recordings = {
         f"{order.name}_{key}.csv": files.csv(experiments[key], noise.spoilt(clean[key], rng))
         for key in ("train", "held_out")}
-    seen = visibility(clean["train"], train, noise, base, order.card.effects, scales)
+    seen = visibility(clean["train"], train, noise, base, order.card.effects, scales,
+                      hidden.sizes)
     later = nominal_fit(noise.whitened(clean["held_out"]), held_out, noise, base).distance
     return Case(recordings, {
         "id": order.name, "class": order.card.kind,
@@ -145,7 +147,7 @@ def _scales(base: Rig, *experiments: Experiment) -> Scales:
 
 def _in_rig(card: Card, base: Rig, train: Experiment, scales: Scales, noise: Noise,
             rng: np.random.Generator) -> _Hidden:
-    now, later, entries = base, base, []
+    now, later, entries, sizes = base, base, [], []
     for effect in card.effects:
         shape = effect.drawn(rng, scales)
         values = sized(shape, drawn_target(rng), base, train, noise)
@@ -160,7 +162,8 @@ def _in_rig(card: Card, base: Rig, train: Experiment, scales: Scales, noise: Noi
         if effect.held_out != "absent":
             later = effect.applied(later, afterwards)
         entries.append(_effect_entry(effect, values, afterwards))
-    return _Hidden(now, later, entries)
+        sizes.append(values)
+    return _Hidden(now, later, entries, sizes)
 
 
 def _effect_entry(effect: Effect, values: Mapping[str, float],
@@ -207,5 +210,6 @@ def _visibility_entry(seen: Visibility, later: float) -> dict[str, object]:
 
     return {"unit": "sigma", "nominal": rounded(seen.nominal), "best_rival": list(seen.rival),
             "best_rival_distance": rounded(seen.distance),
+            "effects": [rounded(x) for x in seen.effects],
             "nominal_held_out": rounded(later),
             "nominal_l_theta": rounded(seen.length), "nominal_d_theta": rounded(seen.damping)}

@@ -2,7 +2,9 @@
 
 An answer is `named` or `set`; every other verdict names nothing.  It is *right* if one of at most
 two hypotheses is the truth, *wrong* if none is.  Twins count as one effect.  A hypothesis is the
-truth only if it holds every hidden effect and no other.
+truth only if it holds every hidden effect and no other.  Of two hidden effects one may be too weak
+to be told (the recording without it fits to less than 4σ): who then names the other one alone has
+named the *visible* part, and is neither right nor wrong.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from pikanid import errors
 from pikanid.concealed.visibility import FROM_NOMINAL, FROM_RIVAL
 
 Entry = Mapping[str, Any]
-Outcome = Literal["right", "long", "wrong", "formula", "alarm", "silent"]
+Outcome = Literal["right", "long", "visible", "wrong", "formula", "alarm", "silent"]
 VERDICTS = ("none", "named", "set", "unconfirmed", "unnamed")
 ANSWERS = ("named", "set")
 MOST_HYPOTHESES = 2
@@ -35,7 +37,8 @@ class Score:
         nominal: Distance of the refitted nominal model [σ].
         verdict: Of the diagnosis.
         mismatch: Whether it says that something is missing.
-        outcome: `right`; `long` (the truth among more than two hypotheses); `wrong`; `formula` (a
+        outcome: `right`; `long` (the truth among more than two hypotheses); `visible` (the part of
+            the truth that could be told among at most two hypotheses); `wrong`; `formula` (a
             symbolic law where the truth is in no catalogue: ids cannot judge it); `alarm`
             (something is missing, nothing named, where nothing hides); `silent`.
         reason: Of a wrong answer: `indistinguishable` (the truth's best rival, closer than 4σ: no
@@ -43,7 +46,7 @@ class Score:
             that the hidden law resembles), `nothing` is hidden, or `other`.
         hypotheses: How many were given.
         probability: Of the most probable one; None where nothing is answered.
-        first_is_truth: Whether that one is the truth.
+        first_is_truth: Whether that one is the truth, or its visible part.
         within: Whether each base parameter lies within 3 standard errors of the truth; None where
             none is compared.
         held_out: RMSE after the diagnosis over the noise; None where it is not given.
@@ -115,7 +118,8 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
 
     >>> truth = {"id": "001", "class": "single", "nameable": True, "base": {},
     ...          "effects": [{"id": "input_delay", "twins": ["sensor_delay"], "near": ""}],
-    ...          "visibility": {"nominal": 40.0, "best_rival": [], "best_rival_distance": 9.0}}
+    ...          "visibility": {"nominal": 40.0, "effects": [40.0],
+    ...                         "best_rival": [], "best_rival_distance": 9.0}}
     >>> answer = {"verdict": "named", "mismatch": True, "hypotheses": [
     ...     {"effects": [{"ids": ["sensor_delay"]}], "probability": 0.97}]}
     >>> judge(truth, answer).outcome
@@ -138,15 +142,17 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
     return Score(
         str(case["id"]), case["class"], bool(case["nameable"]),
         float(case["visibility"]["nominal"]), verdict, mismatch, outcome, reason, len(given),
-        given[0][1] if answered else None, answered and _same(explanations[0], truth),
+        given[0][1] if answered else None,
+        answered and any(_same(explanations[0], t) for t in (truth, _visible(case, truth)) if t),
         _within(case["base"], diagnosis), _held_out(diagnosis))
 
 
 def tally(scores: Iterable[Score]) -> dict[str, Share]:
     """What the scores of a set amount to.
 
-    `right` counts nameable cases only; `wrong` counts all; `wrong_but_knowable` leaves out the
-    answers that no method could have known to be wrong; `false_alarm` counts cases that hide
+    `right` counts nameable cases only; `wrong` counts all, `wrong_strictly` also answers that name
+    the visible part; `wrong_but_knowable` leaves out the answers that no method could have known to
+    be wrong; `false_alarm` counts cases that hide
     nothing, `missed` those whose effect is at least 5σ strong.
     """
     every = list(scores)
@@ -161,6 +167,8 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
     return {
         "right": Share(len(right), len(nameable)),
         "wrong": Share(len(wrong), len(every)),
+        "wrong_strictly": Share(
+            len(wrong) + sum(s.outcome == "visible" for s in every), len(every)),
         "wrong_of_answers": Share(len(wrong), len(answers)),
         "wrong_but_knowable": Share(
             sum(s.reason != "indistinguishable" for s in wrong), len(every)),
@@ -199,6 +207,10 @@ def _outcome(case: Entry, truth: list[set[str]], verdict: str, mismatch: bool,
         return "wrong", "nothing"
     if any(_same(explanation, truth) for explanation in explanations):
         return ("right" if len(explanations) <= MOST_HYPOTHESES else "long"), ""
+    visible = _visible(case, truth)
+    if visible and len(explanations) <= MOST_HYPOTHESES and any(
+            _same(explanation, visible) for explanation in explanations):
+        return "visible", ""
     known = all(effect.get("kind", "catalogue") == "catalogue" or effect["id"] == "power_drag"
                 for effect in case["effects"])
     symbolic = any(identifier.startswith(SYMBOLIC) for explanation in explanations
@@ -206,6 +218,11 @@ def _outcome(case: Entry, truth: list[set[str]], verdict: str, mismatch: bool,
     if symbolic and not known:
         return "formula", ""
     return "wrong", _reason(case, truth, explanations)
+
+
+def _visible(case: Entry, truth: list[set[str]]) -> list[set[str]]:
+    return [effect for effect, distance in zip(truth, case["visibility"]["effects"], strict=True)
+            if distance >= FROM_RIVAL]
 
 
 def _reason(case: Entry, truth: list[set[str]], explanations: list[list[set[str]]]) -> str:

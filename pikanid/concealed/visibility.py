@@ -7,7 +7,7 @@ model is at least 5σ away and the best rival that is no twin at least 4σ.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -40,6 +40,7 @@ class Visibility:
         nominal: Of the refitted nominal model.
         rival: Ids of the best rival explanation; empty where there is none.
         distance: Of the best rival.
+        effects: Of the best fit without each hidden effect.
         length: Refitted l of the nominal model [m].
         damping: Refitted d of the nominal model [N s/m].
     """
@@ -47,6 +48,7 @@ class Visibility:
     nominal: float
     rival: tuple[str, ...]
     distance: float
+    effects: tuple[float, ...]
     length: float
     damping: float
 
@@ -114,7 +116,8 @@ def nominal_fit(truth: Array, experiment: Experiment, noise: Noise, base: Rig) -
 
 
 def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
-               true_effects: Sequence[Effect], scales: Scales) -> Visibility:
+               true_effects: Sequence[Effect], scales: Scales,
+               sizes: Sequence[Mapping[str, float]] = ()) -> Visibility:
     """Compare a truth with the nominal model and with every rival.
 
     Args:
@@ -124,6 +127,7 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
         base: The rig without effects.
         true_effects: What is hidden; rivals leave them and their twins out.
         scales: Of the case.
+        sizes: Quantities of each hidden effect: from where its fit alone starts as well.
     """
     target = noise.whitened(truth)
     nominal = nominal_fit(target, experiment, noise, base)
@@ -133,15 +137,19 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
               if len(true_effects) != 1 or is_rival(c, true_effects[0])]
     if true_effects and nominal.distance > 1.0:
         contest.enter(clean, nominal, rivals)
+    without = [nominal.distance] * len(true_effects)
     if len(true_effects) == 2 and nominal.distance > 1.0:
-        for kept, other in (true_effects, true_effects[::-1]):
+        for k, (other, kept) in enumerate((true_effects, true_effects[::-1])):
             half = Candidate((kept,), scales, experiment, noise, Rig())
-            fit = contest.fits.get((kept,)) or contest.best_start(half, nominal, kept)
+            at = [np.array([base.length, base.damping, *(own[q.name] for q in kept.quantities)])
+                  for own, effect in zip(sizes, true_effects, strict=False) if effect is kept]
+            fit = contest.alone(half, nominal, kept, at)
+            without[k] = fit.distance
             others = [c for c in CATALOGUE
                       if is_rival(c, other) and c.id != kept.id and c.id not in kept.twins]
             contest.enter(half, fit, others, *IN_PAIRS)
     names, distance = contest.winner()
-    return Visibility(nominal.distance, names, min(distance, nominal.distance),
+    return Visibility(nominal.distance, names, min(distance, nominal.distance), tuple(without),
                       float(nominal.values[0]), float(nominal.values[1]))
 
 
@@ -169,12 +177,12 @@ class _Contest:
         for candidate, found in roughly[:full]:
             self._keep(candidate, candidate.refitted(self.target, found.values))
 
-    def best_start(self, candidate: Candidate, nominal: Refit, effect: Effect) -> Refit:
-        """One effect alone, refitted."""
-        _, start = self._screen(candidate, nominal, effect)
-        found = candidate.refitted(self.target, start)
-        self._keep(candidate, found)
-        return found
+    def alone(self, candidate: Candidate, nominal: Refit, effect: Effect,
+              more: Sequence[Array]) -> Refit:
+        """One effect alone, refitted from where it does most to first order, and from more."""
+        for start in [self._screen(candidate, nominal, effect)[1], *more]:
+            self._keep(candidate, candidate.refitted(self.target, start))
+        return self.fits[candidate.effects]
 
     def winner(self) -> tuple[tuple[str, ...], float]:
         """Ids and distance of the closest rival."""

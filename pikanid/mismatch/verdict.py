@@ -17,6 +17,7 @@ from pikanid.mismatch.whitened import GROSS
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
+WHOLE = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # exponents that have names
 SHARP = 0.12  # standard error from which on an exponent says that it is a whole number
 PART = 0.3  # of the nominal held-out RMSE that may remain where only part is explained
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
@@ -61,7 +62,6 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     near = [h for h in tried if _handicapped(h, scale) < lowest + WITHIN
             or (not h.known and h.score(scale) < lowest + RIVAL)]
     near = _parsimonious(_integer_laws(near), scale)
-    near += [h for h in _open_exponents(near, tried) if h not in near]
     given = []
     for h in near:
         if test(h).p_value < ADEQUATE:
@@ -83,7 +83,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             return Answer("unconfirmed", most, tuple(h for h in rest if h not in most)[:5], {},
                           reasons)
         return Answer("unnamed", (), rest[:5], {}, reasons)
-    merged, twins = _merged(known)
+    merged, twins = _merged(known, tried)
     verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
     return Answer(verdict, tuple(merged), tuple(others), twins, reasons)
@@ -142,22 +142,17 @@ def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
     return kept or near
 
 
-def _open_exponents(near: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Power laws that stand for a whole exponent in `near` and whose own is known badly."""
-    found = []
-    for h in near:
-        for o in tried:
-            power = next((e for e in o.effects if e.ids[0] == "power_drag"), None)
-            if power is None or len(o.effects) != len(h.effects):
-                continue
-            replaced = [k for k in h.key - o.key if k in power.covers]
-            n = power.parameters[1].name
-            whole = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}
-            if len(replaced) == 1 and o.key - h.key == {power.key} and (
-                    o.std[n] > SHARP or abs(o.values[n] - whole[replaced[0]]) > 2 * o.std[n]) and (
-                    o.minimum.chi2 < h.minimum.chi2 + 1.0):
-                found.append(o)
-    return found
+def _open_exponent(h: Hypothesis, whole: float) -> bool:
+    """Whether the exponent of a hypothesis' power law may be `whole`, and much else as well."""
+    n = next(e for e in h.effects if e.ids[0] == "power_drag").parameters[1].name
+    return h.std[n] > SHARP and abs(h.values[n] - whole) < 2 * h.std[n]
+
+
+def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) -> Hypothesis | None:
+    """The hypothesis with a law of free exponent in the place of one of `h`'s effects."""
+    rest = h.key - {effect.key}
+    return next((o for o in tried for e in o.effects
+                 if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
 
 
 def _by_evidence(given: list[Hypothesis], predict: Predict, scale: float,
@@ -173,14 +168,19 @@ def _by_evidence(given: list[Hypothesis], predict: Predict, scale: float,
     return sorted(kept, key=lambda h: found[h.key])
 
 
-def _merged(known: list[Hypothesis]
+def _merged(known: list[Hypothesis], tried: Sequence[Hypothesis]
             ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
-    """Hypotheses that differ in twins only become one; what stands for what is noted."""
+    """Hypotheses that differ in twins only become one; what stands for what is noted.
+
+    A law of whole exponent has the power law as a twin where the recording leaves the exponent
+    open.
+    """
     def group(e: Candidate) -> str:
         return e.twin + e.site.suffix if e.twin else e.key
 
     first: dict[frozenset[str], Hypothesis] = {}
     twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = {}
+    absorbed = set()
     for h in known:
         signature = frozenset(group(e) for e in h.effects)
         leader = first.setdefault(signature, h)
@@ -189,7 +189,12 @@ def _merged(known: list[Hypothesis]
             for o in h.effects:
                 if group(o) == group(e):
                     table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.ids)))
-    return list(first.values()), twins
+        for e in h.effects:
+            power = _power_law(h, e, tried) if e.ids[0] in WHOLE else None
+            if leader is h and power and _open_exponent(power, WHOLE[e.ids[0]]):
+                table[e.key] += ("power_drag",)
+                absorbed.add(power.key)
+    return [h for h in first.values() if h.key not in absorbed], twins
 
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict

@@ -37,14 +37,26 @@ class Stretches:
 
 
 @dataclass(frozen=True, eq=False)
+class Windows:
+    """Where the tables of a family stand among the w coefficients that a row touches."""
+
+    states: tuple[slice, ...]
+    tops: tuple[slice, ...]
+    width: int
+    firsts: tuple[Ints, ...]  # first coefficient (M,) of each chain
+
+
+@dataclass(frozen=True, eq=False)
 class BandedNormal:
-    """JᵀJ and Jᵀr of one recording: lower band (kd + 1, n), border (n, b), corner (b, b)."""
+    """JᵀJ and Jᵀr of one recording, the residual r as one more column beside ∂r/∂θ.
+
+    Lower band (kd + 1, n), right-hand columns [border | Jᵀr] (n, b + 1), and the corner
+    (b + 1, b + 1), whose last entry is ‖r‖².
+    """
 
     band: Array
-    border: Array
+    right: Array
     corner: Array
-    slope: Array  # (n,) Jᵀr by the coefficients
-    slope_theta: Array  # (b,)
     costs: tuple[float, ...]  # ‖r‖² of each family
 
 
@@ -60,7 +72,8 @@ class BandedAssembler:
         self.order = _interleave(part, self.n)
         self.position = np.empty(self.n, dtype=np.int64)
         self.position[self.order] = np.arange(self.n)
-        groups = [_columns(sites, self.position) for sites in families]
+        self.windows = [_windows(sites) for sites in families]
+        groups = [_columns(windows, self.position) for windows in self.windows]
         self.bandwidth = max(
             int((columns.max(axis=1) - columns.min(axis=1)).max()) for _, columns in groups)
         self.stretches = [self._stretches(starts, columns) for starts, columns in groups]
@@ -78,97 +91,100 @@ class BandedAssembler:
             one, other = own[:, a], own[:, b]
             band = np.minimum(one, other) * (self.bandwidth + 1) + np.abs(one - other)
             begins = starts[first:last + 1] - starts[first]
-            lengths = np.diff(begins)
-            distinct = np.unique(lengths)
-            by_length: list[tuple[Ints | None, Ints]] = []
-            for length in distinct:
-                which = np.flatnonzero(lengths == length)
-                times = None if distinct.size == 1 else begins[which][:, None] + np.arange(length)
-                by_length.append((times, which))
-            out.append(Stretches(slice(int(starts[first]), int(starts[last])), tuple(by_length),
+            out.append(Stretches(slice(int(starts[first]), int(starts[last])), _by_length(begins),
                                  own, base, int(own.max()) + 1, (a, b), band))
         return out
 
     def normal(self, families: list[Sites], rows: list[Rows], b: int) -> BandedNormal:
         """Assemble JᵀJ and Jᵀr from the residual families (b columns of θ)."""
-        n, kd = self.n, self.bandwidth
-        band, border, corner = np.zeros((n, kd + 1)), np.zeros((n, b)), np.zeros((b, b))
-        slope, slope_theta = np.zeros(n), np.zeros(b)
+        band = np.zeros((self.n, self.bandwidth + 1))
+        right, corner = np.zeros((self.n, b + 1)), np.zeros((b + 1, b + 1))
+        beside = np.arange(b + 1)
         costs = []
-        for pieces, sites, row in zip(self.stretches, families, rows, strict=True):
-            total = np.zeros((b + 1, b + 1))
+        for pieces, windows, sites, row in zip(
+                self.stretches, self.windows, families, rows, strict=True):
+            w, cost = windows.width, 0.0
             for piece in pieces:
-                gram = _gram(piece, _stack(sites, row, piece.rows, b))
-                w = piece.columns.shape[1]
+                gram = _gram(piece, _stack(windows, sites, row, piece.rows, b))
                 part = slice(piece.base, piece.base + piece.span)
-                products = gram[:, piece.lower[0], piece.lower[1]].ravel()
-                band[part] += np.bincount(
-                    piece.band.ravel(), products, piece.span * (kd + 1)).reshape(-1, kd + 1)
-                into = piece.columns.ravel()
-                slope[part] += np.bincount(into, gram[:, :w, -1].ravel(), piece.span)
-                if row.by_theta is not None:
-                    for j in range(b):
-                        column = gram[:, :w, w + j].ravel()
-                        border[part, j] += np.bincount(into, column, piece.span)
-                total += gram[:, w:, w:].sum(axis=0)
-            corner += total[:b, :b]
-            slope_theta += total[:b, b]
-            costs.append(float(total[b, b]))
-        return BandedNormal(np.ascontiguousarray(band.T), border, corner, slope, slope_theta,
-                            tuple(costs))
+                _scatter(band[part], piece.band, gram[:, piece.lower[0], piece.lower[1]])
+                _scatter(right[part], piece.columns[:, :, None] * (b + 1) + beside,
+                         gram[:, :w, w:])
+                total = gram[:, w:, w:].sum(axis=0)
+                corner += total
+                cost += float(total[b, b])
+            costs.append(cost)
+        return BandedNormal(band.T, right, corner, tuple(costs))
 
 
-def _stack(sites: Sites, rows: Rows, part: slice, b: int) -> Array:
-    """[∂r/∂local coefficients, ∂r/∂θ, r] (M, E, w + b + 1) of some rows of a family."""
-    local = local_jacobian(sites, rows, part)
-    residual = rows.residual[part]
-    w = local.shape[2]
-    stacked = np.zeros((*residual.shape, w + b + 1))
-    stacked[..., :w] = local
+def _scatter(target: Array, places: Ints, values: Array) -> None:
+    """Add values to the flattened target, at places that may repeat."""
+    added = np.bincount(places.ravel(), values.ravel(), target.size)
+    target += added.reshape(target.shape)
+
+
+def _stack(windows: Windows, sites: Sites, rows: Rows, part: slice, b: int) -> Array:
+    """[∂r/∂local coefficients, ∂r/∂θ, r] (M + 1, E, w + b + 1) of some rows of a family.
+
+    The last row is zero: it fills up the stretches that are shorter than others.
+    """
+    residual, w = rows.residual[part], windows.width
+    stacked = np.zeros((residual.shape[0] + 1, residual.shape[1], w + b + 1))
+    out = stacked[:-1]
+    if rows.by_state is not None:
+        for s, (table, at) in enumerate(zip(sites.states, windows.states, strict=True)):
+            out[:, :, at] += rows.by_state[part, :, s, None] * table.window[1][part, None, :]
+    if rows.by_top is not None:
+        for e, (table, at) in enumerate(zip(sites.tops, windows.tops, strict=True)):
+            out[:, e, at] += rows.by_top[part, e, None] * table.window[1][part]
     if rows.by_theta is not None:
-        stacked[..., w:w + b] = rows.by_theta[part]
-    stacked[..., -1] = residual
+        out[:, :, w:w + b] = rows.by_theta[part]
+    out[:, :, -1] = residual
     return stacked
 
 
-def local_jacobian(sites: Sites, rows: Rows, part: slice) -> Array:
-    """Jacobian by the coefficients that a row touches, (M, E, w), of some rows of a family."""
-    blocks = _blocks(sites)
-    count, width = rows.residual[part].shape
-    out = np.zeros((count, width, sum(size for _, size, _ in blocks.values())))
-    if rows.by_state is not None:
-        for s, table in enumerate(sites.states):
-            at, size, _ = blocks[table.part.start]
-            by_state = rows.by_state[part, :, s, None]
-            out[:, :, at:at + size] += by_state * table.window[1][part, None, :]
-    if rows.by_top is not None:
-        for e, table in enumerate(sites.tops):
-            at, size, _ = blocks[table.part.start]
-            out[:, e, at:at + size] += rows.by_top[part, e, None] * table.window[1][part]
-    return out
-
-
-def _blocks(sites: Sites) -> dict[int, tuple[int, int, Ints]]:
-    """Chain (by the start of its coefficients) -> (first local column, width, first columns)."""
-    blocks: dict[int, tuple[int, int, Ints]] = {}
-    at = 0
+def _windows(sites: Sites) -> Windows:
+    """The chains' windows side by side; all tables of a chain share one."""
+    places: dict[int, slice] = {}
+    firsts, width = [], 0
     for table in (*sites.states, *sites.tops):
-        if table.part.start not in blocks:
+        if table.part.start not in places:
             first, values = table.window
-            size = values.shape[1]
-            blocks[table.part.start] = (at, size, first)
-            at += size
-    return blocks
+            places[table.part.start] = slice(width, width + values.shape[1])
+            firsts.append(first)
+            width += values.shape[1]
+    return Windows(tuple(places[table.part.start] for table in sites.states),
+                   tuple(places[table.part.start] for table in sites.tops), width, tuple(firsts))
 
 
-def _columns(sites: Sites, position: Ints) -> tuple[Ints, Ints]:
+def _by_length(begins: Ints) -> tuple[tuple[Ints | None, Ints], ...]:
+    """Stretches (G,) of like length together, each with the times of its rows.
+
+    Like means that the longest is at most half as long again: the others repeat the time that
+    stands for a row of zeros.
+    """
+    lengths = np.diff(begins)
+    if np.all(lengths == lengths[0]):
+        return ((None, np.arange(lengths.size)),)
+    found: list[tuple[Ints | None, Ints]] = []
+    left = lengths.copy()
+    while longest := int(left.max()):
+        which = np.flatnonzero(3 * left >= 2 * longest)
+        step = np.arange(longest)
+        inside = step < lengths[which, None]
+        found.append((np.where(inside, begins[which, None] + step, begins[-1]), which))
+        left[which] = 0
+    return tuple(found)
+
+
+def _columns(windows: Windows, position: Ints) -> tuple[Ints, Ints]:
     """Starts of the stretches (G + 1,) and the coefficients each touches (G, w), in band order."""
-    blocks = list(_blocks(sites).values())
-    firsts = np.column_stack([first for _, _, first in blocks])
+    firsts = np.column_stack(windows.firsts)
     changes = np.flatnonzero(np.any(np.diff(firsts, axis=0) != 0, axis=1)) + 1
     starts = np.concatenate([[0], changes, [firsts.shape[0]]]).astype(np.int64)
+    sizes = {at.start: at.stop - at.start for at in (*windows.states, *windows.tops)}
     columns = [firsts[starts[:-1], i][:, None] + np.arange(size)
-               for i, (_, size, _) in enumerate(blocks)]
+               for i, size in enumerate(sizes.values())]
     return starts, position[np.concatenate(columns, axis=1)]
 
 
@@ -184,11 +200,11 @@ def _interleave(part: Part, n: int) -> Ints:
 
 
 def _gram(stretches: Stretches, stacked: Array) -> Array:
-    """Products VᵀV (G, W, W) of every stretch of stacked rows V (M, E, W)."""
+    """Products VᵀV (G, W, W) of every stretch of stacked rows V (M + 1, E, W)."""
     width = stacked.shape[2]
     out = np.empty((stretches.columns.shape[0], width, width))
     for times, groups in stretches.by_length:
-        rows = stacked if times is None else stacked[times]
+        rows = stacked[:-1] if times is None else np.take(stacked, times, axis=0)
         v = rows.reshape(groups.size, -1, width)
         out[groups] = np.matmul(v.transpose(0, 2, 1), v)
     return out

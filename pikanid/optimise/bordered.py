@@ -14,10 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_factor, cho_solve
 
 from pikanid.approximators import Array
 from pikanid.functional import Functional, Rows
+from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.gauss_newton import Point, box_minimum
 from pikanid.optimise.local_rows import Family, Layout
 from pikanid.optimise.smoothing import multiply
@@ -133,9 +134,7 @@ class Bordered:
         q = self.layout.far_at.size
         band = self.band.copy()
         band[0] += damping
-        factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-        solved = cho_solve_banded(
-            (factor, True), np.column_stack([self.border[:, :q], near]), check_finite=False)
+        solved = solve_band(factor_band(band), np.column_stack([self.border[:, :q], near]))
         middle = self.corner[:q, :q] - self.border[:, :q].T @ solved[:, :q]
         middle[np.diag_indices(q)] += damping
         beyond = cho_solve(cho_factor(middle, lower=True, check_finite=False),

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
+from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
 
 EXACT_UP_TO = 300  # data rows; beyond, the trace is estimated
@@ -116,7 +117,7 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
         if block.held_by_theta is not None:
             pulled_theta += block.held_by_theta.T @ pulled[:k]
         factor = _factor(block.band)
-        solved = cho_solve_banded((factor, True), pulled[k:], check_finite=False)
+        solved = solve_band(factor, pulled[k:])
         total += float(np.sum(solved * pulled[k:]))
         theta[columns] += pulled_theta - block.border.T @ solved
     if theta.size:
@@ -128,10 +129,10 @@ def _factor(band: Array) -> Array:
     """Cholesky factor of a band that rounding may have left just short of positive definite."""
     lift = 0.0
     while True:
-        lifted = band.copy()
+        lifted = band.copy(order="F")
         lifted[0] *= 1.0 + lift
         try:
-            return cholesky_banded(lifted, lower=True, overwrite_ab=True, check_finite=False)
+            return factor_band(lifted)
         except LinAlgError:
             lift = max(1e-14, 10.0 * lift)
             if lift > 1e-2:

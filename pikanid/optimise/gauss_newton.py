@@ -11,11 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
 from pikanid.functional import Functional
 from pikanid.optimise.banded import BandedAssembler, BandedNormal
+from pikanid.optimise.cholesky import factor_band, solve_band, solve_positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +32,19 @@ class Eliminated:
     """One recording's normal equations without the held coefficients: they move with θ alone."""
 
     band: Array  # (kd + 1, n - k)
-    border: Array  # (n - k, b)
-    corner: Array  # (b, b)
-    slope: Array
-    slope_theta: Array
+    right: Array  # (n - k, b + 1): border, and gradient as the last column
+    corner: Array  # (b + 1, b + 1)
     held_by_theta: Array | None  # (k, b)
+
+    @property
+    def border(self) -> Array:
+        """JᵀJ between coefficients and θ (n - k, b)."""
+        return self.right[:, :-1]
+
+    @property
+    def slope(self) -> Array:
+        """Jᵀr by the coefficients (n - k,)."""
+        return self.right[:, -1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +88,7 @@ class BandedSystem:
         self.families = [functional.families(r) for r in range(len(functional.parts))]
         self.assemblers = [BandedAssembler(part, families) for part, families
                            in zip(functional.parts, self.families, strict=True)]
+        self.orders = [assembler.order for assembler in self.assemblers]
 
     def linearise(self, point: Point, lam: float) -> Linearisation:
         """Residuals and normal equations at a point."""
@@ -108,55 +118,48 @@ class BandedSystem:
         Raises:
             LinAlgError: If a band or the reduced matrix is not positive definite.
         """
-        theta = at.point.theta
-        schur, slope = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
-        factors, inner, outer = [], [], []
+        theta, b = at.point.theta, at.point.theta.size
+        schur, slope, promised = np.zeros((b, b)), np.zeros(b), 0.0
+        inner = []
         for columns, block in zip(self.columns, at.blocks, strict=True):
-            band = block.band.copy()
-            band[0] *= 1.0 + damping
-            factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
-            solved = cho_solve_banded((factor, True), np.column_stack([block.border, block.slope]),
-                                      check_finite=False)
-            factors.append(factor)
-            inner.append(solved[:, :-1])
-            outer.append(solved[:, -1])
-            corner = block.corner + damping * np.diag(np.diag(block.corner))
-            schur[np.ix_(columns, columns)] += corner - block.border.T @ solved[:, :-1]
-            slope[columns] += block.slope_theta - block.border.T @ solved[:, -1]
+            band, corner = block.band, block.corner
+            if damping > 0.0:
+                band, corner = band.copy(order="F"), corner.copy()
+                band[0] *= 1.0 + damping
+                corner[np.diag_indices(columns.size)] *= 1.0 + damping
+            inner.append(solve_band(factor_band(band), block.right))
+            followed = block.right.T @ inner[-1]
+            schur[columns[:, None], columns] += corner[:-1, :-1] - followed[:-1, :-1]
+            slope[columns] += corner[:-1, -1] - followed[:-1, -1]
+            promised += followed[-1, -1]
         schur = 0.5 * (schur + schur.T)
         change = box_minimum(schur, slope, lower - theta, upper - theta)
-        promised = -change @ (slope + 0.5 * schur @ change)
+        promised -= change @ (2.0 * slope + schur @ change)
         moves = []
-        for r, (columns, block) in enumerate(zip(self.columns, at.blocks, strict=True)):
-            own = change[columns]
-            free = -(outer[r] + inner[r] @ own)
-            promised += 0.5 * block.slope @ outer[r]
-            move = np.empty(self.functional.parts[r].n_coefficients)
-            held = move.size - free.size
-            # Held coefficients are set from the initial state afterwards, exactly.
-            move[self.assemblers[r].order] = np.concatenate([np.zeros(held), free])
+        for columns, order, solved in zip(self.columns, self.orders, inner, strict=True):
+            # Held coefficients, the first, are set from the initial state afterwards, exactly.
+            move = np.zeros(order.size)
+            move[order[order.size - len(solved):]] = -solved @ np.append(change[columns], 1.0)
             moves.append(move)
-        return Step(tuple(moves), change, 2.0 * float(promised), schur, tuple(inner))
+        return Step(tuple(moves), change, float(promised), schur,
+                    tuple(solved[:, :-1] for solved in inner))
 
 
 def _eliminate(normal: BandedNormal, k: int, held_by_theta: Array | None) -> Eliminated:
     """Substitute c[held] = const + Q θ (the first k in band order)."""
     band = normal.band[:, k:]
     if held_by_theta is None or k == 0:
-        return Eliminated(band, normal.border[k:], normal.corner, normal.slope[k:],
-                          normal.slope_theta, None)
-    n, kd = normal.border.shape[0], normal.band.shape[0] - 1
+        return Eliminated(band, normal.right[k:], normal.corner, None)
+    n, kd = normal.right.shape[0], normal.band.shape[0] - 1
     leading = np.zeros((n, k))
     for j in range(k):
         end = min(n, j + kd + 1)
         leading[j:end, j] = normal.band[:end - j, j]
     leading[:k] = np.tril(leading[:k]) + np.tril(leading[:k], -1).T
-    q = held_by_theta
-    cross = q.T @ normal.border[:k]
-    return Eliminated(
-        band, normal.border[k:] + leading[k:] @ q,
-        normal.corner + cross + cross.T + q.T @ leading[:k] @ q,
-        normal.slope[k:], normal.slope_theta + q.T @ normal.slope[:k], q)
+    q = np.column_stack([held_by_theta, np.zeros(k)])  # the residual's column is no unknown
+    cross = q.T @ normal.right[:k]
+    return Eliminated(band, normal.right[k:] + leading[k:] @ q,
+                      normal.corner + cross + cross.T + q.T @ leading[:k] @ q, held_by_theta)
 
 
 def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Array:
@@ -172,7 +175,7 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     """
     if slope.size == 0:
         return np.zeros(0)
-    diagonal = np.diag(matrix)
+    diagonal = matrix.diagonal()
     # A parameter without influence here (damping of a body at rest) stays where it is.
     change, bound = np.clip(0.0, lower, upper), (lower >= upper) | (diagonal == 0.0)
     if bound.all():
@@ -180,13 +183,15 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     if not np.all(diagonal[~bound] > 0.0):
         raise LinAlgError("the reduced matrix is not positive definite")
     root = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    if not bound.any():  # nearly always: no bound meets the free minimum
+        free_minimum = _minimum(matrix, slope, root)
+        if ((lower <= free_minimum) & (free_minimum <= upper)).all():
+            return free_minimum
     for _ in range(4 * slope.size + 4):
         free = np.flatnonzero(~bound)
         if free.size:
-            scale = root[free]
-            factor = np.linalg.cholesky(matrix[np.ix_(free, free)] / np.outer(scale, scale))
-            rhs = -(slope[free] + matrix[np.ix_(free, np.flatnonzero(bound))] @ change[bound])
-            change[free] = np.linalg.solve(factor.T, np.linalg.solve(factor, rhs / scale)) / scale
+            held = slope[free] + matrix[np.ix_(free, np.flatnonzero(bound))] @ change[bound]
+            change[free] = _minimum(matrix[np.ix_(free, free)], held, root[free])
         over = np.maximum(lower - change, change - upper)
         if np.any(over[free] > 0.0):
             worst = int(free[np.argmax((over * root)[free])])
@@ -202,6 +207,11 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
             break
         bound[int(np.argmax(wrong))] = False
     return np.clip(change, lower, upper)
+
+
+def _minimum(matrix: Array, slope: Array, root: Array) -> Array:
+    """Minimum of ½dᵀMd + sᵀd, M scaled by the root of its diagonal."""
+    return -solve_positive(matrix / (root[:, None] * root), slope / root) / root
 
 
 MAX_ITERATIONS = 100  # at one λ

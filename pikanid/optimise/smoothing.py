@@ -9,9 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError
+from scipy.linalg.blas import dsbmv
 
 from pikanid.approximators import Array
+from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, gauss_newton
 
 # (GCV score, residual sum of squares, effective parameters)
@@ -35,29 +37,26 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
 
     `system` is built on `functional.smoothing()`; θ stays.
     """
-    count = system.functional.n_data
     data, both = system.linearise(point, 0.0), system.linearise(point, 1.0)
     mass = sum(float(b.band[0].sum()) for b in data.blocks)
     rough = sum(float(b.band[0].sum()) for b in both.blocks) - mass
     if mass <= 0.0 or rough <= 0.0:
         return None
-    probes = _probes([b.slope.size for b in data.blocks])
+    count, pencil = system.functional.n_data, Pencil(data, both)
     ridge = mass / rough
     if rho is None:
-        scores = {q: _criterion(data, both, q, probes, count)
-                  for q in ridge * 10.0 ** np.arange(-14.0, 5.0)}
+        scores = {q: pencil.score(q, count) for q in ridge * 10.0 ** np.arange(-14.0, 5.0)}
         best = _best(scores)
         if best is None:
             return None
-        scores |= {q: _criterion(data, both, q, probes, count)
-                   for q in (best / 10**0.5, best * 10**0.5)}
+        scores |= {q: pencil.score(q, count) for q in (best / 10**0.5, best * 10**0.5)}
         rho = _best(scores)
         assert rho is not None
         score = scores[rho]
     else:
         # Least squares proper (ρ = 0) keeps a trace of roughness, for knots without data.
         rho = max(rho, 1e-14 * ridge)
-        score = _criterion(data, both, rho, probes, count, most=1.0)
+        score = pencil.score(rho, count, most=1.0)
     if score is None:
         return None
     residual, effective = score[1:]
@@ -69,39 +68,42 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
     return Smoothed(found.at.point, sigma, effective, rho)
 
 
-def _probes(sizes: list[int]) -> list[Array]:
-    generator = np.random.default_rng(0)
-    number = int(np.clip(4000 // max(1, sum(sizes)), 1, 16))
-    return [generator.choice([-1.0, 1.0], size=(size, number)) for size in sizes]
-
-
 def _best(scores: dict[float, Score | None]) -> float | None:
     found = {rho: score[0] for rho, score in scores.items() if score is not None}
     return min(found, key=lambda rho: found[rho]) if found else None
 
 
-def _criterion(data: Linearisation, both: Linearisation, rho: float, probes: list[Array],
-               count: int, most: float = 0.8) -> Score | None:
-    """The score at ρ; None where the system is singular or more than `most` of the data is used."""
-    effective, residual = 0.0, data.data_cost
-    for only, all_, probe in zip(data.blocks, both.blocks, probes, strict=True):
-        band = only.band + rho * (all_.band - only.band)
-        slope = only.slope + rho * (all_.slope - only.slope)
-        try:
-            factor = cholesky_banded(band, lower=True, check_finite=False)
-        except LinAlgError:
+class Pencil:
+    """The normal equations of the data, and how they change with ρ, at one point."""
+
+    def __init__(self, data: Linearisation, both: Linearisation):
+        self.cost = data.data_cost
+        self.blocks = []
+        sizes = [block.slope.size for block in data.blocks]
+        number = int(np.clip(4000 // max(1, sum(sizes)), 1, 16))
+        generator = np.random.default_rng(0)
+        for size, only, all_ in zip(sizes, data.blocks, both.blocks, strict=True):
+            probe = generator.choice([-1.0, 1.0], size=(size, number))
+            right = np.column_stack([multiply(only.band, probe), -only.slope])
+            rough = np.column_stack([np.zeros_like(probe), only.slope - all_.slope])
+            self.blocks.append((only, all_.band - only.band, right, rough, probe / number))
+
+    def score(self, rho: float, count: int, most: float = 0.8) -> Score | None:
+        """None where the system is singular or more than `most` of `count` data is used."""
+        effective, residual = 0.0, self.cost
+        for only, band, right, rough, probe in self.blocks:
+            try:
+                factor = factor_band(only.band + rho * band)
+            except LinAlgError:
+                return None
+            solved = solve_band(factor, right + rho * rough)
+            effective += float(np.sum(probe * solved[:, :-1]))
+            step = solved[:, -1]
+            residual += float(step @ (2.0 * only.slope + multiply(only.band, step[:, None])[:, 0]))
+        if effective >= most * count and most < 1.0:
             return None
-        moved = multiply(only.band, probe)
-        solved = cho_solve_banded((factor, True), np.column_stack([moved, -slope]),
-                                  check_finite=False)
-        effective += float(np.mean(np.sum(probe * solved[:, :-1], axis=0)))
-        step = solved[:, -1]
-        residual += 2.0 * float(only.slope @ step)
-        residual += float(step @ multiply(only.band, step[:, None])[:, 0])
-    if effective >= most * count and most < 1.0:
-        return None
-    left = max(count - effective, 1e-3)
-    return count * residual / left**2, residual, effective
+        left = max(count - effective, 1e-3)
+        return count * residual / left**2, residual, effective
 
 
 def multiply(band: Array, columns: Array) -> Array:
@@ -111,9 +113,5 @@ def multiply(band: Array, columns: Array) -> Array:
     array([[2., 1.],
            [1., 2.]])
     """
-    out = band[0][:, None] * columns
-    for d in range(1, min(band.shape[0], columns.shape[0])):
-        off = band[d, :-d][:, None]
-        out[d:] += off * columns[:-d]
-        out[:-d] += off * columns[d:]
-    return out
+    kd = band.shape[0] - 1
+    return np.column_stack([dsbmv(kd, 1.0, band, column, lower=1) for column in columns.T])

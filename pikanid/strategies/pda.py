@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from pikanid import errors
 from pikanid.approximators import Array, LinearApproximator
@@ -22,6 +21,7 @@ from pikanid.estimate import Estimate
 from pikanid.expressions import symbol
 from pikanid.functional import Functional
 from pikanid.model import Model
+from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.covariance import invert
 from pikanid.optimise.gauss_newton import BandedSystem, Point, box_minimum
 from pikanid.optimise.smoothing import Smoothed, smooth
@@ -217,10 +217,10 @@ def _covariance(functional: Functional, system: BandedSystem, point: Point, rho:
     meat, first = np.zeros_like(bread), 0
     for r, part in enumerate(functional.parts):
         columns, order = system.columns[r], system.assemblers[r].order
-        factor = cholesky_banded(penalised.blocks[r].band, lower=True, check_finite=False)
+        factor = factor_band(penalised.blocks[r].band)
         border = coupled.blocks[r].border - alone.blocks[r].border
         carried = np.zeros((part.n_coefficients, columns.size))
-        carried[order[part.held.size:]] = cho_solve_banded((factor, True), border)
+        carried[order[part.held.size:]] = solve_band(factor, border)
         rows = functional.data_rows(r, point.coefficients[r], point.theta)
         for sites, row in zip(part.data, rows, strict=True):
             assert row.by_state is not None

@@ -1,0 +1,48 @@
+"""Cholesky factors of symmetric positive definite matrices, banded or small, straight from LAPACK.
+
+SciPy's and NumPy's own functions check, convert and dispatch: on a short recording that takes
+longer than the algebra.
+"""
+
+from __future__ import annotations
+
+from scipy.linalg import LinAlgError
+from scipy.linalg.lapack import dpbtrf, dpbtrs, dposv
+
+from pikanid.approximators import Array
+
+
+def factor_band(band: Array) -> Array:
+    """Lower Cholesky factor (kd + 1, n) of a matrix in lower band form (kd + 1, n).
+
+    Raises:
+        LinAlgError: If the matrix is not positive definite.
+    """
+    factor, info = dpbtrf(band, lower=1)
+    if info:
+        raise LinAlgError(f"the leading minor of order {info} is not positive definite")
+    return factor
+
+
+def solve_band(factor: Array, columns: Array) -> Array:
+    """A⁻¹ of columns (n, q), A given by its factor.
+
+    >>> import numpy as np
+    >>> solve_band(factor_band(np.array([[4.0, 4.0], [2.0, 0.0]])), np.array([[4.0], [8.0]]))
+    array([[0.],
+           [2.]])
+    """
+    solved, _ = dpbtrs(factor, columns, lower=1)
+    return solved
+
+
+def solve_positive(matrix: Array, columns: Array) -> Array:
+    """A⁻¹ of columns (n,) or (n, q), A a small dense matrix.
+
+    Raises:
+        LinAlgError: If the matrix is not positive definite.
+    """
+    _, solved, info = dposv(matrix, columns, lower=1)
+    if info:
+        raise LinAlgError(f"the leading minor of order {info} is not positive definite")
+    return solved
