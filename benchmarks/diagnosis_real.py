@@ -1,6 +1,7 @@
 """Diagnoses of real recordings, each with its nominal model alone; rows for a report.
 
-    python benchmarks/diagnosis_real.py [single_pendulum free_swing silverbox falling_balls]
+    python benchmarks/diagnosis_real.py [single_pendulum free_swing silverbox falling_balls
+                                         slosh_lar]
 
 One function a recording; none is given anything but the nominal model and the data.
 """
@@ -126,6 +127,23 @@ def falling_balls(balls: Sequence[str] = datasets.BALLS) -> list[Row]:
     return rows
 
 
+def slosh_lar(motions: Sequence[str] = datasets.SLOSH_MOTIONS) -> list[Row]:
+    """Every run of a kind of motion explained, the next one of that kind held out.
+
+    Runs of one kind differ in nothing but how long the same path takes.
+    """
+    kinds: dict[tuple[str, ...], list[str]] = {}
+    for name in motions:
+        *path, _, angle = name.split("_")
+        kinds.setdefault((*path, angle), []).append(name)
+    rows = []
+    for runs in kinds.values():
+        for train, other in zip(runs, [*runs[1:], runs[0]], strict=True):
+            dx, seconds = _diagnosed("slosh", *map(datasets.slosh_lar_forced, (train, other)))
+            rows.append(_row(f"{train}, held out {other}", dx, seconds, _laws(dx)))
+    return rows
+
+
 def table(rows: Sequence[Row]) -> str:
     """Rows as a Markdown table."""
     lines = ["| recording | verdict | hypotheses | held-out RMSE | seconds | |",
@@ -150,6 +168,14 @@ def _row(recording: str, dx: Diagnosis, seconds: float, remark: str = "") -> Row
                seconds, remark)
 
 
+def _laws(dx: Diagnosis) -> str:
+    """What the first hypothesis adds, with its constants."""
+    effects = dx.hypotheses[0].effects if dx.hypotheses else ()
+    return ", ".join(" ".join([e.expression, *(f"({n} = {v.value:.3g} ± {v.std:.2g} {v.unit})"
+                                               for n, v in e.parameters.items())])
+                     for e in effects)
+
+
 def _joined(part: str) -> pk.Recording:
     pieces = datasets.single_pendulum(part)  # type: ignore[arg-type]  # train or held_out
     t, y = (np.concatenate([getattr(p["theta"], name) for p in pieces])
@@ -165,7 +191,7 @@ def _range(recording: pk.Recording, start: int, stop: int) -> pk.Recording:
 
 RECORDINGS: dict[str, Callable[[], list[Row]]] = {
     "single_pendulum": single_pendulum, "free_swing": free_swing, "silverbox": silverbox,
-    "falling_balls": falling_balls}
+    "falling_balls": falling_balls, "slosh_lar": slosh_lar}
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or RECORDINGS:

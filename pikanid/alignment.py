@@ -24,9 +24,10 @@ def energy_delay(
     The delay is where the cross-correlation ∫ E(t) y²(t + τ) dt of the motion's energy E with that
     of the signal is largest; the signal has to cover the whole motion.  Channels of one unit form a
     group (the components of an acceleration, the angles of a tilt).  Every group counts for the
-    same: E = Σ_groups |u_g|² / ∫|u_g|² dt.  So no model takes part, and it need not be known which
-    of the motions the signal answers to, or with what sign.  The signal is measured from its
-    median: at rest for most of its time.
+    same: E = Σ_groups |u_g|² / ∫|u_g|² dt.  So no model takes part, nor the sign or the size of any
+    answer.  The less the energy of the signal resembles E, the less exact the delay is: off by a
+    part of a lobe of E where the signal answers to one of several motions only.  The signal is
+    measured from its median: at rest for most of its time.
 
     Args:
         recording: With the signal and the channels of the motion, which starts and ends at rest.

@@ -122,7 +122,7 @@ def test_what_is_no_attitude() -> None:
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_attitude_angles_of_a_body_that_turns_about_one_axis(axis: str) -> None:
     angle = 9.0 * T if axis == "z" else 0.4 * np.sin(3 * T)  # headings go beyond a full turn
-    q = Rotation.from_euler(axis, angle).as_quat()
+    q = Rotation.from_euler(axis, angle[:, None]).as_quat()
     pose = dict(zip(kinematics.QUATERNION, q.T, strict=True))
     found = kinematics.attitude_angles(Recording.from_arrays(T, pose))
     for name, about in (("tilt_x", "x"), ("tilt_y", "y"), ("heading", "z")):
