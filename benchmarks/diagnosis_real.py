@@ -47,9 +47,9 @@ MODELS = {
     # The first mode of the water in an upright, round vessel, in both horizontal directions, after
     # H. Lamb, Hydrodynamics, 1932, for radius R and filling H: omega^2 = g xi/R tanh(xi H/R), and
     # a steady acceleration a raises the surface by c a at the wall, c = 2 R/((xi^2 - 1) g), with
-    # xi = 1.8412, R = 49 mm, H = 78 mm.  That is theory for small waves: omega may be a quarter off,
-    # c a factor of two.  What is seen is the highest point of the surface; the little square keeps
-    # its slope finite at rest.
+    # xi = 1.8412, R = 49 mm, H = 78 mm.  That is theory for small waves: omega may be a quarter
+    # off, c a factor of two.  What is seen is the highest point of the surface; the little square
+    # keeps its slope finite at rest.
     "slosh": {
         "name": "upright slosh mode",
         "states": {"q_x": {"unit": "mm", "initial": 0.0}, "v_x": {"unit": "mm/s", "initial": 0.0},
