@@ -53,6 +53,7 @@ def test_edge_of_drag_bends_against_the_motion() -> None:
     assert left > 0 and right < -5 * edge.std[-1]
 
 
+@pytest.mark.slow
 def test_without_held_out_the_end_has_to_be_predicted() -> None:
     dx = pk.diagnose(systems.sloshing(), recording(FRICTION))
     assert dx.verdict == "unconfirmed"

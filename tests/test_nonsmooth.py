@@ -156,6 +156,7 @@ def test_implicit_steps_switch_at_the_same_instants(name: str) -> None:
 
 
 @pytest.mark.compiled
+@pytest.mark.slow
 def test_compiled_friction_is_the_interpreted_one() -> None:
     """What numba makes of the kernels is what Python makes of them."""
     term, recording = TERMS["coulomb"], drive("pulses")

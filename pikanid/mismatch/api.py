@@ -19,6 +19,7 @@ from pikanid.mismatch.force_shape import force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.locate import locate, smallest
+from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.preparation import (
     check_pair,
     oversampling,
@@ -102,6 +103,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
             search = case.search
             ranked = search.grow(case.adequate)
         tell("confirmation")
+        case.clear_later(ranked[0])
         answer = settle(ranked, search.scale(), case.test, case.predicted,
                         case.later is not None, case.proves)
     return _diagnosis(case, detection, answer, alpha, begun)
@@ -149,9 +151,12 @@ class Case:
         if best.far:
             return False
         fit = as_estimate(best, self.before)
-        new = with_refined_noise(self.records, fit, self.rate, quiet)
-        if all(abs(np.log(a[o].sigma / b[o].sigma)) < 0.05 and abs(a[o].rho - b[o].rho) < 0.06
-               for a, b in zip(self.records.levels, new.levels, strict=True) for o in a):
+        new, count = with_refined_noise(self.records, fit, self.rate, quiet)
+        _note_outliers(count, "the recording", self.notes)
+        same = all(
+            abs(np.log(a[o].sigma / b[o].sigma)) < 0.05 and abs(a[o].rho - b[o].rho) < 0.06
+            for a, b in zip(self.records.levels, new.levels, strict=True) for o in a)
+        if same and not count:
             return False
         self.records = new
         self.resumed(self.search)
@@ -159,6 +164,16 @@ class Case:
             self.later = Records(self.later.recordings,
                                  tuple(new.levels[0] for _ in self.later.recordings))
         return True
+
+    def clear_later(self, best: Hypothesis) -> None:
+        """Leave the outliers of the held-out recordings out that the best prediction shows."""
+        prediction = None if best.far else self.predicted(best)
+        if self.later is None or prediction is None:
+            return
+        self.later, count = without_lone(self.later, prediction.residuals)
+        if count:
+            _note_outliers(count, "the held-out recording", self.notes)
+            self.predictions.clear()
 
     def adequate(self, h: Hypothesis) -> bool:
         """Whether nothing is left in the train recordings."""
@@ -218,7 +233,8 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
         before = NLS(starts=1).fit(before.fitted_model, _with_sigma(records, model))
     nominal = before.fitted_model
     rate = sites(nominal, records.recordings)[0].rate
-    records = with_refined_noise(records, before, rate, quiet)
+    records, count = with_refined_noise(records, before, rate, quiet)
+    _note_outliers(count, "the recording", notes)
     held = None
     if later is not None:
         held = prepared(model, later, None, notes, together)
@@ -230,6 +246,11 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
     search.predicts = case.predicts
     return case
+
+
+def _note_outliers(count: int, where: str, notes: list[str]) -> None:
+    if count:
+        notes.append(f"{count} more outliers of {where} show beside a fit and are left out.")
 
 
 def _held_as_recorded(model: Model, train: tuple[Recording, ...]) -> Model:

@@ -18,13 +18,14 @@ INF = float("inf")
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
          shape: Callable[[View], np.ndarray], *, one_sided: bool, twin: str = "",
-         variant: str = "", known: bool = True) -> Candidate:
+         variant: str = "", known: bool = True, rugged: bool = False) -> Candidate:
     """A force with one parameter: `shape` (L,) is what it adds to q'' at size 1."""
     def signs(view: View) -> list[Sign]:
         return [Sign({size.name: 1.0}, force=shape(view), one_sided=one_sided)]
 
     return Candidate((identifier,), name, expression, "dynamics", site, (size,),
-                     lambda m: m.with_term(site.v, expression), signs, variant, twin, known=known)
+                     lambda m: m.with_term(site.v, expression), signs, variant, twin, known=known,
+                     rugged=rugged)
 
 
 def sense(view: View, v: str) -> np.ndarray:
@@ -38,7 +39,7 @@ def coulomb_friction(site: Site) -> list[Candidate]:
     """Dry friction: the same force at every speed, against the motion."""
     c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
     return [term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-                 lambda w: -sense(w, site.v), one_sided=True)]
+                 lambda w: -sense(w, site.v), one_sided=True, rugged=True)]
 
 
 def quadratic_drag(site: Site) -> list[Candidate]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +31,7 @@ class HeldOut:
         evidence: -2 ln of the probability density of the recording, given the fit (up to a
             constant that all hypotheses share).
         predicted, measured, t: First output.
+        residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
     """
 
     rmse: float
@@ -40,6 +41,7 @@ class HeldOut:
     t: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
+    residuals: tuple[tuple[int, str, np.ndarray, np.ndarray], ...]
 
     @functools.cached_property
     def detection(self) -> Detection:
@@ -151,7 +153,17 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     big, small = _volume(found.J), _volume(root)
     samples = whitened.problem.experiments[0].samples[0]
     return HeldOut(rmse, tests, found.chi2, found.chi2 + big - small, samples.t, samples.y,
-                   responses[0].y[: len(samples.t)])
+                   responses[0].y[: len(samples.t)], tuple(_residuals(whitened, gaps)))
+
+
+def _residuals(whitened: Whitened, gaps: list[np.ndarray]
+               ) -> Iterator[tuple[int, str, np.ndarray, np.ndarray]]:
+    for r, gap in enumerate(gaps):
+        first = 0
+        for s in whitened.problem.experiments[r].samples:
+            name = whitened.problem.model.outputs[s.output].name
+            yield r, name, s.t, gap[first:first + len(s.t)]
+            first += len(s.t)
 
 
 def _volume(J: np.ndarray) -> float:

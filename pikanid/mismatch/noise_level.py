@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pikanid import errors, noise
+from pikanid import noise
 from pikanid.channel import Channel
 from pikanid.recording import Recording
 
-SPIKE = 5.0  # σ by which a sample must leave its neighbours to count as an outlier
-CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
+LONGEST = 50  # samples of a gap that a line across it is followed over
 QUIET = 100  # samples of a quiet stretch that say something about low frequencies
 
 
@@ -52,38 +51,6 @@ class Level:
             keep, left = keep[:, None], left[:, None]
         rest = (rows[1:] - keep * rows[:-1]) / left
         return np.concatenate([rows[:1], rest]) / self.sigma
-
-
-def without_outliers(recording: Recording, output: str) -> tuple[Recording, int]:
-    """The recording without samples that leave the cubic through their neighbours, and how many.
-
-    The worst goes first: beside a spike its neighbours look bad as well.
-    """
-    channel = recording[output]
-    seen = np.flatnonzero(np.isfinite(channel.values))
-    y = channel.values[seen].copy()
-    if len(y) < 20:
-        return recording, 0
-    try:
-        sigma, _ = noise.high_band_sigma(channel)
-    except errors.BadRecording:
-        return recording, 0
-    gap = np.zeros(len(y))
-    gap[2:-2] = y[2:-2] - np.convolve(y, CUBIC, "valid")
-    bad: list[int] = []
-    while len(bad) <= 0.1 * len(y):
-        k = int(np.argmax(np.abs(gap)))
-        if abs(gap[k]) < SPIKE * sigma * np.sqrt(1 + np.sum(CUBIC**2)):
-            break
-        bad.append(k)
-        y[k] -= gap[k]
-        for near in range(max(k - 2, 2), min(k + 3, len(y) - 2)):
-            gap[near] = y[near] - CUBIC @ y[near - 2:near + 3]
-    if not bad or len(bad) > 0.1 * len(y):
-        return recording, 0
-    values = channel.values.copy()
-    values[seen[bad]] = np.nan
-    return recording.with_channels(replace(channel, values=values)), len(bad)
 
 
 def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None) -> Level:
@@ -125,6 +92,7 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     window = tukey(len(even), 0.2)
     power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)
     omega = np.linspace(0, np.pi, len(power))
+    power /= np.maximum(bridged(grid), 0.1)
     # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
     high = (omega > np.clip(6 * rate * h, 0.25 * np.pi, 0.6 * np.pi)) & (omega < 0.97 * np.pi)
     spectra = [(omega[high], power[high], 0.9 * share)]
@@ -143,6 +111,32 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)
     return Level(sigma, rho, spread, h, source)
+
+
+def bridged(grid: np.ndarray) -> np.ndarray:
+    """What straight lines across gaps leave of white noise's power (n//2 + 1,), by frequency.
+
+    Args:
+        grid: (N,) increasing numbers of the samples that are there, from 0 to n - 1.
+
+    >>> [float(x) for x in bridged(np.arange(5))]
+    [1.0, 1.0, 1.0]
+    """
+    from scipy.sparse import csr_array
+
+    n = int(grid[-1]) + 1
+    every = np.arange(n)
+    left = np.clip(np.searchsorted(grid, every, "right") - 1, 0, len(grid) - 2)
+    width = grid[left + 1] - grid[left]
+    share = (every - grid[left]) / width
+    # of a long line nothing is left at the frequencies that count
+    there = width <= LONGEST
+    A = csr_array((np.concatenate([(1 - share) * there, share * there]),
+                   (np.tile(every, 2), np.concatenate([left, left + 1]))), shape=(n, len(grid)))
+    A.eliminate_zeros()
+    covariance = (A @ A.T).tocoo()
+    lags = np.bincount((covariance.row - covariance.col) % n, covariance.data, n)
+    return np.asarray(np.fft.rfft(lags).real / n)
 
 
 def noise_stretch(channel: Channel) -> tuple[float, float] | None:

@@ -9,7 +9,8 @@ import numpy as np
 from pikanid import errors
 from pikanid.channel import Channel
 from pikanid.estimate import Estimate
-from pikanid.mismatch.noise_level import Level, first_level, refined, without_outliers
+from pikanid.mismatch.noise_level import Level, first_level, refined
+from pikanid.mismatch.outliers import without_lone, without_outliers
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 from pikanid.recording import Recording
@@ -86,17 +87,22 @@ def averaged(channel: Channel, count: int) -> Channel:
 
 
 def with_refined_noise(records: Records, fit: Estimate, rate: float,
-                       quiet: tuple[float, float] | None) -> Records:
-    """Noise levels again, from what a fit leaves."""
+                       quiet: tuple[float, float] | None) -> tuple[Records, int]:
+    """Noise levels again, from what a fit leaves, and without the outliers that it shows; how many
+    these are.
+    """
+    outputs = [(r, name) for r, found in enumerate(records.levels) for name in found]
+    fits = dict(zip(outputs, fit.fits, strict=True))
+    records, count = without_lone(records, [(*key, f.t, f.residual) for key, f in fits.items()])
     levels = []
-    fits = iter(fit.fits)
-    for recording, found in zip(records.recordings, records.levels, strict=True):
+    for r, (recording, found) in enumerate(zip(records.recordings, records.levels, strict=True)):
         new = {}
         for name, level in found.items():
-            f = next(fits)
-            new[name] = refined(level, recording[name], f.t, f.residual, rate, quiet)
+            f = fits[r, name]
+            kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
+            new[name] = refined(level, recording[name], f.t[kept], f.residual[kept], rate, quiet)
         levels.append(new)
-    return Records(records.recordings, tuple(levels))
+    return Records(records.recordings, tuple(levels)), count
 
 
 def set_aside(train: tuple[Recording, ...], model: Model, notes: list[str]

@@ -109,7 +109,7 @@ class Search:
                     self._fit(rest, [best.point], again=True)
                 for simple in self.candidates:
                     if simple.key in effect.covers and simple.key not in best.key:
-                        size = best.values[effect.parameters[0].name]
+                        size = _as_strong(best, effect, simple)
                         self._fit((*rest, simple), [
                             {**best.point, simple.parameters[0].name: size * share}
                             for share in (1.0, 2.0)], again=True)
@@ -141,10 +141,10 @@ class Search:
             for other in self.candidates:
                 if other.known and effect.key in other.covers:
                     rest = [e for e in best.effects if e is not effect and e is not other]
-                    power = dict.fromkeys([other.parameters[1].name],
-                                          {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8))
-                    size = {other.parameters[0].name: best.values[effect.parameters[0].name]}
-                    self._fit((*rest, other), [{**best.point, **size, **power}])
+                    n = {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8)
+                    size = {other.parameters[0].name: _as_strong(best, effect, other, n),
+                            other.parameters[1].name: n}
+                    self._fit((*rest, other), [{**best.point, **size}])
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
@@ -190,6 +190,28 @@ class Search:
             self.fits[key] = found
             return found
         return known or self.fits[frozenset()]
+
+
+EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}
+
+
+def _as_strong(h: Hypothesis, effect: Candidate, other: Candidate, n: float | None = None) -> float:
+    """Size of a law of |v|ⁿ that takes as much energy out of the motion as another one does, or
+    that one's own size where either is no such law.
+    """
+    def exponent(e: Candidate) -> float | None:
+        if e.ids[0] == "power_drag" and e is effect:
+            return h.values[e.parameters[1].name]
+        return n if e.ids[0] == "power_drag" else EXPONENTS.get(e.ids[0])
+
+    size = h.values[effect.parameters[0].name]
+    a, b = exponent(effect), exponent(other)
+    if a is None or b is None:
+        return size
+    at = h.model.state_names.index(effect.site.v)
+    speed = np.concatenate([np.abs(response.states[:, at]) for response in
+                            h.whitened.responses(h.minimum.theta, states=True)])
+    return float(size * np.mean(speed ** (a + 1)) / max(float(np.mean(speed ** (b + 1))), 1e-12))
 
 
 def repeated(r: np.ndarray) -> float:

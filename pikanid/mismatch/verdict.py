@@ -18,7 +18,8 @@ WITHIN = 6.0  # difference of the criterion below which hypotheses are not told 
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
 WHOLE = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # exponents that have names
-SHARP = 0.12  # standard error from which on an exponent says that it is a whole number
+SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
+OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
 PART = 0.3  # of the nominal held-out RMSE that may remain where only part is explained
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
 WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
@@ -125,27 +126,37 @@ def _parsimonious(near: list[Hypothesis], scale: float) -> list[Hypothesis]:
 
 
 def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
-    """A power law whose exponent may be 0, 1 or 2 is left to the integer law, and the other way.
-
-    Where the exponent is known so badly that both a whole and a broken one are well inside its
-    interval, both stay.
-    """
-    kept = []
-    for h in near:
-        power = [e for e in h.effects if e.ids[0] == "power_drag"]
-        if power:
-            n = power[0].parameters[1].name
-            value, std = h.values[n], h.std[n]
-            if std < SHARP and min(abs(value - k) for k in (0, 1, 2)) < 2 * std:
-                continue
-        kept.append(h)
+    """A power law whose exponent is sharply a whole number is left to the law of that name."""
+    kept = [h for h in near if not any(
+        (gap := _exponent_gap(h, whole)) is not None and gap < 1 and _sharp(h)
+        for whole in (0, 1, 2))]
     return kept or near
 
 
+def _exponent(h: Hypothesis) -> str | None:
+    """Name of the exponent of a hypothesis' power law, if it has one."""
+    return next((e.parameters[1].name for e in h.effects if e.ids[0] == "power_drag"), None)
+
+
+def _exponent_gap(h: Hypothesis, whole: float) -> float | None:
+    """Standard errors between that exponent and a whole number; one at its lower bound is zero."""
+    n = _exponent(h)
+    if n is None:
+        return None
+    if whole == 0 and h.values[n] <= h.model.parameter(n).bounds[0]:
+        return 0.0
+    return abs(h.values[n] - whole) / max(h.std[n], 1e-9)
+
+
+def _sharp(h: Hypothesis) -> bool:
+    n = _exponent(h)
+    return n is not None and h.std[n] < SHARP
+
+
 def _open_exponent(h: Hypothesis, whole: float) -> bool:
-    """Whether the exponent of a hypothesis' power law may be `whole`, and much else as well."""
-    n = next(e for e in h.effects if e.ids[0] == "power_drag").parameters[1].name
-    return h.std[n] > SHARP and abs(h.values[n] - whole) < 2 * h.std[n]
+    """Whether the exponent of a hypothesis' power law may be `whole`, or something else as well."""
+    gap = _exponent_gap(h, whole)
+    return gap is not None and gap < OPEN and not (gap < 1 and _sharp(h))
 
 
 def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) -> Hypothesis | None:
