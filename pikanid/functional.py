@@ -18,7 +18,7 @@ from scipy import sparse
 
 from pikanid import errors
 from pikanid.adequacy import difference_noise
-from pikanid.approximators import Array, LinearApproximator
+from pikanid.approximators import Array, is_linear
 from pikanid.approximators.tables import Table, anchor
 from pikanid.chains import Chains
 from pikanid.evaluated import delays
@@ -109,7 +109,7 @@ class Functional:
 
     def states(self, sites: Sites, coefficients: Array) -> Array:
         """Approximated states (M, n) at the sites."""
-        return np.column_stack([table.values(coefficients) for table in sites.states])
+        return _side_by_side(sites.states, coefficients)
 
     def rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> list[Rows]:
         """All residual families of recording r with derivatives: data, physics, start."""
@@ -129,29 +129,24 @@ class Functional:
         return [self._data(sites, coefficients, p, positions) for sites in self.parts[r].data]
 
     def _data(self, sites: Sites, c: Array, p: Array, positions: NDArray[np.int64]) -> Rows:
-        x = self.states(sites, c)
-        one = slice(sites.output, sites.output + 1)
-        y = self.vector_field.outputs(sites.t, x, sites.u, p)[:, one]
-        hx, hp = self.vector_field.output_jacobians(sites.t, x, sites.u, p)
-        weight = sites.weight
-        return Rows(weight * (y - sites.target), weight[:, :, None] * hx[:, one], None,
-                    weight[:, :, None] * hp[:, one][:, :, positions])
+        y, hx, hp = self.vector_field.outputs_linearised(
+            sites.t, self.states(sites, c), sites.u, p, [sites.output], positions)
+        weight = sites.weight[:, :, None]
+        return Rows(sites.weight * (y - sites.target), weight * hx, None, weight * hp)
 
     def physics_rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> Rows:
         """The physics family of recording r alone."""
         sites, c = self.parts[r].physics, coefficients
         p = self.problem.parameters(theta, r)
         positions, _ = self.problem.columns(r)
-        weight = np.sqrt(lam) * sites.weight / self.scale
-        tops = np.column_stack([table.values(c) for table in sites.tops])
+        weight = np.sqrt(lam) / self.scale * sites.weight
+        tops = _side_by_side(sites.tops, c)
         if self.penalty == "roughness":
             return Rows(weight * tops, None, weight, None)
-        x = self.states(sites, c)
-        last = list(self.chains.top)
-        f = self.vector_field.rhs(sites.t, x, sites.u, p)[:, last]
-        fx, fp = self.vector_field.rhs_jacobians(sites.t, x, sites.u, p)
-        return Rows(weight * (tops - f), -weight[:, :, None] * fx[:, last], weight,
-                    -weight[:, :, None] * fp[:, last][:, :, positions])
+        f, fx, fp = self.vector_field.rhs_linearised(
+            sites.t, self.states(sites, c), sites.u, p, self.chains.top, positions)
+        minus = -weight[:, :, None]
+        return Rows(weight * (tops - f), minus * fx, weight, minus * fp)
 
     def _start(self, sites: Sites, r: int, c: Array, p: Array,
                positions: NDArray[np.int64]) -> Rows:
@@ -191,6 +186,13 @@ class Functional:
             [sparse.block_diag(blocks), sparse.csr_array(np.vstack(borders))]))
 
 
+def _side_by_side(tables: Sequence[Table], coefficients: Array) -> Array:
+    values = np.empty((tables[0].t.size, len(tables)))
+    for k, table in enumerate(tables):
+        values[:, k] = table.values(coefficients)
+    return values
+
+
 def bind(problem: Problem, vector_field: VectorField, chains: Chains,
          approximators: Sequence[tuple[AnyApproximator, ...]],
          nodes: Sequence[tuple[Array, Array]], *, given_start: bool = True,
@@ -209,7 +211,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
     parts = []
     for experiment, own, (times, weights) in zip(
             problem.experiments, approximators, nodes, strict=True):
-        sizes = [a.n_basis if isinstance(a, LinearApproximator) else a.n_coefficients for a in own]
+        sizes = [a.n_basis if is_linear(a) else a.n_coefficients for a in own]
         ends = np.cumsum(sizes)
         pieces = [slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)]
 

@@ -8,7 +8,7 @@ shallow KAN with w_b = 0; Eq. (4)) is its basis alone, and its basis is local: e
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,11 @@ class LinearApproximator(Protocol):
 
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis (M, n_basis): equally many consecutive nonzeros a row, one-sided from the right."""
+
+
+def is_linear(approximator: Any) -> TypeGuard[LinearApproximator]:
+    """Whether an approximator is its basis; as `isinstance` says, which takes 20 µs to say it."""
+    return hasattr(approximator, "basis")
 
 
 def local_rows(matrix: sparse.csr_array) -> tuple[NDArray[np.int64], Array]:

@@ -78,7 +78,10 @@ class BSpline:
 
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis matrix or its time derivative at ``t`` (M,): csr (M, n_basis), degree + 1 a row."""
-        first, values = self.local(np.asarray(t, dtype=float), derivative)
+        t = np.asarray(t, dtype=float)
+        if derivative == 0:
+            return SciPyBSpline.design_matrix(t, self.knots, self.degree)
+        first, values = self.local(t, derivative)
         rows, width = values.shape
         columns = first[:, None] + np.arange(width)
         pointers = width * np.arange(rows + 1)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from pikanid.approximators import Approximator, Array, LinearApproximator, local_rows
+from pikanid.approximators import Approximator, Array, LinearApproximator, is_linear, local_rows
 
 Matrix = Array | sparse.csr_array
 
@@ -32,7 +33,7 @@ class Table:
     def of(approximator: Approximator | LinearApproximator, t: Array, derivative: int,
            part: slice) -> Table:
         """Tabulate; a linear approximator is evaluated here once and for all."""
-        if not isinstance(approximator, LinearApproximator):
+        if not is_linear(approximator):
             return Table(approximator, t, derivative, part)
         matrix = approximator.basis(t, derivative)
         first, local = local_rows(matrix)
@@ -79,10 +80,15 @@ def gauss_nodes(breakpoints: Array, points: int) -> tuple[Array, Array]:
     >>> bool(np.isclose((weights * times**3).sum(), 3**4 / 4))
     True
     """
-    nodes, weights = np.polynomial.legendre.leggauss(points)
+    nodes, weights = _legendre(points)
     half = 0.5 * np.diff(breakpoints)[:, None]
     middle = 0.5 * (breakpoints[1:] + breakpoints[:-1])[:, None]
     return (middle + half * nodes).ravel(), (half * weights).ravel()
+
+
+@functools.lru_cache
+def _legendre(points: int) -> tuple[Array, Array]:
+    return np.polynomial.legendre.leggauss(points)
 
 
 def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths: tuple[int, ...],
@@ -99,7 +105,7 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
     held, blocks, offset = [], [], 0
     at = np.array([start])
     for approximator, length in zip(approximators, lengths, strict=True):
-        if not isinstance(approximator, LinearApproximator):
+        if not is_linear(approximator):
             return None
         rows = np.vstack([approximator.basis(at, q).toarray() for q in range(length)])
         if np.any(np.abs(np.triu(rows, 1)) > 1e-9 * np.abs(rows).max(axis=1, keepdims=True)):

@@ -87,6 +87,9 @@ class Search:
         self._simplify()
         best = self.ranked()[0]
         if adequate(best):
+            # what a test of everything misses may still be worth its penalty
+            price = float(np.log(best.whitened.rows) + 2 * np.log(self.choices))
+            self._extend(best, LATER, self.scale() * price)
             self._exchange(best)
             self._simplify()
         scale = self.scale()
@@ -165,14 +168,15 @@ class Search:
         level = max(1.0, closest.minimum.chi2 / freedom)
         return level * repeated(closest.minimum.r) ** (1 - 1 / level)
 
-    def _extend(self, hypothesis: Hypothesis, count: int) -> None:
+    def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0) -> None:
         present = {e.key for e in hypothesis.effects}
         groups = {e.twin for e in hypothesis.effects if e.twin}
         others = [c for c in self.candidates if c.fits and c.key not in present
                   and (not c.twin or c.twin not in groups)
                   and not (c.absent and hypothesis.far)]
         screen = Screen(hypothesis, others)
-        least = TELLING * hypothesis.minimum.chi2 if hypothesis.far else 0.0
+        if hypothesis.far:
+            least = TELLING * hypothesis.minimum.chi2
         for candidate, starts in screen.singles(count, least):
             self._fit((*hypothesis.effects, candidate), starts)
 

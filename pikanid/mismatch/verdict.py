@@ -62,7 +62,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     lowest = min(_handicapped(h, scale) for h in tried)
     near = [h for h in tried if _handicapped(h, scale) < lowest + WITHIN
             or (not h.known and h.score(scale) < lowest + RIVAL)]
-    near = _parsimonious(_integer_laws(near), scale)
+    near = _integer_laws(near)
     given = []
     for h in near:
         if test(h).p_value < ADEQUATE:
@@ -72,6 +72,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             reasons[h.key] = "does not predict the held-out recording"
         else:
             given.append(h)
+    given = _parsimonious(given, scale)
     if checked and len(given) > 1:
         given = _by_evidence(given, predict, scale, reasons)
     outside = [h for h in given if not h.known]

@@ -29,11 +29,8 @@ class Stretches:
 
     rows: slice  # which times of the family
     by_length: tuple[tuple[Ints | None, Ints], ...]  # (times (g, L) or None = all, groups (g,))
-    columns: Ints  # (G, w): coefficients in band order, less `base`
-    base: int
-    span: int  # coefficients touched: base ... base + span - 1
-    lower: tuple[Ints, Ints]  # pairs a >= b of the w local columns
-    band: Ints  # (G, w(w+1)/2): where their products go in the flattened band (span, kd + 1)
+    part: slice  # coefficients touched, in band order
+    places: NDArray[np.int32]  # (G, pairs): where products go in the flattened (span, kd + b + 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +41,15 @@ class Windows:
     tops: tuple[slice, ...]
     width: int
     firsts: tuple[Ints, ...]  # first coefficient (M,) of each chain
+
+    def pairs(self, b: int) -> tuple[Ints, Ints]:
+        """Which of the products of w + b + 1 columns are kept: those of w with w, of w with b + 1.
+
+        Of the symmetric ones the lower half.
+        """
+        one, other = np.tril_indices(self.width)
+        local, beside = np.divmod(np.arange(self.width * (b + 1)), b + 1)
+        return np.append(one, local), np.append(other, self.width + beside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,60 +73,57 @@ class BandedAssembler:
     state first, then all chains interleaved along time.
     """
 
-    def __init__(self, part: Part, families: list[Sites]):
-        self.n = part.n_coefficients
+    def __init__(self, part: Part, families: list[Sites], b: int):
+        self.n, self.b = part.n_coefficients, b
         self.order = _interleave(part, self.n)
-        self.position = np.empty(self.n, dtype=np.int64)
-        self.position[self.order] = np.arange(self.n)
+        position = np.empty(self.n, dtype=np.int64)
+        position[self.order] = np.arange(self.n)
         self.windows = [_windows(sites) for sites in families]
-        groups = [_columns(windows, self.position) for windows in self.windows]
+        self.pairs = [windows.pairs(b) for windows in self.windows]
+        groups = [_columns(windows, position) for windows in self.windows]
         self.bandwidth = max(
             int((columns.max(axis=1) - columns.min(axis=1)).max()) for _, columns in groups)
-        self.stretches = [self._stretches(starts, columns) for starts, columns in groups]
+        self.stretches = [self._stretches(windows.width, starts, columns)
+                          for windows, (starts, columns) in zip(self.windows, groups, strict=True)]
 
-    def _stretches(self, starts: Ints, columns: Ints) -> list[Stretches]:
+    def _stretches(self, w: int, starts: Ints, columns: Ints) -> list[Stretches]:
         """Cut a family into pieces of some `ROWS_AT_ONCE` rows, at changes of the coefficients."""
         cuts = np.searchsorted(starts, np.arange(0, starts[-1], ROWS_AT_ONCE))
         cuts = np.unique(np.append(cuts, starts.size - 1))
-        a, b = np.tril_indices(columns.shape[1])
+        a, b = np.tril_indices(w)
+        beside = self.bandwidth + 1 + np.arange(self.b + 1)
+        stride = beside[-1] + 1
         out = []
         for first, last in pairwise(cuts):
-            own = columns[first:last]
-            base = int(own.min())
-            own = own - base
+            base, end = int(columns[first:last].min()), int(columns[first:last].max()) + 1
+            own = columns[first:last] - base
             one, other = own[:, a], own[:, b]
-            band = np.minimum(one, other) * (self.bandwidth + 1) + np.abs(one - other)
-            begins = starts[first:last + 1] - starts[first]
-            out.append(Stretches(slice(int(starts[first]), int(starts[last])), _by_length(begins),
-                                 own, base, int(own.max()) + 1, (a, b), band))
+            band = np.minimum(one, other) * stride + np.abs(one - other)
+            right = (own[:, :, None] * stride + beside).reshape(len(own), -1)
+            out.append(Stretches(slice(int(starts[first]), int(starts[last])),
+                                 _by_length(starts[first:last + 1] - starts[first]),
+                                 slice(base, end),
+                                 np.hstack([band, right]).astype(np.int32)))
         return out
 
-    def normal(self, families: list[Sites], rows: list[Rows], b: int) -> BandedNormal:
-        """Assemble JᵀJ and Jᵀr from the residual families (b columns of θ)."""
-        band = np.zeros((self.n, self.bandwidth + 1))
-        right, corner = np.zeros((self.n, b + 1)), np.zeros((b + 1, b + 1))
-        beside = np.arange(b + 1)
+    def normal(self, families: list[Sites], rows: list[Rows]) -> BandedNormal:
+        """Assemble JᵀJ and Jᵀr from the residual families."""
+        b, kd = self.b, self.bandwidth
+        whole, corner = np.zeros((self.n, kd + b + 2)), np.zeros((b + 1, b + 1))
         costs = []
-        for pieces, windows, sites, row in zip(
-                self.stretches, self.windows, families, rows, strict=True):
-            w, cost = windows.width, 0.0
+        for pieces, windows, pairs, sites, row in zip(
+                self.stretches, self.windows, self.pairs, families, rows, strict=True):
+            cost = 0.0
             for piece in pieces:
                 gram = _gram(piece, _stack(windows, sites, row, piece.rows, b))
-                part = slice(piece.base, piece.base + piece.span)
-                _scatter(band[part], piece.band, gram[:, piece.lower[0], piece.lower[1]])
-                _scatter(right[part], piece.columns[:, :, None] * (b + 1) + beside,
-                         gram[:, :w, w:])
-                total = gram[:, w:, w:].sum(axis=0)
+                into = whole[piece.part]
+                into += np.bincount(piece.places.ravel(), gram[:, *pairs].ravel(),
+                                    into.size).reshape(into.shape)
+                total = gram[:, windows.width:, windows.width:].sum(axis=0)
                 corner += total
                 cost += float(total[b, b])
             costs.append(cost)
-        return BandedNormal(band.T, right, corner, tuple(costs))
-
-
-def _scatter(target: Array, places: Ints, values: Array) -> None:
-    """Add values to the flattened target, at places that may repeat."""
-    added = np.bincount(places.ravel(), values.ravel(), target.size)
-    target += added.reshape(target.shape)
+        return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs))
 
 
 def _stack(windows: Windows, sites: Sites, rows: Rows, part: slice, b: int) -> Array:
@@ -202,7 +205,7 @@ def _interleave(part: Part, n: int) -> Ints:
 def _gram(stretches: Stretches, stacked: Array) -> Array:
     """Products VᵀV (G, W, W) of every stretch of stacked rows V (M + 1, E, W)."""
     width = stacked.shape[2]
-    out = np.empty((stretches.columns.shape[0], width, width))
+    out = np.empty((len(stretches.places), width, width))
     for times, groups in stretches.by_length:
         rows = stacked[:-1] if times is None else np.take(stacked, times, axis=0)
         v = rows.reshape(groups.size, -1, width)

@@ -7,7 +7,7 @@ longer than the algebra.
 from __future__ import annotations
 
 from scipy.linalg import LinAlgError
-from scipy.linalg.lapack import dpbtrf, dpbtrs, dposv
+from scipy.linalg.lapack import dpbtrf, dpbtrs, dposv, dtbtrs
 
 from pikanid.approximators import Array
 
@@ -33,6 +33,12 @@ def solve_band(factor: Array, columns: Array) -> Array:
            [2.]])
     """
     solved, _ = dpbtrs(factor, columns, lower=1)
+    return solved
+
+
+def whiten_band(factor: Array, columns: Array) -> Array:
+    """L⁻¹ of columns (n, q), for A = LLᵀ: their squares sum to those of xᵀA⁻¹x."""
+    solved, _ = dtbtrs(factor, columns, uplo="L")
     return solved
 
 

@@ -6,14 +6,16 @@ covariance Σ, Cov = Zᵀ J_dᵀ Σ J_d Z, Z the θ columns of M⁻¹ (White, Ec
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
-from pikanid.optimise.cholesky import factor_band, solve_band
+from pikanid.approximators.tables import Table
+from pikanid.functional import Rows, Sites
+from pikanid.optimise.cholesky import factor_band, whiten_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
 
 EXACT_UP_TO = 300  # data rows; beyond, the trace is estimated
@@ -48,17 +50,25 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
 def inside_bounds(system: BandedSystem, at: Linearisation) -> NDArray[np.bool_]:
     """Which parameters (b,) are not at a bound."""
     problem, theta = system.functional.problem, at.point.theta
-    stuck = np.isclose(theta, problem.lower, rtol=1e-6, atol=0.0)
-    return ~(stuck | np.isclose(theta, problem.upper, rtol=1e-6, atol=0.0))
+    return ~(_meets(theta, problem.lower) | _meets(theta, problem.upper))
+
+
+def _meets(theta: Array, bound: Array) -> NDArray[np.bool_]:
+    return np.abs(theta - bound) <= np.where(np.isfinite(bound), 1e-6 * np.abs(bound), -1.0)
 
 
 def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
-    """Inverse over the parameters `inside` that have any influence, zero elsewhere."""
-    out = np.zeros_like(matrix)
-    which = np.flatnonzero(inside & (np.diag(matrix) > 0.0))
-    scale = np.sqrt(np.diag(matrix)[which])
-    normal = matrix[np.ix_(which, which)] / np.outer(scale, scale)
-    out[np.ix_(which, which)] = np.linalg.pinv(normal, 1e-13, True) / np.outer(scale, scale)
+    """Inverse over the parameters `inside` that have any influence, zero elsewhere.
+
+    Directions without any are left out.
+    """
+    out, diagonal = np.zeros_like(matrix), matrix.diagonal()
+    which = np.flatnonzero(inside & (diagonal > 0.0))
+    square, scale = (which[:, None], which), np.sqrt(diagonal[which])
+    values, vectors = np.linalg.eigh(matrix[square] / (scale[:, None] * scale))
+    seen = np.abs(values) > 1e-13 * np.abs(values).max(initial=0.0)
+    vectors = vectors[:, seen] / scale[:, None]
+    out[square] = (vectors / values[seen]) @ vectors.T
     return out
 
 
@@ -74,14 +84,23 @@ def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[A
         follow[system.assemblers[r].order] = np.concatenate([held, -step.inner[r]])
         rows = functional.data_rows(r, at.point.coefficients[r], at.point.theta)
         for sites, row in zip(part.data, rows, strict=True):
-            assert row.by_theta is not None and row.by_state is not None
+            assert row.by_theta is not None
             own = row.by_theta[:, 0].copy()
-            for s, table in enumerate(sites.states):
-                own += row.by_state[:, 0, s, None] * (table.basis @ follow[table.part])
+            for table, by_state in _met(sites, row):
+                own += by_state * (table.basis @ follow[table.part])
             full = np.zeros((sites.t.size, at.point.theta.size))
             full[:, columns] = own
             responses.append(full)
     return responses
+
+
+def _met(sites: Sites, rows: Rows) -> Iterator[tuple[Table, Array]]:
+    """Tables of the states that a data family depends on, and the slopes (M, 1) by them."""
+    assert rows.by_state is not None
+    for s, table in enumerate(sites.states):
+        by_state = rows.by_state[:, 0, s, None]
+        if by_state.any():
+            yield table, by_state
 
 
 def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) -> float:
@@ -105,21 +124,18 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
         pulled_theta = np.zeros((columns.size, probes.shape[1]))
         for sites, row in zip(part.data, functional.data_rows(
                 r, coefficients, at.point.theta), strict=True):
-            assert row.by_theta is not None and row.by_state is not None
+            assert row.by_theta is not None
             probe = probes[first:first + sites.t.size]
             first += sites.t.size
-            for s, table in enumerate(sites.states):
-                weighted = row.by_state[:, 0, s, None] * probe
-                pulled[table.part] += table.basis.T @ weighted
+            for table, by_state in _met(sites, row):
+                pulled[table.part] += table.basis.T @ (by_state * probe)
             pulled_theta += row.by_theta[:, 0].T @ probe
         pulled = pulled[system.assemblers[r].order]
         k = part.held.size
         if block.held_by_theta is not None:
             pulled_theta += block.held_by_theta.T @ pulled[:k]
-        factor = _factor(block.band)
-        solved = solve_band(factor, pulled[k:])
-        total += float(np.sum(solved * pulled[k:]))
-        theta[columns] += pulled_theta - block.border.T @ solved
+        total += float(np.sum(whiten_band(_factor(block.band), pulled[k:]) ** 2))
+        theta[columns] += pulled_theta - step.inner[r].T @ pulled[k:]
     if theta.size:
         total += float(np.sum(theta * (invert(step.schur, inside_bounds(system, at)) @ theta)))
     return total if rows <= EXACT_UP_TO else total / probes.shape[1]

@@ -86,8 +86,9 @@ class BandedSystem:
         self.functional = functional
         self.columns = [functional.problem.columns(r)[1] for r in range(len(functional.parts))]
         self.families = [functional.families(r) for r in range(len(functional.parts))]
-        self.assemblers = [BandedAssembler(part, families) for part, families
-                           in zip(functional.parts, self.families, strict=True)]
+        self.assemblers = [
+            BandedAssembler(part, families, columns.size) for part, families, columns
+            in zip(functional.parts, self.families, self.columns, strict=True)]
         self.orders = [assembler.order for assembler in self.assemblers]
 
     def linearise(self, point: Point, lam: float) -> Linearisation:
@@ -95,7 +96,7 @@ class BandedSystem:
         blocks, data, physics, other = [], [], 0.0, 0.0
         for r, (part, c) in enumerate(zip(self.functional.parts, point.coefficients, strict=True)):
             rows = self.functional.rows(r, c, point.theta, lam)
-            normal = self.assemblers[r].normal(self.families[r], rows, self.columns[r].size)
+            normal = self.assemblers[r].normal(self.families[r], rows)
             held = self.functional.hold_jacobian(r, point.theta)
             blocks.append(_eliminate(normal, part.held.size, held))
             count = len(part.data)
@@ -131,17 +132,17 @@ class BandedSystem:
             followed = block.right.T @ inner[-1]
             schur[columns[:, None], columns] += corner[:-1, :-1] - followed[:-1, :-1]
             slope[columns] += corner[:-1, -1] - followed[:-1, -1]
-            promised += followed[-1, -1]
+            promised += float(followed[-1, -1])
         schur = 0.5 * (schur + schur.T)
         change = box_minimum(schur, slope, lower - theta, upper - theta)
-        promised -= change @ (2.0 * slope + schur @ change)
+        promised -= float(change @ (2.0 * slope + schur @ change))
         moves = []
         for columns, order, solved in zip(self.columns, self.orders, inner, strict=True):
             # Held coefficients, the first, are set from the initial state afterwards, exactly.
             move = np.zeros(order.size)
             move[order[order.size - len(solved):]] = -solved @ np.append(change[columns], 1.0)
             moves.append(move)
-        return Step(tuple(moves), change, float(promised), schur,
+        return Step(tuple(moves), change, promised, schur,
                     tuple(solved[:, :-1] for solved in inner))
 
 

@@ -7,6 +7,7 @@ Math. 31, 1979); edf = tr((A_d + ρ A_q)⁻¹ A_d), estimated from a few fixed r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -16,8 +17,17 @@ from pikanid.approximators import Array
 from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, gauss_newton
 
-# (GCV score, residual sum of squares, effective parameters)
-Score = tuple[float, float, float]
+# The splines use all that they can of the data once a decade adds less than this share to it.
+FLAT = 1e-4
+
+
+class Score(NamedTuple):
+    """What cross-validation says of a ρ."""
+
+    rho: float
+    value: float
+    residual: float  # sum of squares
+    effective: float  # parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,24 +52,16 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
     rough = sum(float(b.band[0].sum()) for b in both.blocks) - mass
     if mass <= 0.0 or rough <= 0.0:
         return None
-    count, pencil = system.functional.n_data, Pencil(data, both)
-    ridge = mass / rough
+    count = system.functional.n_data
+    pencil, ridge = Pencil(data, both, count), mass / rough
     if rho is None:
-        scores = {q: pencil.score(q, count) for q in ridge * 10.0 ** np.arange(-14.0, 5.0)}
-        best = _best(scores)
-        if best is None:
-            return None
-        scores |= {q: pencil.score(q, count) for q in (best / 10**0.5, best * 10**0.5)}
-        rho = _best(scores)
-        assert rho is not None
-        score = scores[rho]
+        chosen = pencil.search(ridge)
     else:
         # Least squares proper (ρ = 0) keeps a trace of roughness, for knots without data.
-        rho = max(rho, 1e-14 * ridge)
-        score = pencil.score(rho, count, most=1.0)
-    if score is None:
+        chosen = pencil.at(max(rho, 1e-14 * ridge), most=1.0)
+    if chosen is None:
         return None
-    residual, effective = score[1:]
+    rho, _, residual, effective = chosen
     try:
         found = gauss_newton(system, point, rho, point.theta, point.theta, iterations=10)
     except LinAlgError:
@@ -68,16 +70,11 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
     return Smoothed(found.at.point, sigma, effective, rho)
 
 
-def _best(scores: dict[float, Score | None]) -> float | None:
-    found = {rho: score[0] for rho, score in scores.items() if score is not None}
-    return min(found, key=lambda rho: found[rho]) if found else None
-
-
 class Pencil:
-    """The normal equations of the data, and how they change with ρ, at one point."""
+    """The normal equations of `count` data, and how they change with ρ, at one point."""
 
-    def __init__(self, data: Linearisation, both: Linearisation):
-        self.cost = data.data_cost
+    def __init__(self, data: Linearisation, both: Linearisation, count: int):
+        self.cost, self.count = data.data_cost, count
         self.blocks = []
         sizes = [block.slope.size for block in data.blocks]
         number = int(np.clip(4000 // max(1, sum(sizes)), 1, 16))
@@ -88,8 +85,30 @@ class Pencil:
             rough = np.column_stack([np.zeros_like(probe), only.slope - all_.slope])
             self.blocks.append((only, all_.band - only.band, right, rough, probe / number))
 
-    def score(self, rho: float, count: int, most: float = 0.8) -> Score | None:
-        """None where the system is singular or more than `most` of `count` data is used."""
+    def search(self, ridge: float) -> Score | None:
+        """The least score, by decades and then half a decade beside it.
+
+        From 1e4 of `ridge` down to where less roughness changes nothing: the splines use all of the
+        data that they can, or more than they may.  1e-14 is the end in any case.
+        """
+        found: list[Score] = []
+        for rho in ridge * 10.0 ** np.arange(4.0, -15.0, -1.0):
+            score = self.at(rho)
+            if score is not None:
+                found.append(score)
+            elif found:
+                break
+            used = [score.effective for score in found]
+            if len(used) > 1 and used[-1] > 2.0 * used[0] and used[-1] < (1 + FLAT) * used[-2]:
+                break
+        if not found:
+            return None
+        best = min(found, key=lambda score: score.value)
+        beside = [self.at(best.rho * factor) for factor in (10**-0.5, 10**0.5)]
+        return min([best, *filter(None, beside)], key=lambda score: score.value)
+
+    def at(self, rho: float, most: float = 0.8) -> Score | None:
+        """None where the system is singular or more than `most` of the data is used."""
         effective, residual = 0.0, self.cost
         for only, band, right, rough, probe in self.blocks:
             try:
@@ -100,10 +119,10 @@ class Pencil:
             effective += float(np.sum(probe * solved[:, :-1]))
             step = solved[:, -1]
             residual += float(step @ (2.0 * only.slope + multiply(only.band, step[:, None])[:, 0]))
-        if effective >= most * count and most < 1.0:
+        if effective >= most * self.count and most < 1.0:
             return None
-        left = max(count - effective, 1e-3)
-        return count * residual / left**2, residual, effective
+        left = max(self.count - effective, 1e-3)
+        return Score(rho, self.count * residual / left**2, residual, effective)
 
 
 def multiply(band: Array, columns: Array) -> Array:

@@ -45,6 +45,12 @@ class VectorField:
         """∂f/∂x (M, n, n) and ∂f/∂p (M, n, P)."""
         return self._functions.jacobians(t, x, u, p, "f")
 
+    def rhs_linearised(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray,
+                       rows: Sequence[int], free: Sequence[int] | np.ndarray
+                       ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """E `rows` of f (M, E), of ∂f/∂x (M, E, n), and of ∂f/∂p (M, E, b) by the `free` ones."""
+        return self._functions.linearised(t, x, u, p, "f", rows, free)
+
     def outputs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """y = h (M, q)."""
         return self._functions.values["h"](t, x, u, p)
@@ -53,6 +59,12 @@ class VectorField:
                          ) -> tuple[np.ndarray, np.ndarray]:
         """∂h/∂x (M, q, n) and ∂h/∂p (M, q, P)."""
         return self._functions.jacobians(t, x, u, p, "h")
+
+    def outputs_linearised(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray,
+                           rows: Sequence[int], free: Sequence[int] | np.ndarray
+                           ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """E `rows` of h (M, E), of ∂h/∂x (M, E, n), and of ∂h/∂p (M, E, b) by the `free` ones."""
+        return self._functions.linearised(t, x, u, p, "h", rows, free)
 
 
 class _Functions:
@@ -109,31 +121,42 @@ class _Functions:
         def evaluate(t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
             with np.errstate(all="ignore"):
                 columns = function(*self.arguments(t, x, u, p))[:-1]
-            return np.stack([np.broadcast_to(c, np.shape(t)) for c in columns], axis=1)
+            return _columns(columns, len(t))
 
         return evaluate
 
     def jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray, name: str
                   ) -> tuple[np.ndarray, np.ndarray]:
+        rows, free = range(len(self.exprs[name])), range(len(self.p))
+        return self.linearised(t, x, u, p, name, rows, free)[1:]
+
+    def linearised(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray, name: str,
+                   rows: Sequence[int], free: Sequence[int] | np.ndarray
+                   ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         places, function, edges = self._table(name)
-        rows, n, count = len(self.exprs[name]), len(self.x), len(t)
-        jx, jp = np.zeros((count, rows, n)), np.zeros((count, rows, len(self.p)))
+        count, n, values = len(t), len(self.x), len(self.exprs[name])
+        row_at = {row: k for k, row in enumerate(rows)}
+        column_at = {int(column): k for k, column in enumerate(free)}
+        jx, jp = np.zeros((count, len(rows), n)), np.zeros((count, len(rows), len(free)))
         with np.errstate(all="ignore"):
-            values = function(*self.arguments(t, x, u, p))
-        for (row, column), value in zip(places, values, strict=False):
-            if column < n:
-                jx[:, row, column] = value
-            else:
-                jp[:, row, column - n] = value
+            found = function(*self.arguments(t, x, u, p))
+        for (row, column), value in zip(places, found[values:], strict=False):
+            if row in row_at and column < n:
+                jx[:, row_at[row], column] = value
+            elif row in row_at and column - n in column_at:
+                jp[:, row_at[row], column_at[column - n]] = value
+        inner = found[values + len(places):]
         for (row, index, order), z, weight in zip(
-                edges, values[len(places):len(places) + len(edges)],
-                values[len(places) + len(edges):len(places) + 2 * len(edges)], strict=True):
+                edges, inner, inner[len(edges):], strict=False):
+            if row not in row_at:
+                continue
             spline = self.model.splines[index]
             first = self.model.parameter_names.index(spline.coefficient_names[0])
             basis = _basis(spline.knots, spline.degree, np.broadcast_to(z, (count,)), order)
-            jp[:, row, first:first + spline.size] += np.reshape(
-                np.broadcast_to(weight, (count,)), (-1, 1)) * basis
-        return jx, jp
+            own = [k for k in range(spline.size) if first + k in column_at]
+            jp[:, row_at[row], [column_at[first + k] for k in own]] += np.reshape(
+                np.broadcast_to(weight, (count,)), (-1, 1)) * basis[:, own]
+        return _columns([found[row] for row in rows], count), jx, jp
 
     def _table(self, name: str) -> Any:
         if name not in self._tables:
@@ -149,7 +172,7 @@ class _Functions:
                     edges.append((row, int(atom.args[0]), int(atom.args[1])))
                     inner.append(atom.args[2])
                     weights.append(e.subs(atom, handle).diff(handle).subs(handle, atom))
-            everything = [*entries, *inner, *weights, sp.Integer(0)]
+            everything = [*self.exprs[name], *entries, *inner, *weights, sp.Integer(0)]
             if len(everything) == 1:
                 everything.append(sp.Integer(0))
             self._tables[name] = (
@@ -167,6 +190,14 @@ class _Splines:
         spline = self.model.splines[int(index)]
         return _basis(spline.knots, spline.degree, np.atleast_1d(z), int(order)) @ np.array(
             coefficients)
+
+
+def _columns(values: Sequence[Any], count: int) -> np.ndarray:
+    """Arrays (M,) and constants side by side (M, len(values))."""
+    out = np.empty((count, len(values)), dtype=np.result_type(float, *values))
+    for k, value in enumerate(values):
+        out[:, k] = value
+    return out
 
 
 def _basis(knots: Sequence[float], degree: int, z: np.ndarray, order: int) -> np.ndarray:
