@@ -15,7 +15,8 @@ from pikanid.mismatch.catalogue import candidates
 from pikanid.mismatch.detect import detect, frequency_bands, past_inputs, unit_columns
 from pikanid.mismatch.hypothesis import extended
 from pikanid.mismatch.least_squares import minimise
-from pikanid.mismatch.noise_level import Level, refined, without_outliers
+from pikanid.mismatch.noise_level import Level, refined
+from pikanid.mismatch.outliers import without_outliers
 from pikanid.mismatch.preparation import averaged, oversampling
 from pikanid.mismatch.site import sites
 from pikanid.mismatch.tangent import directions

@@ -1,0 +1,121 @@
+"""Outliers beside a fit, and noise under bridged gaps, against simulated noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pikanid import Model, Recording
+from pikanid.mismatch.forces import coulomb_friction
+from pikanid.mismatch.hypothesis import fitted
+from pikanid.mismatch.noise_level import Level, bridged, refined
+from pikanid.mismatch.outliers import lone, without_lone, without_outliers
+from pikanid.mismatch.site import sites
+from pikanid.mismatch.whitened import Records
+
+SIGMA = 0.002
+
+
+def noise(n: int, rho: float = 0.0, seed: int = 0) -> np.ndarray:
+    e = np.random.default_rng(seed).standard_normal(n)
+    return np.asarray(lfilter([np.sqrt(1 - rho**2)], [1.0, -rho], e))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
+def test_hardly_any_noise_is_alone(rho: float) -> None:
+    assert lone(noise(100_000, rho)).mean() < 1e-3
+
+
+def test_gross_errors_are_found_where_the_residual_bends() -> None:
+    """Misfits bend where an input switches or a sensor clips; errors of 6 σ are no such thing."""
+    n = np.arange(2000)
+    bent = 40 * np.abs((n % 100) / 50 - 1) + noise(2000)
+    assert lone(bent).mean() < 2e-3
+    hit = np.arange(37, 2000, 111)
+    bent[hit] += 8.0 * np.where(hit % 2, 1, -1)
+    found = lone(bent)
+    assert found[hit].mean() > 0.9
+    assert found.sum() <= len(hit) + 2
+
+
+def test_what_is_everywhere_is_no_outlier() -> None:
+    r = noise(500)
+    r[::5] += 30.0
+    assert not lone(r).any()
+    assert not lone(np.zeros(10)).any()
+
+
+def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
+    t = np.arange(1000) / 100.0
+    motion = 0.2 * np.sin(14 * t)
+    y = motion + SIGMA * noise(1000, seed=1)
+    hit = np.arange(20, 1000, 50)
+    y[hit] += 6 * SIGMA
+    whole = Recording.from_arrays(t, {"y": y}, {"y": "rad"})
+    before, _ = without_outliers(whole, "y")
+    seen = np.isfinite(before["y"].values)
+    residual = (0, "y", t[seen], (y - motion)[seen])
+    records, count = without_lone(Records((before,), ({},)), [residual])
+    left = np.flatnonzero(~np.isfinite(records.recordings[0]["y"].values))
+    assert count == (~np.isin(hit, np.flatnonzero(~seen))).sum() - np.isfinite(
+        records.recordings[0]["y"].values[hit]).sum()
+    assert np.isin(hit, left).mean() > 0.85
+    assert len(left) < len(hit) + 3
+
+
+def test_straight_lines_over_gaps_take_power_away() -> None:
+    rng = np.random.default_rng(3)
+    n = 400
+    grid = np.sort(rng.choice(np.arange(1, n - 1), int(0.9 * n), replace=False))
+    grid = np.concatenate([[0], grid, [n - 1]])
+    power = np.zeros(n // 2 + 1)
+    for _ in range(4000):
+        even = np.interp(np.arange(n), grid, rng.standard_normal(len(grid)))
+        power += np.abs(np.fft.rfft(even)) ** 2 / n / 4000
+    ratio = power / bridged(grid)
+    # 4000 periodograms scatter by 1.6 %
+    assert np.abs(ratio - 1).max() < 0.08
+    assert ratio[150:].mean() == pytest.approx(1.0, abs=0.005)
+    assert bridged(grid)[150:].mean() < 0.9
+
+
+def test_dropouts_do_not_lower_the_noise() -> None:
+    rng = np.random.default_rng(4)
+    found = []
+    for seed in range(8):
+        t = np.arange(2000) / 100.0
+        e = SIGMA * noise(2000, seed=seed)
+        kept = rng.random(2000) > 0.08
+        channel = Recording.from_arrays(t, {"y": np.where(kept, 0.2 * np.sin(14 * t) + e, np.nan)},
+                                        {"y": "rad"})["y"]
+        level = refined(Level(SIGMA, 0.0, 0.1, 0.01, "the start"), channel, t[kept], e[kept], 14.0,
+                        None)
+        found.append(level.sigma)
+    assert np.mean(found) == pytest.approx(SIGMA, rel=0.02)
+
+
+def test_friction_is_found_beyond_the_hills_between() -> None:
+    """A motion that comes to rest makes χ² rugged along the size of dry friction."""
+    model = Model.from_dict({
+        "name": "swing", "states": {"q": {"initial": 0.3}, "v": {"initial": 0.0}},
+        "parameters": {"w2": {"guess": 200.0}}, "equations": {"q": "v", "v": "-w2*q"},
+        "outputs": {"q": {"expression": "q"}}})
+    t = np.arange(300) / 100.0
+    # half swings of dry friction about ±c/w² (S. Timoshenko, Vibration Problems, 1937, § 10)
+    c, w = 8.0, np.sqrt(200.0)
+    rest, amplitude, y = c / 200.0, 0.3, np.empty(300)
+    for k, time in enumerate(t):
+        half = int(time * w / np.pi)
+        a = max(amplitude - (2 * half + 1) * rest, 0.0)
+        sign = 1 if half % 2 == 0 else -1
+        y[k] = sign * rest + a * np.cos(w * time) if a > 0 else y[k - 1]
+    records = Records((Recording.from_arrays(t, {"q": y + SIGMA * noise(300)}),),
+                      ({"q": Level(SIGMA, 0.0, 0.0, 0.01, "given")},))
+    entry = coulomb_friction(sites(model, records.recordings)[0])[0]
+    size = entry.parameters[0].name
+    for start in (2.0, 4.5, 14.0):
+        found = fitted(model, [entry], records, [{size: start}], 30)
+        assert found is not None
+        assert found.values[size] == pytest.approx(c, rel=0.01)
+        assert found.minimum.chi2 < 1.3 * 300
