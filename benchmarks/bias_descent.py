@@ -85,7 +85,8 @@ def profile(lengths: Sequence[float] = LENGTHS) -> list[Stop]:
     setup, (cells, lam, _) = _setup(wide=True), STAGES[-1]
     functional = setup.functional(KanGrid(
         cells, 3, exact_switches=False, quadrature="sum", count=COLLOCATION))
-    system, (point, _) = BandedSystem(functional), first_point(functional)
+    system = BandedSystem(functional)
+    point, _ = first_point(system)
     found = []
     for length in lengths:
         low, high = (np.array([length, end]) for end in WIDE["d_theta"])

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from pikanid import errors
 from pikanid.adequacy import difference_noise
-from pikanid.approximators import Array, is_linear
+from pikanid.approximators import Array
 from pikanid.approximators.tables import Table, anchor
 from pikanid.chains import Chains
 from pikanid.evaluated import delays
@@ -61,12 +61,12 @@ class Functional:
 
         They are those of the model's order, or `extra` orders higher.
         """
-        parts = []
-        for part in self.parts:
-            tops = tuple(Table.of(table.approximator, table.t, table.derivative + extra, table.part)
-                         for table in part.physics.tops)
-            parts.append(replace(part, physics=replace(part.physics, tops=tops)))
-        return replace(self, penalty="roughness", parts=tuple(parts) if extra else self.parts)
+        parts = self.parts
+        if extra:
+            parts = tuple(replace(part, physics=replace(part.physics, tops=tuple(
+                Table.of(table.approximator, table.t, table.derivative + extra, table.part)
+                for table in part.physics.tops))) for part in self.parts)
+        return replace(self, penalty="roughness", parts=parts)
 
     @property
     def n_data(self) -> int:
@@ -211,7 +211,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
     parts = []
     for experiment, own, (times, weights) in zip(
             problem.experiments, approximators, nodes, strict=True):
-        sizes = [a.n_basis if is_linear(a) else a.n_coefficients for a in own]
+        sizes = [a.n_coefficients for a in own]
         ends = np.cumsum(sizes)
         pieces = [slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)]
 

@@ -42,6 +42,10 @@ class LinearApproximator(Protocol):
     def n_basis(self) -> int:
         """Number of basis functions."""
 
+    @property
+    def n_coefficients(self) -> int:
+        """Number of adjustable coefficients: as many."""
+
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis (M, n_basis): equally many consecutive nonzeros a row, one-sided from the right."""
 

@@ -28,8 +28,8 @@ def solve_band(factor: Array, columns: Array) -> Array:
     """A⁻¹ of columns (n, q), A given by its factor.
 
     >>> import numpy as np
-    >>> solve_band(factor_band(np.array([[4.0, 4.0], [2.0, 0.0]])), np.array([[4.0], [8.0]]))
-    array([[0.],
+    >>> solve_band(factor_band(np.array([[4.0, 5.0], [2.0, 0.0]])), np.array([[8.0], [12.0]]))
+    array([[1.],
            [2.]])
     """
     solved, _ = dpbtrs(factor, columns, lower=1)

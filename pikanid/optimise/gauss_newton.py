@@ -8,6 +8,7 @@ inside the box.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,6 +91,12 @@ class BandedSystem:
             BandedAssembler(part, families, columns.size) for part, families, columns
             in zip(functional.parts, self.families, self.columns, strict=True)]
         self.orders = [assembler.order for assembler in self.assemblers]
+
+    def over(self, functional: Functional) -> BandedSystem:
+        """Another functional at the same sites, whose sparsity is therefore the same."""
+        other = copy.copy(self)
+        other.functional = functional
+        return other
 
     def linearise(self, point: Point, lam: float) -> Linearisation:
         """Residuals and normal equations at a point."""

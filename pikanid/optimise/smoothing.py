@@ -54,11 +54,8 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
         return None
     count = system.functional.n_data
     pencil, ridge = Pencil(data, both, count), mass / rough
-    if rho is None:
-        chosen = pencil.search(ridge)
-    else:
-        # Least squares proper (ρ = 0) keeps a trace of roughness, for knots without data.
-        chosen = pencil.at(max(rho, 1e-14 * ridge), most=1.0)
+    # Least squares proper (ρ = 0) keeps a trace of roughness, for knots without data.
+    chosen = pencil.search(ridge) if rho is None else pencil.at(max(rho, 1e-14 * ridge), most=1.0)
     if chosen is None:
         return None
     rho, _, residual, effective = chosen

@@ -46,7 +46,7 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, cells: float | None, max_grid: i
         while grid.intervals < cells and 2 * grid.intervals <= max_grid:
             grid = grid.refined()
     functional = setup.functional(grid)
-    point, smoothed = first_point(functional)
+    point, smoothed = first_point(BandedSystem(functional))
     noise = noise_level(functional, smoothed)
     scale = physics_scale(functional, point, noise)
     stages: list[Stage] = []

@@ -119,11 +119,11 @@ def start_is_estimated(problem: Problem) -> bool:
                for state in problem.model.states)
 
 
-def first_point(functional: Functional) -> tuple[Point, Smoothed | None]:
+def first_point(system: BandedSystem) -> tuple[Point, Smoothed | None]:
     """Splines smoothed through the data, θ at its guess; flat ones where data say too little."""
-    theta = functional.problem.guess
+    functional, theta = system.functional, system.functional.problem.guess
     flat = tuple(functional.resting(r, theta) for r in range(len(functional.parts)))
-    smoothed = smooth(BandedSystem(functional.smoothing()), Point(flat, theta))
+    smoothed = smooth(system.over(functional.smoothing()), Point(flat, theta))
     return (Point(flat, theta), None) if smoothed is None else (smoothed.point, smoothed)
 
 
@@ -188,11 +188,11 @@ def _from_data(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Sched
                ) -> tuple[BandedSystem, list[Stage], Outcome, list[str]]:
     """The whole way on one grid: smooth the data, scale the physics, follow λ."""
     functional = setup.functional(grid)
-    point, smoothed = first_point(functional)
+    system = BandedSystem(functional)
+    point, smoothed = first_point(system)
     noise = noise_level(functional, smoothed)
     if setup.nondimensional:
-        functional = functional.with_scale(physics_scale(functional, point, noise))
-    system = BandedSystem(functional)
+        system = system.over(functional.with_scale(physics_scale(functional, point, noise)))
     return (system, *_best_path(system, point, plans(noise), noise))
 
 
