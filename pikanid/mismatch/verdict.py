@@ -20,7 +20,8 @@ RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps 
 WHOLE = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # exponents that have names
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
 OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
-PART = 0.3  # of the nominal held-out RMSE that may remain where only part is explained
+PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
+NARROW = 0.03  # of the swing: a loop no wider is dry friction that gives a little before it slips
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
 WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
 PREDICTED = 8  # hypotheses of which that is found out
@@ -82,8 +83,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         rest = tuple(h for h in near if h not in given) + tuple(given)
         most = _largest_part(base, tried, scale, predict) if not given else ()
         if most:
-            return Answer("unconfirmed", most, tuple(h for h in rest if h not in most)[:5], {},
-                          reasons)
+            merged, twins = _merged(list(most), tried)
+            return Answer("unconfirmed", tuple(merged),
+                          tuple(h for h in rest if h not in most)[:5], twins, reasons)
         return Answer("unnamed", (), rest[:5], {}, reasons)
     merged, twins = _merged(known, tried)
     verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
@@ -185,7 +187,7 @@ def _merged(known: list[Hypothesis], tried: Sequence[Hypothesis]
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
-    open.
+    open, and hysteresis dry friction where its loop is narrow (P. Dahl, AIAA J. 14, 1976).
     """
     def group(e: Candidate) -> str:
         return e.twin + e.site.suffix if e.twin else e.key
@@ -206,6 +208,9 @@ def _merged(known: list[Hypothesis], tried: Sequence[Hypothesis]
             if leader is h and power and _open_exponent(power, WHOLE[e.ids[0]]):
                 table[e.key] += ("power_drag",)
                 absorbed.add(power.key)
+            if leader is h and e.ids[0] == "hysteresis" and (
+                    h.values[e.parameters[1].name] < NARROW * e.site.swing):
+                table[e.key] += ("coulomb_friction",)
     return [h for h in first.values() if h.key not in absorbed], twins
 
 
