@@ -102,10 +102,11 @@ class Functional:
     def hold_jacobian(self, r: int, theta: Array) -> Array | None:
         """d c[held] / d θ (k, b) in the columns of `problem.columns(r)`; None where constant."""
         part = self.parts[r]
+        if part.held.size == 0:
+            return None
         positions, _ = self.problem.columns(r)
-        p = self.problem.parameters(theta, r)
-        jacobian = self.problem.experiments[r].initial_jacobian(p)[:, positions]
-        return part.hold @ jacobian if part.held.size and np.any(jacobian) else None
+        jacobian = self.problem.experiments[r].initial_jacobian(self.problem.parameters(theta, r))
+        return part.hold @ jacobian[:, positions] if jacobian[:, positions].any() else None
 
     def states(self, sites: Sites, coefficients: Array) -> Array:
         """Approximated states (M, n) at the sites."""

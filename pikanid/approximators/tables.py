@@ -107,8 +107,10 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
     for approximator, length in zip(approximators, lengths, strict=True):
         if not is_linear(approximator):
             return None
-        rows = np.vstack([approximator.basis(at, q).toarray() for q in range(length)])
-        if np.any(np.abs(np.triu(rows, 1)) > 1e-9 * np.abs(rows).max(axis=1, keepdims=True)):
+        windows = [local_rows(approximator.basis(at, q)) for q in range(length)]
+        rows = np.vstack([values for _, values in windows])
+        decisive = np.abs(np.triu(rows, 1)) <= 1e-9 * np.abs(rows).max(axis=1, keepdims=True)
+        if not decisive.all() or any(first[0] for first, _ in windows):
             return None
         held.append(offset + np.arange(length))
         blocks.append(np.linalg.inv(rows[:, :length]))

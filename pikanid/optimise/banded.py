@@ -193,12 +193,11 @@ def _columns(windows: Windows, position: Ints) -> tuple[Ints, Ints]:
 
 def _interleave(part: Part, n: int) -> Ints:
     """Order of the coefficients: held ones first, then by their relative place in each chain."""
-    key = np.empty(n)
-    for table in part.physics.tops:
-        inside = np.arange(table.part.start, table.part.stop)
-        free = inside[~np.isin(inside, part.held)]
-        key[free] = (np.arange(free.size) + 0.5) / free.size
+    key = np.zeros(n)
     key[part.held] = -1.0
+    for table in part.physics.tops:
+        free = table.part.start + np.flatnonzero(key[table.part] == 0.0)
+        key[free] = (np.arange(free.size) + 0.5) / free.size
     return np.argsort(key, kind="stable").astype(np.int64)
 
 

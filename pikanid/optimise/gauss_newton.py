@@ -185,16 +185,17 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
         return np.zeros(0)
     diagonal = matrix.diagonal()
     # A parameter without influence here (damping of a body at rest) stays where it is.
-    change, bound = np.clip(0.0, lower, upper), (lower >= upper) | (diagonal == 0.0)
+    bound = (lower >= upper) | (diagonal == 0.0)
     if bound.all():
-        return change
-    if not np.all(diagonal[~bound] > 0.0):
+        return np.clip(0.0, lower, upper)
+    if not (bound | (diagonal > 0.0)).all():
         raise LinAlgError("the reduced matrix is not positive definite")
     root = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     if not bound.any():  # nearly always: no bound meets the free minimum
-        free_minimum = _minimum(matrix, slope, root)
-        if ((lower <= free_minimum) & (free_minimum <= upper)).all():
-            return free_minimum
+        change = _minimum(matrix, slope, root)
+        if ((lower <= change) & (change <= upper)).all():
+            return change
+    change = np.clip(0.0, lower, upper)
     for _ in range(4 * slope.size + 4):
         free = np.flatnonzero(~bound)
         if free.size:

@@ -115,7 +115,7 @@ class Pencil:
             solved = solve_band(factor, right + rho * rough)
             effective += float(np.sum(probe * solved[:, :-1]))
             step = solved[:, -1]
-            residual += float(step @ (2.0 * only.slope + multiply(only.band, step[:, None])[:, 0]))
+            residual += float(step @ (2.0 * only.slope + _product(only.band, step)))
         if effective >= most * self.count and most < 1.0:
             return None
         left = max(self.count - effective, 1e-3)
@@ -129,5 +129,8 @@ def multiply(band: Array, columns: Array) -> Array:
     array([[2., 1.],
            [1., 2.]])
     """
-    kd = band.shape[0] - 1
-    return np.column_stack([dsbmv(kd, 1.0, band, column, lower=1) for column in columns.T])
+    return np.column_stack([_product(band, column) for column in columns.T])
+
+
+def _product(band: Array, column: Array) -> Array:
+    return dsbmv(band.shape[0] - 1, 1.0, band, column, lower=1)
