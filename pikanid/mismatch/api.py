@@ -237,8 +237,7 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     _note_outliers(count, "the recording", notes)
     held = None
     if later is not None:
-        held = prepared(model, later, None, notes, together)
-        held = Records(held.recordings, tuple(records.levels[0] for _ in held.recordings))
+        held = prepared(model, later, None, notes, together, records.levels[0])
     found = sites(nominal, records.recordings)
     listed = catalogue_of(found)
     search = Search(nominal, records, listed, tell)

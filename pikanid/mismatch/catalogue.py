@@ -33,9 +33,12 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
     (27, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
+    # two coordinates may be seen in one output, which has one sensor
+    first = {s.output.name: s.q for s in reversed(sites)}
     for table in (ENTRIES, GUARDS):
         for site in sites:
             for entry in table:
                 for candidate in entry(site):
-                    made.setdefault(candidate.key, candidate)
+                    if candidate.channel != "sensor" or first[site.output.name] == site.q:
+                        made.setdefault(candidate.key, candidate)
     return tuple(made.values())

@@ -221,7 +221,8 @@ def cross_axis(site: Site) -> list[Candidate]:
         k = Parameter(site.name(f"kappa_{c}"), 0.0, f"({unit or '1'})/[{c}]")
 
         def extend(model: Model, c: str = c, k: Parameter = k) -> Model:
-            model = model.replace(inputs=(*model.inputs, Input(c)))
+            if c not in model.input_names:
+                model = model.replace(inputs=(*model.inputs, Input(c)))
             if site.inputs:
                 return model.map_input(goal, function=f"{goal} + {k.name}*{c}")
             return model.with_term(site.v, f"{k.name}*{c}")

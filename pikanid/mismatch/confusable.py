@@ -18,7 +18,7 @@ from pikanid import errors
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.catalogue import candidates as catalogue_of
 from pikanid.mismatch.hypothesis import fitted
-from pikanid.mismatch.search import Screen
+from pikanid.mismatch.screen import Screen
 from pikanid.mismatch.seen import Sigma
 from pikanid.mismatch.site import sites
 from pikanid.mismatch.sizing import Sized, recorded, sized

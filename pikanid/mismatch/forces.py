@@ -199,10 +199,11 @@ def boundary_layer(site: Site) -> list[Candidate]:
     if not site.rate:
         return []
     b = Parameter(site.name("b_layer"), 0.0, "1/s^0.5", (0.0, INF))
-    band = (site.rate / 20, site.rate * 12)
+    # beyond three times the natural rate little moves; faster states would need shorter steps
+    band = (site.rate / 20, site.rate * 3)
 
     def extend(model: Model) -> Model:
-        model, half = model.with_half_derivative(site.v, site.name("layer"), band, 8)
+        model, half = model.with_half_derivative(site.v, site.name("layer"), band, 6)
         return model.with_term(site.v, -symbol(b.name) * half)
 
     def signs(view: View) -> list[Sign]:

@@ -68,7 +68,7 @@ class Hypothesis:
     def covariance(self) -> np.ndarray:
         """(n, n) of the estimates; infinite variances become very large ones."""
         J = self.minimum.J
-        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-150)
+        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-100)
         _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
         inverse = vt.T / np.maximum(s, 1e-9 * s[0] if len(s) else 1.0) ** 2 @ vt
         return np.asarray(inverse / np.outer(norms, norms))

@@ -29,6 +29,7 @@ class Level:
         spread: Relative standard error of its power at low frequencies.
         interval: Between samples [s].
         source: In words.
+        stretch: Start and stop [s] of a quiet stretch long enough to tell low frequencies.
     """
 
     sigma: float
@@ -36,6 +37,7 @@ class Level:
     spread: float
     interval: float
     source: str
+    stretch: tuple[float, float] | None = None
 
     def whiten(self, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Rows (N,) or (N, k) at times t as white noise of unit variance.
@@ -65,9 +67,11 @@ def first_level(recording: Recording, output: str, quiet: tuple[float, float] | 
         return Level(sigma, 0.0, 0.0, channel.interval, "given")
     model = noise.estimate(channel, quiet)
     rho = float(np.clip(model.autocovariance(2)[1] / model.sigma**2, 0.0, 0.98))
+    long = model.source == "quiet stretch" and model.n >= QUIET
     return Level(model.sigma, rho if model.n >= QUIET and not model.white else 0.0,
                  2 * model.sigma_std / model.sigma, channel.interval,
-                 f"the {model.source} ({model.start:g} s to {model.stop:g} s)")
+                 f"the {model.source} ({model.start:g} s to {model.stop:g} s)",
+                 (model.start, model.stop) if long else None)
 
 
 def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
@@ -79,7 +83,7 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
         channel: Of the output.
         t, residual: (N,) of the fit at the samples that are there.
         rate: Natural frequency [rad/s]: the residual counts from six times that on.
-        quiet: Stretch in which nothing moves; looked for if None.
+        quiet: Stretch in which nothing moves, if one is known.
     """
     from scipy.signal.windows import tukey
 
@@ -97,7 +101,7 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     high = (omega > np.clip(6 * rate * h, 0.25 * np.pi, 0.6 * np.pi)) & (omega < 0.97 * np.pi)
     spectra = [(omega[high], power[high], 0.9 * share)]
     source = "the residual's highest frequencies"
-    found = quiet or noise_stretch(channel)
+    found = quiet or level.stretch
     if found is not None:
         inside = (channel.time >= found[0]) & (channel.time <= found[1]) & np.isfinite(
             channel.values)
@@ -110,7 +114,7 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     sigma, rho, spread = _whittle(spectra, given)
     if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)
-    return Level(sigma, rho, spread, h, source)
+    return Level(sigma, rho, spread, h, source, level.stretch)
 
 
 def bridged(grid: np.ndarray) -> np.ndarray:
@@ -137,14 +141,6 @@ def bridged(grid: np.ndarray) -> np.ndarray:
     covariance = (A @ A.T).tocoo()
     lags = np.bincount((covariance.row - covariance.col) % n, covariance.data, n)
     return np.asarray(np.fft.rfft(lags).real / n)
-
-
-def noise_stretch(channel: Channel) -> tuple[float, float] | None:
-    """A quiet stretch of at least `QUIET` samples."""
-    model = noise.estimate(channel)
-    if model.source != "quiet stretch" or model.n < QUIET:
-        return None
-    return model.start, model.stop
 
 
 def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float | None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,12 +23,14 @@ LEAST = 300  # samples of an output that must be there for that
 
 
 def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float, float] | None,
-             notes: list[str], together: int = 1) -> Records:
-    """Recordings in the model's units without outliers, each output with a first noise level.
+             notes: list[str], together: int = 1, levels: Mapping[str, Level] | None = None
+             ) -> Records:
+    """Recordings in the model's units without outliers, each output with a first noise level, or
+    with the one that is known.
 
     Where `together` is more than one, that many samples of an output become one.
     """
-    done, levels = [], []
+    done, every = [], []
     for recording in recordings:
         found: dict[str, Level] = {}
         for output in model.outputs:
@@ -38,10 +41,11 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
                              f"'{output.name}' are left out.")
             if together > 1:
                 recording = recording.with_channels(averaged(recording[output.name], together))
-            found[output.name] = first_level(recording, output.name, quiet)
+            found[output.name] = (levels[output.name] if levels is not None else
+                                  first_level(recording, output.name, quiet))
         done.append(recording)
-        levels.append(found)
-    return Records(tuple(done), tuple(levels))
+        every.append(found)
+    return Records(tuple(done), tuple(every))
 
 
 def oversampling(model: Model, recordings: tuple[Recording, ...]) -> int:

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
-from pikanid.mismatch.detect import unit_columns
-from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted, start_from
-from pikanid.mismatch.tangent import Directions, directions
+from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
+from pikanid.mismatch.screen import Screen, as_strong
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
@@ -21,6 +20,7 @@ LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
+EFFORT = 3000.0  # simulations of the nominal model's cost, after which nothing new is begun
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
 
@@ -44,6 +44,12 @@ class Search:
     tell: Callable[[str], None] = lambda text: None
     predicts: Callable[[Hypothesis, Hypothesis], bool] = lambda fewer, more: True
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
+    spent: float = 0.0
+
+    @property
+    def tired(self) -> bool:
+        """Whether so much has been simulated that what has been found must do."""
+        return self.spent > EFFORT
 
     @property
     def choices(self) -> int:
@@ -64,7 +70,8 @@ class Search:
         if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
             for pair, starts in screen.pairs(PAIRS):
-                self._fit(pair, starts)
+                if not self.tired:
+                    self._fit(pair, starts)
             self._simplify()
         return self.grow(adequate)
 
@@ -72,7 +79,7 @@ class Search:
         """Add effects to the best hypotheses as long as something is left and that helps."""
         for count in range(1, MOST):
             best = self.ranked()[0]
-            if adequate(best):
+            if adequate(best) or self.tired:
                 break
             self.tell(f"{count + 1} effects together")
             leading = [h for h in self.ranked() if h.effects][: LEADING if count == 1 else 1]
@@ -95,7 +102,7 @@ class Search:
         scale = self.scale()
         ranked = self.ranked()
         for h in ranked[:NEAR]:
-            if h.score(scale) < ranked[0].score(scale) + CLOSE:
+            if h.score(scale) < ranked[0].score(scale) + CLOSE and not self.tired:
                 self._with_power_laws(h)
         return self.ranked()
 
@@ -104,6 +111,11 @@ class Search:
         the fit going on where it stood: what led there may have been no more than a way out of a
         local minimum.
         """
+        if self.ranked()[0].far:
+            for closest in self._closest():
+                for effect in closest.effects:
+                    self._fit(tuple(e for e in closest.effects if e is not effect),
+                              [closest.point], again=True)
         for _ in range(MOST):
             best = self.ranked()[0]
             for effect in best.effects:
@@ -112,12 +124,23 @@ class Search:
                     self._fit(rest, [best.point], again=True)
                 for simple in self.candidates:
                     if simple.key in effect.covers and simple.key not in best.key:
-                        size = _as_strong(best, effect, simple)
+                        size = as_strong(best, effect, simple)
                         self._fit((*rest, simple), [
                             {**best.point, simple.parameters[0].name: size * share}
                             for share in (1.0, 2.0)], again=True)
             if self.ranked()[0] is best:
                 break
+
+    def _closest(self) -> list[Hypothesis]:
+        """The hypothesis that fits best of each number of effects from two on, most effects first.
+
+        What a first step out of a large misfit does not see can come to light beside another
+        effect, which then has to go.
+        """
+        several = [h for h in self.fits.values() if len(h.effects) > 1 and h.known]
+        counts = sorted({len(h.effects) for h in several}, reverse=True)
+        return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
+                for n in counts]
 
     def _exchange(self, best: Hypothesis) -> None:
         """Put others in the place of each effect of a hypothesis: rivals that no path led to."""
@@ -145,7 +168,7 @@ class Search:
                 if other.known and effect.key in other.covers:
                     rest = [e for e in best.effects if e is not effect and e is not other]
                     n = {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8)
-                    size = {other.parameters[0].name: _as_strong(best, effect, other, n),
+                    size = {other.parameters[0].name: as_strong(best, effect, other, n),
                             other.parameters[1].name: n}
                     self._fit((*rest, other), [{**best.point, **size}])
 
@@ -178,7 +201,8 @@ class Search:
         if hypothesis.far:
             least = TELLING * hypothesis.minimum.chi2
         for candidate, starts in screen.singles(count, least):
-            self._fit((*hypothesis.effects, candidate), starts)
+            if not self.tired:
+                self._fit((*hypothesis.effects, candidate), starts)
 
     def _fit(self, effects: Sequence[Candidate], starts: Sequence[Start | Mapping[str, float]],
              again: bool = False) -> Hypothesis:
@@ -190,32 +214,13 @@ class Search:
         ordered = sorted(effects, key=lambda e: order[e.key])
         found = fitted(self.nominal, ordered, self.records, starts, self.choices,
                        min((h.minimum.chi2 for h in self.fits.values()), default=np.inf))
+        if found is not None:
+            nominal = self.fits[frozenset()].whitened if self.fits else found.whitened
+            self.spent += found.whitened.work / max(nominal.cost, 1.0)
         if found is not None and (known is None or found.minimum.chi2 < known.minimum.chi2):
             self.fits[key] = found
             return found
         return known or self.fits[frozenset()]
-
-
-EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}
-
-
-def _as_strong(h: Hypothesis, effect: Candidate, other: Candidate, n: float | None = None) -> float:
-    """Size of a law of |v|ⁿ that takes as much energy out of the motion as another one does, or
-    that one's own size where either is no such law.
-    """
-    def exponent(e: Candidate) -> float | None:
-        if e.ids[0] == "power_drag" and e is effect:
-            return h.values[e.parameters[1].name]
-        return n if e.ids[0] == "power_drag" else EXPONENTS.get(e.ids[0])
-
-    size = h.values[effect.parameters[0].name]
-    a, b = exponent(effect), exponent(other)
-    if a is None or b is None:
-        return size
-    at = h.model.state_names.index(effect.site.v)
-    speed = np.concatenate([np.abs(response.states[:, at]) for response in
-                            h.whitened.responses(h.minimum.theta, states=True)])
-    return float(size * np.mean(speed ** (a + 1)) / max(float(np.mean(speed ** (b + 1))), 1e-12))
 
 
 def repeated(r: np.ndarray) -> float:
@@ -225,98 +230,3 @@ def repeated(r: np.ndarray) -> float:
     rho = np.fft.irfft(spectrum)[1:max(n // 4, 2)] / max(float(r @ r), 1e-300)
     # noise alone has ρ² = 1/N
     return max(1.0, 1 + 2 * float(np.sum(rho**2 - 1 / n)))
-
-
-class Screen:
-    """What each candidate would take away from a residual, to first order."""
-
-    def __init__(self, about: Hypothesis, candidates: Sequence[Candidate]):
-        self.about = about
-        self.found: Directions = directions(about.whitened, about.minimum.theta, candidates)
-        self.units, self.lengths = unit_columns(self.found.D, about.minimum.J)
-        # r = ŷ - y: a sign that is present in y shows as its negative
-        self.z = -(self.units.T @ about.minimum.r)
-        good = self.lengths > 0
-        allowed = good & ((self.z > 0) | ~self.found.one_sided)
-        self.gain = np.where(allowed, self.z**2, 0.0)
-        self.names = [f.label for f in about.whitened.problem.free]
-        norms = np.maximum(np.linalg.norm(about.minimum.J, axis=0), 1e-300)
-        # what the parameters take up of each sign, as far as they are told apart
-        scaled = np.linalg.lstsq(about.minimum.J / norms, self.found.D, 1e-8)[0]
-        self.taken = scaled / norms[:, None]
-
-    def best(self, candidate: int, count: int = 1) -> list[int]:
-        """A candidate's most telling signs, no two neighbours."""
-        own = np.flatnonzero(self.found.owner == candidate)
-        chosen: list[int] = []
-        for k in own[np.argsort(-self.gain[own], kind="stable")]:
-            if self.gain[k] > 0 and all(abs(int(k) - c) > 1 for c in chosen):
-                chosen.append(int(k))
-            if len(chosen) == count:
-                break
-        return chosen
-
-    def singles(self, count: int, least: float = 0.0) -> list[tuple[Candidate, list[Start]]]:
-        """The most promising candidates, with the starts of their fits; χ² has to fall by at
-        `least` so much to first order.
-        """
-        several = [self.best(c, 3) for c in range(len(self.found.candidates))]
-        order = sorted((k for k, s in enumerate(several) if s),
-                       key=lambda k: -self.gain[several[k][0]])
-        listed: list[tuple[Candidate, list[Start]]] = []
-        for k in order:
-            if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < 3.0 and listed):
-                break
-            candidate = self.found.candidates[k]
-            signs = several[k] if len(candidate.parameters) > 1 or not self.found.signs[
-                several[k][0]].scales else several[k][:1]
-            listed.append((candidate, [self._start(candidate, s, self.z[s]) for s in signs]))
-        # guards beside the entries, not in their place
-        known = [entry for entry in listed if entry[0].known][:count]
-        return known + [entry for entry in listed if not entry[0].known][:max(count // 3, 1)]
-
-    def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
-        size = float(amplitude / self.lengths[sign])
-        start = start_from(candidate, self.found.signs[sign], size, self.about.point)
-        if not self.found.signs[sign].scales:
-            return start
-        moved = {n: self.about.point[n] - size * float(d)
-                 for n, d in zip(self.names, self.taken[:, sign], strict=True)}
-        return Start({**start.values, **moved}, start.origin)
-
-    def pairs(self, count: int
-              ) -> list[tuple[tuple[Candidate, Candidate], list[Start]]]:
-        """The pairs that take most away together, also where neither does alone."""
-        # a law of free exponent is tried later, in the place of whole ones
-        known = np.array([c.known and not c.covers for c in self.found.candidates])
-        good = np.flatnonzero((self.lengths > 0) & known[self.found.owner])
-        C = self.units[:, good].T @ self.units[:, good]
-        z, owner = self.z[good], self.found.owner[good]
-        rest = 1 - C**2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            first = (z[:, None] - C * z[None, :]) / rest
-            gain = first * z[:, None] + first.T * z[None, :]
-        sided = self.found.one_sided[good]
-        bad = (rest < 1e-4) | (owner[:, None] == owner[None, :]) | (
-            sided[:, None] & (first <= 0)) | (sided[None, :] & (first.T <= 0))
-        gain = np.triu(np.where(bad, 0.0, gain), 1)
-        listed: list[tuple[tuple[Candidate, Candidate], list[Start]]] = []
-        taken: set[tuple[int, int]] = set()
-        for flat in np.argsort(-gain, axis=None, kind="stable")[:4000]:
-            i, j = divmod(int(flat), len(z))
-            pair = (int(owner[i]), int(owner[j]))
-            a, b = (self.found.candidates[k] for k in pair)
-            if gain[i, j] < 6.0 or len(listed) == count:
-                break
-            if pair in taken or (a.twin and a.twin == b.twin):
-                continue
-            taken.add(pair)
-            start = self._start(a, int(good[i]), first[i, j])
-            other = self._start(b, int(good[j]), first[j, i])
-            own = {p.name for p in b.parameters}
-            values, origin = ({**x, **{n: v for n, v in y.items() if n in own}} for x, y in (
-                (start.values, other.values), (start.origin, other.origin)))
-            for n, now in self.about.point.items():
-                values[n] = start.values[n] + other.values[n] - now
-            listed.append(((a, b), [Start(values, origin)]))
-        return listed

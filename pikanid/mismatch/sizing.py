@@ -12,7 +12,7 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import project
 from pikanid.mismatch.hypothesis import Hypothesis, fitted, start_from
 from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.search import Screen
+from pikanid.mismatch.screen import Screen
 from pikanid.mismatch.seen import Sigma
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model

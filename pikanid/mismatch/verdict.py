@@ -73,7 +73,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             reasons[h.key] = "does not predict the held-out recording"
         else:
             given.append(h)
-    given = _parsimonious(given, scale)
+    given = [h for h in given if not _needless(h, near, given, scale)]
     if checked and len(given) > 1:
         given = _by_evidence(given, predict, scale, reasons)
     outside = [h for h in given if not h.known]
@@ -122,10 +122,13 @@ def _handicapped(h: Hypothesis, scale: float) -> float:
     return h.score(scale) + GUARD * sum(not e.known for e in h.effects)
 
 
-def _parsimonious(near: list[Hypothesis], scale: float) -> list[Hypothesis]:
-    """Without those that only add effects to a better one."""
-    return [h for h in near if not any(
-        o.key < h.key and _handicapped(o, scale) <= _handicapped(h, scale) for o in near)]
+def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothesis],
+              scale: float) -> bool:
+    """Whether a hypothesis only adds effects to a better one, or to one that a test refuses but
+    that is far better.
+    """
+    return any(o.key < h.key and _handicapped(o, scale) + (0.0 if o in given else WITHIN)
+               <= _handicapped(h, scale) for o in near)
 
 
 def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:

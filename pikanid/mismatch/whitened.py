@@ -63,6 +63,7 @@ class Whitened:
         self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
         self.steps: list[Steps] = []
         self.rows = self.problem.n_samples
+        self.work = 0.0
 
     def choose_steps(self, theta: np.ndarray, share: float = 0.05, misfit: float = 1.0) -> bool:
         """Steps whose error stays below a share of the noise; False where nothing can be run.
@@ -93,8 +94,17 @@ class Whitened:
 
     def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
         """Simulate every recording, with derivatives by its own parameters."""
+        self.work += self.cost
         return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
                 for r, s in enumerate(self.simulators)]
+
+    @property
+    def cost(self) -> float:
+        """Of a simulation with derivatives: states times steps."""
+        spans = [e.samples[0].t[-1] - e.samples[0].t[0] for e in self.problem.experiments]
+        steps = [max(span / s.longest, len(e.samples[0].t)) for span, s, e in zip(
+            spans, self.steps, self.problem.experiments, strict=True)]
+        return float(len(self.problem.model.states) * np.sum(steps))
 
     def residual(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run."""

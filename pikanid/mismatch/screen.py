@@ -1,0 +1,128 @@
+"""What each candidate promises beside a hypothesis, to first order, and where its fit begins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.detect import unit_columns
+from pikanid.mismatch.hypothesis import Hypothesis, Start, start_from
+from pikanid.mismatch.tangent import Directions, directions
+
+EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}
+
+
+def as_strong(h: Hypothesis, effect: Candidate, other: Candidate, n: float | None = None) -> float:
+    """Size of a law of |v|ⁿ that takes as much energy out of the motion as another one does, or
+    that one's own size where either is no such law.
+    """
+    def exponent(e: Candidate) -> float | None:
+        if e.ids[0] == "power_drag" and e is effect:
+            return h.values[e.parameters[1].name]
+        return n if e.ids[0] == "power_drag" else EXPONENTS.get(e.ids[0])
+
+    size = h.values[effect.parameters[0].name]
+    a, b = exponent(effect), exponent(other)
+    if a is None or b is None:
+        return size
+    at = h.model.state_names.index(effect.site.v)
+    speed = np.concatenate([np.abs(response.states[:, at]) for response in
+                            h.whitened.responses(h.minimum.theta, states=True)])
+    return float(size * np.mean(speed ** (a + 1)) / max(float(np.mean(speed ** (b + 1))), 1e-12))
+
+
+class Screen:
+    """What each candidate would take away from a residual, to first order."""
+
+    def __init__(self, about: Hypothesis, candidates: Sequence[Candidate]):
+        self.about = about
+        self.found: Directions = directions(about.whitened, about.minimum.theta, candidates)
+        self.units, self.lengths = unit_columns(self.found.D, about.minimum.J)
+        # r = ŷ - y: a sign that is present in y shows as its negative
+        self.z = -(self.units.T @ about.minimum.r)
+        good = self.lengths > 0
+        allowed = good & ((self.z > 0) | ~self.found.one_sided)
+        self.gain = np.where(allowed, self.z**2, 0.0)
+        self.names = [f.label for f in about.whitened.problem.free]
+        norms = np.maximum(np.linalg.norm(about.minimum.J, axis=0), 1e-300)
+        # what the parameters take up of each sign, as far as they are told apart
+        scaled = np.linalg.lstsq(about.minimum.J / norms, self.found.D, 1e-8)[0]
+        self.taken = scaled / norms[:, None]
+
+    def best(self, candidate: int, count: int = 1) -> list[int]:
+        """A candidate's most telling signs, no two neighbours."""
+        own = np.flatnonzero(self.found.owner == candidate)
+        chosen: list[int] = []
+        for k in own[np.argsort(-self.gain[own], kind="stable")]:
+            if self.gain[k] > 0 and all(abs(int(k) - c) > 1 for c in chosen):
+                chosen.append(int(k))
+            if len(chosen) == count:
+                break
+        return chosen
+
+    def singles(self, count: int, least: float = 0.0) -> list[tuple[Candidate, list[Start]]]:
+        """The most promising candidates, with the starts of their fits; χ² has to fall by at
+        `least` so much to first order.
+        """
+        several = [self.best(c, 3) for c in range(len(self.found.candidates))]
+        order = sorted((k for k, s in enumerate(several) if s),
+                       key=lambda k: -self.gain[several[k][0]])
+        listed: list[tuple[Candidate, list[Start]]] = []
+        for k in order:
+            if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < 3.0 and listed):
+                break
+            candidate = self.found.candidates[k]
+            signs = several[k] if len(candidate.parameters) > 1 or not self.found.signs[
+                several[k][0]].scales else several[k][:1]
+            listed.append((candidate, [self._start(candidate, s, self.z[s]) for s in signs]))
+        # guards beside the entries, not in their place
+        known = [entry for entry in listed if entry[0].known][:count]
+        return known + [entry for entry in listed if not entry[0].known][:max(count // 3, 1)]
+
+    def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
+        size = float(amplitude / self.lengths[sign])
+        start = start_from(candidate, self.found.signs[sign], size, self.about.point)
+        if not self.found.signs[sign].scales:
+            return start
+        moved = {n: self.about.point[n] - size * float(d)
+                 for n, d in zip(self.names, self.taken[:, sign], strict=True)}
+        return Start({**start.values, **moved}, start.origin)
+
+    def pairs(self, count: int
+              ) -> list[tuple[tuple[Candidate, Candidate], list[Start]]]:
+        """The pairs that take most away together, also where neither does alone."""
+        # a law of free exponent is tried later, in the place of whole ones
+        known = np.array([c.known and not c.covers for c in self.found.candidates])
+        good = np.flatnonzero((self.lengths > 0) & known[self.found.owner])
+        C = self.units[:, good].T @ self.units[:, good]
+        z, owner = self.z[good], self.found.owner[good]
+        rest = 1 - C**2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = (z[:, None] - C * z[None, :]) / rest
+            gain = first * z[:, None] + first.T * z[None, :]
+        sided = self.found.one_sided[good]
+        bad = (rest < 1e-4) | (owner[:, None] == owner[None, :]) | (
+            sided[:, None] & (first <= 0)) | (sided[None, :] & (first.T <= 0))
+        gain = np.triu(np.where(bad, 0.0, gain), 1)
+        listed: list[tuple[tuple[Candidate, Candidate], list[Start]]] = []
+        taken: set[tuple[int, int]] = set()
+        for flat in np.argsort(-gain, axis=None, kind="stable")[:4000]:
+            i, j = divmod(int(flat), len(z))
+            pair = (int(owner[i]), int(owner[j]))
+            a, b = (self.found.candidates[k] for k in pair)
+            if gain[i, j] < 6.0 or len(listed) == count:
+                break
+            if pair in taken or (a.twin and a.twin == b.twin):
+                continue
+            taken.add(pair)
+            start = self._start(a, int(good[i]), first[i, j])
+            other = self._start(b, int(good[j]), first[j, i])
+            own = {p.name for p in b.parameters}
+            values, origin = ({**x, **{n: v for n, v in y.items() if n in own}} for x, y in (
+                (start.values, other.values), (start.origin, other.origin)))
+            for n, now in self.about.point.items():
+                values[n] = start.values[n] + other.values[n] - now
+            listed.append(((a, b), [Start(values, origin)]))
+        return listed
