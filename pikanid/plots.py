@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -169,9 +169,14 @@ def stroke(k: int, scale: float = 1.0) -> dict[str, Any]:
     return {"color": COLOURS[k], "linewidth": scale * WIDTHS[k], "linestyle": DASHES[k]}
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure [inch] that pyplot knows nothing of and that a notebook shows."""
-    return _shown()(figsize=(width, height), layout="constrained")
+def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained",
+               dpi: float | None = None) -> Figure:
+    """An empty figure [inch] that pyplot knows nothing of and that a notebook shows.
+
+    >>> new_figure(4.0, 3.0)._repr_png_()[1:4]
+    b'PNG'
+    """
+    return _shown()(figsize=(width, height), layout=layout, dpi=dpi)
 
 
 def image(figure: Figure, ending: str = ".png") -> bytes:

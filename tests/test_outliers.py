@@ -119,3 +119,13 @@ def test_friction_is_found_beyond_the_hills_between() -> None:
         assert found is not None
         assert found.values[size] == pytest.approx(c, rel=0.01)
         assert found.minimum.chi2 < 1.3 * 300
+
+
+def test_two_neighbours_do_not_hide_each_other() -> None:
+    t = np.arange(500) / 100.0
+    residual = SIGMA * noise(500, seed=2)
+    residual[[219, 220]] += np.array([12.0, 15.0]) * SIGMA
+    whole = Recording.from_arrays(t, {"y": residual})
+    records, count = without_lone(Records((whole,), ({},)), [(0, "y", t, residual)])
+    gone = np.flatnonzero(np.isnan(records.recordings[0]["y"].values))
+    assert {219, 220} <= set(gone.tolist()) and count == len(gone) <= 3

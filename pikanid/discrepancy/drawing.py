@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pikanid.plots import new_figure
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -19,12 +21,8 @@ LINE, FAINT, BAND = "#0072B2", "#777777", "#BBBBBB"
 
 def draw(found: Discrepancy) -> Figure:
     """One axes an edge: value, 95 % band, and below it how often each value was visited."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     count = len(found.edges)
-    figure = Figure(figsize=(4.0 * count, 3.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(4.0 * count, 3.6)
     for k, edge in enumerate(found.edges):
         axes = figure.add_subplot(1, count, k + 1)
         colour = LINE if edge.significant else FAINT

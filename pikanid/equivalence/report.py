@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pikanid.plots import new_figure
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -124,10 +126,8 @@ class EquivalenceReport:
 
     def plot(self) -> Figure:
         """Every difference on a logarithmic axis: agreements, their bounds, and controls."""
-        from matplotlib.figure import Figure
-
         labels = list(dict.fromkeys((row.must_differ, _label(row)) for row in self.rows))
-        figure = Figure(figsize=(10.0, 1.0 + 0.28 * len(labels)), layout="constrained")
+        figure = new_figure(10.0, 1.0 + 0.28 * len(labels))
         axes = figure.add_subplot()
         floor = 1e-17
         for height, (differs, label) in enumerate(labels):

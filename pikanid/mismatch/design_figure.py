@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pikanid.plots import COLOURS, DASHES, DPI
+from pikanid.plots import COLOURS, DASHES, DPI, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -14,12 +14,10 @@ if TYPE_CHECKING:
 
 def design_figure(chosen: NextExperiment) -> Figure:
     """Inputs above, the foretold outputs of every hypothesis below."""
-    from matplotlib.figure import Figure
-
     inputs = list(chosen.profile.channels.values())
     outputs = list(next(iter(chosen.responses.values())))
     rows = len(inputs) + len(outputs)
-    figure = Figure(figsize=(8.0, 1.2 + 1.7 * rows), dpi=DPI, layout="constrained")
+    figure = new_figure(8.0, 1.2 + 1.7 * rows, dpi=DPI)
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     for axis, channel in zip(axes, inputs, strict=False):
         axis.step(channel.time, channel.values, where="post", color="0.2", linewidth=1.0)

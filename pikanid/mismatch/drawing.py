@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pikanid.plots import new_figure
+
 if TYPE_CHECKING:
     import matplotlib.figure
 
@@ -20,10 +22,8 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
     with a held-out recording, its prediction before and after and what each leaves; at the bottom
     the missing force over states and inputs, with its 95 % band.
     """
-    from matplotlib.figure import Figure
-
     rows = 1 if dx.held_out is None else 3
-    figure = Figure(figsize=(9.0, 2.6 * (rows + (dx.shape is not None))), layout="constrained")
+    figure = new_figure(9.0, 2.6 * (rows + (dx.shape is not None)))
     upper: matplotlib.figure.FigureBase = figure
     if dx.shape is not None:
         upper, lower = figure.subfigures(

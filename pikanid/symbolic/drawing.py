@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pikanid.plots import new_figure
 from pikanid.symbolic.composed import Place
 from pikanid.symbolic.named import NamedEdge
 
@@ -29,15 +30,11 @@ def draw(reading: Reading, *paths: str | Path) -> Figure:
     share of its layer's contribution.  Files are written in the format of their endings (.png,
     .svg, .pdf).
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     layers = 1 + max(layer for layer, _, _ in reading.edges)
     by_layer = [sorted(p for p in reading.edges if p[0] == k) for k in range(layers)]
     height = max(2, *(len(places) for places in by_layer)) * ROW + 0.7
     width = layers * COLUMN + 1.6
-    figure = Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, height, None)
     back = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     back.set_xlim(0.0, width)
     back.set_ylim(0.0, height)
