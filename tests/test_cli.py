@@ -461,6 +461,7 @@ def in_a_terminal(words: list[str], **environment: str) -> bytes:
                           capture_output=True, env=env).stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_a_terminal_gets_progress_and_colour_unless_refused(recorded: str, tmp_path: Path) -> None:
     words = ["identify", str(tmp_path / recorded), "-m", "sloshing", "--sigma", "0.1deg"]

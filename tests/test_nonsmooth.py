@@ -129,6 +129,7 @@ def test_touch_between_two_steps_is_not_missed(wall: float) -> None:
     assert np.abs(found.sensitivity[:, 0] - expected).max() < 1e-2 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_endless_switching_ends_with_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     """At rest on a jump of the force itself every instant is a switch: it is said, not looped."""
     monkeypatch.setattr("pikanid.simulation.simulator.FINEST", 1)
