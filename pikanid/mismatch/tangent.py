@@ -165,41 +165,18 @@ class Tangent:
         """δx (L, n, m) by the classical Runge-Kutta method: over dozens of periods small errors of
         phase would look like damping.  Forces in cubics between stops, inputs held.
         """
-        h = np.diff(self.t)[:, None, None]
-        A = [h * fx for fx, _ in self.thirds]
-        F = [h * (f + u) for f, u in zip(
-            (force[:-1], _middle(force), force[1:]), held, strict=True)]
-        few = A[0][::max(len(h) // 50, 1)]
+        from pikanid.mismatch.affine import follow
+
+        h = np.diff(self.t)
+        A = np.stack([fx for fx, _ in self.thirds])
+        F = np.stack([f + u for f, u in zip(
+            (force[:-1], _middle(force), force[1:]), held, strict=True)])
+        every = max(len(h) // 50, 1)
+        few = h[::every, None, None] * A[0, ::every]
         fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))
         # states that forget within a step need shorter ones
         parts = min(max(int(np.ceil(fastest / STABLE)), 1), MOST_PARTS)
-        over, gain = np.broadcast_to(np.eye(A[0].shape[1]), A[0].shape), np.zeros_like(F[0])
-        for k in range(parts):
-            shares = (k + np.array([0.0, 0.5, 1.0])) / parts
-            one, more = _stepped(*([_parabola(X, s) / parts for s in shares] for X in (A, F)))
-            over, gain = one @ over, one @ gain + more
-        out = np.empty((len(self.t), *start.shape))
-        out[0] = start
-        for k in range(len(h)):
-            out[k + 1] = over[k] @ out[k] + gain[k]
-        return out
-
-
-def _parabola(X: Sequence[np.ndarray], s: float) -> np.ndarray:
-    """The parabola through values at the left end, the middle and the right end, at share s."""
-    return np.asarray((1 - s) * (1 - 2 * s) * X[0] + 4 * s * (1 - s) * X[1]
-                      + s * (2 * s - 1) * X[2])
-
-
-def _stepped(A: Sequence[np.ndarray], F: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """One Runge-Kutta step of x' = A x + F over unit time: x becomes Φ x + g, for all steps."""
-    eye = np.eye(A[0].shape[1])
-    B = A[1] @ (eye + A[0] / 2)
-    C = A[1] @ (eye + B / 2)
-    over = eye + (A[0] + 2 * B + 2 * C + A[2] @ (eye + C)) / 6
-    second = A[1] @ F[0] / 2 + F[1]
-    third = A[1] @ second / 2 + F[1]
-    return over, (F[0] + 2 * second + 2 * third + A[2] @ third + F[2]) / 6
+        return np.asarray(follow(A, F, h, start, parts))
 
 
 def _middle(rows: np.ndarray) -> np.ndarray:
