@@ -105,7 +105,9 @@ def lags(site: Site) -> list[Candidate]:
 
     def seen(view: View) -> list[Sign]:
         # a first guess of the right size matters: far shorter lags are stiff
-        return [Sign({tau.name: s}, seen=_lagged(view.t, view.y[o], s) - view.y[o],
+        from pikanid.mismatch.recurrences import lagged
+
+        return [Sign({tau.name: s}, seen=lagged(view.t, view.y[o], s) - view.y[o],
                      one_sided=True, null=0.0) for s in LAGS]
 
     found = [Candidate(("sensor_lag",), "a lag of the sensor", f"{o} behind a lag {tau.name}",
@@ -115,30 +117,14 @@ def lags(site: Site) -> list[Candidate]:
         t_u = Parameter(site.name("tau_a"), 0.01, "s", (2e-4, 5.0))
 
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[Sign]:
-            return [Sign({t_u.name: s}, push={u: _lagged(view.t, view.u[u], s, True) - view.u[u]},
+            from pikanid.mismatch.recurrences import lagged
+
+            return [Sign({t_u.name: s}, push={u: lagged(view.t, view.u[u], s, True) - view.u[u]},
                          one_sided=True, null=0.0) for s in LAGS]
 
         found.append(_input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),
                             f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name))
     return found
-
-
-def _lagged(t: np.ndarray, y: np.ndarray, tau: float, held: bool = False) -> np.ndarray:
-    """A first-order lag of a signal; of a held one the mean over each step."""
-    out = np.empty(len(y))
-    out[0] = state = y[0]
-    for k, h in enumerate(np.diff(t)):
-        keep = np.exp(-h / tau)
-        if held:
-            out[k] = y[k] + (state - y[k]) * (1 - keep) * tau / h
-            state = y[k] + (state - y[k]) * keep
-        else:
-            slope = (y[k + 1] - y[k]) / h
-            state = (state - y[k] + slope * tau) * keep + y[k + 1] - slope * tau
-            out[k + 1] = state
-    if held:
-        out[-1] = state
-    return out
 
 
 def _input(site: Site, u: str, identifier: str, name: str, parameters: tuple[Parameter, ...],

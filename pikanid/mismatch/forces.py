@@ -165,33 +165,20 @@ def hysteresis(site: Site) -> list[Candidate]:
         return model.with_state(State(z), loop).with_term(site.v, f"-{b.name}*{z}")
 
     def signs(view: View) -> list[Sign]:
+        from pikanid.mismatch.recurrences import bouc_wen
+
         v = view.x[site.v]
         if np.all(v >= 0) or np.all(v <= 0):
             return []  # without a return there is no loop
         top = float(np.abs(view.x[site.q]).max(initial=1e-9))
         found = []
         for share in (0.02, 0.06, 0.15, 0.4):
-            path = _loop(view.x[site.q] / (share * top))
+            path = bouc_wen(view.x[site.q] / (share * top))
             found.append(Sign({b.name: 1.0, d.name: share * top}, force=-path, one_sided=True))
         return found
 
     return [Candidate(("hysteresis",), "hysteresis (Bouc-Wen)", f"-{b.name}*{z}", "dynamics", site,
                       (b, d), extend, signs, variant="bouc_wen")]
-
-
-def _loop(q: np.ndarray) -> np.ndarray:
-    """Bouc and Wen's z along q, both in units of the yield displacement: dz = dq (1 - sgn(dq) z)
-    when loaded further, dz = dq when unloaded; exact along straight lines.
-    """
-    z = np.zeros(len(q))
-    for k, dq in enumerate(np.diff(q)):
-        sense, now = np.sign(dq), np.sign(dq) * z[k]
-        free = min(abs(dq), max(-now, 0.0))
-        now += free
-        z[k + 1] = sense * (1 - (1 - now) * np.exp(-(abs(dq) - free)) if now >= 0 else now)
-        if dq == 0:
-            z[k + 1] = z[k]
-    return z
 
 
 def boundary_layer(site: Site) -> list[Candidate]:

@@ -20,7 +20,7 @@ LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
-EFFORT = 3000.0  # simulations of the nominal model's cost, after which nothing new is begun
+EFFORT = 1.2e7  # states times steps simulated, after which nothing new is begun
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
 
@@ -215,8 +215,7 @@ class Search:
         found = fitted(self.nominal, ordered, self.records, starts, self.choices,
                        min((h.minimum.chi2 for h in self.fits.values()), default=np.inf))
         if found is not None:
-            nominal = self.fits[frozenset()].whitened if self.fits else found.whitened
-            self.spent += found.whitened.work / max(nominal.cost, 1.0)
+            self.spent += found.whitened.work
         if found is not None and (known is None or found.minimum.chi2 < known.minimum.chi2):
             self.fits[key] = found
             return found

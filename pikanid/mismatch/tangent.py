@@ -141,36 +141,36 @@ class Tangent:
     def _columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
         L, n, m = len(self.t), self.x.shape[1], len(listed)
         force, start = np.zeros((L, n, m)), np.zeros((n, m))
-        held = [np.zeros((L - 1, n, m)) for _ in self.thirds]
         seen = np.zeros((L, len(self.model.outputs), m))
         places = {s: i for i, s in enumerate(self.model.state_names)}
         inputs = {i: j for j, i in enumerate(self.model.input_names)}
         for k, (candidate, sign) in enumerate(listed):
             if sign.force is not None:
                 force[:, places[candidate.site.v], k] += sign.force
-            for name, du in sign.push.items():
-                for block, (_, fu) in zip(held, self.thirds, strict=True):
-                    block[:, :, k] += fu[:, :, inputs[name]] * du[:-1, None]
             if sign.seen is not None:
                 o = self.model.output_names.index(candidate.site.output.name)
                 seen[:, o, k] += sign.seen
             for name, value in sign.initial.items():
                 start[places[name], k] = value
-        state = self._integrated(force, held, start)
+        F = np.empty((3, L - 1, n, m))
+        F[0], F[1], F[2] = force[:-1], _middle(force), force[1:]
+        for k, (_, sign) in enumerate(listed):
+            for name, du in sign.push.items():
+                for block, (_, fu) in zip(F, self.thirds, strict=True):
+                    block[:, :, k] += fu[:, :, inputs[name]] * du[:-1, None]
+        state = self._integrated(F, start)
         y = np.einsum("lqn,lnm->lqm", self.hx, state) + seen
         return y[self.stop, self.output]
 
-    def _integrated(self, force: np.ndarray, held: Sequence[np.ndarray], start: np.ndarray
-                    ) -> np.ndarray:
+    def _integrated(self, F: np.ndarray, start: np.ndarray) -> np.ndarray:
         """δx (L, n, m) by the classical Runge-Kutta method: over dozens of periods small errors of
-        phase would look like damping.  Forces in cubics between stops, inputs held.
+        phase would look like damping.  Forces F (3, L-1, n, m) are cubics between stops, inputs
+        held.
         """
-        from pikanid.mismatch.affine import follow
+        from pikanid.mismatch.recurrences import follow
 
         h = np.diff(self.t)
         A = np.stack([fx for fx, _ in self.thirds])
-        F = np.stack([f + u for f, u in zip(
-            (force[:-1], _middle(force), force[1:]), held, strict=True)])
         every = max(len(h) // 50, 1)
         few = h[::every, None, None] * A[0, ::every]
         fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))

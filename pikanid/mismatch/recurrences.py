@@ -1,6 +1,4 @@
-"""Many linear systems that share their matrix, integrated at once.
-
-    X' = A(t) X + F(t),      X (n, m)
+"""What goes on step by step along a motion: linear systems, lags, and loops of hysteresis.
 
 Imported where it is used: numba takes its time.
 """
@@ -14,7 +12,8 @@ from numba import njit
 @njit(cache=True)
 def follow(A: np.ndarray, F: np.ndarray, h: np.ndarray, start: np.ndarray, parts: int
            ) -> np.ndarray:
-    """X (L, n, m) by the classical Runge-Kutta method.
+    """Many linear systems that share their matrix, X' = A(t) X + F(t): X (L, n, m) by the classical
+    Runge-Kutta method.
 
     Args:
         A: (3, L-1, n, n) at the left end, the middle and the right end of each step; a parabola
@@ -67,3 +66,45 @@ def follow(A: np.ndarray, F: np.ndarray, h: np.ndarray, start: np.ndarray, parts
                     probe[i, j] = x[i, j]
         out[k + 1] = x
     return out
+
+
+@njit(cache=True)
+def lagged(t: np.ndarray, y: np.ndarray, tau: float, held: bool = False) -> np.ndarray:
+    """A first-order lag tau of y (L,) at times t; of a held signal the mean over each step."""
+    out = np.empty(len(y))
+    state = y[0]
+    out[0] = state
+    for k in range(len(t) - 1):
+        h = t[k + 1] - t[k]
+        keep = np.exp(-h / tau)
+        if held:
+            out[k] = y[k] + (state - y[k]) * (1 - keep) * tau / h
+            state = y[k] + (state - y[k]) * keep
+        else:
+            slope = (y[k + 1] - y[k]) / h
+            state = (state - y[k] + slope * tau) * keep + y[k + 1] - slope * tau
+            out[k + 1] = state
+    if held:
+        out[-1] = state
+    return out
+
+
+@njit(cache=True)
+def bouc_wen(q: np.ndarray) -> np.ndarray:
+    """Bouc and Wen's z along q (L,), q in units of the yield displacement: dz = dq (1 - sgn(dq) z)
+    when loaded further, dz = dq when unloaded; exact along straight lines.
+    """
+    z = np.zeros(len(q))
+    for k in range(len(q) - 1):
+        dq = q[k + 1] - q[k]
+        if dq == 0:
+            z[k + 1] = z[k]
+            continue
+        sense = 1.0 if dq > 0 else -1.0
+        now = sense * z[k]
+        free = min(abs(dq), max(-now, 0.0))
+        now += free
+        if now >= 0:
+            now = 1 - (1 - now) * np.exp(-(abs(dq) - free))
+        z[k + 1] = sense * now
+    return z
