@@ -1,7 +1,7 @@
 """How good are diagnoses?  Open sets of concealed recordings, scored: `reports/diagnosis.md`.
 
     python benchmarks/report_diagnosis.py [FOLDER] [--work build/diagnosis] [--cases 60]
-        [--workers 2] [--only rich ...] [--alarms 400]
+        [--workers 2] [--only rich ...] [--alarms 400] [--recordings silverbox ...]
 
 Every set is made from its seed, every diagnosis is kept in the work folder: an interrupted run goes
 on where it stopped.  Nothing of the truth reaches a diagnosis.
@@ -13,7 +13,7 @@ import argparse
 import json
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -61,6 +61,8 @@ def main() -> None:
     parser.add_argument("--alarms", type=int, default=400,
                         help="clean recordings of each noise; 0 for none")
     parser.add_argument("--only", choices=[s.name for s in SETS], action="append")
+    parser.add_argument("--recordings", choices=list(diagnosis_real.RECORDINGS), nargs="*",
+                        default=list(diagnosis_real.RECORDINGS), help="real ones to diagnose")
     given = parser.parse_args()
     chosen = [s for s in SETS if not given.only or s.name in given.only]
     parts = ["# Diagnoses of concealed recordings\n", provenance(), INTRODUCTION]
@@ -69,14 +71,15 @@ def main() -> None:
     if given.alarms:
         parts.append(diagnosis_alarms.section(given.alarms, given.work, given.workers))
     if not given.only:
-        parts.append(_real(given.work))
+        parts.append(_real(given.work, given.recordings))
     atomically(given.folder / "diagnosis.md", "\n".join(parts).encode())
 
 
-def _real(work: Path) -> str:
+def _real(work: Path, names: Sequence[str]) -> str:
     """Rows of the recordings that are there."""
     rows, missing = [], []
-    for name, make in diagnosis_real.RECORDINGS.items():
+    for name in names:
+        make = diagnosis_real.RECORDINGS[name]
         kept = work / "real" / f"{name}.json"
         try:
             if not kept.exists():
