@@ -39,6 +39,7 @@ def run(folder: Path, length: float) -> dict[str, object]:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_second_process_compiles_nothing(tmp_path: Path) -> None:
     first = run(tmp_path, 0.045)
     assert first["misses"] == 1

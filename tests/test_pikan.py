@@ -191,7 +191,7 @@ BLAST = {"name": "blast", "states": {"x": {"initial": 1.0}},
     ("tank", {}), ("tank", {"width": (1, 3, 1)}), ("tank", {"protocol": "paper"}),
     pytest.param("blast", {}, marks=pytest.mark.slow),
     pytest.param("blast", {"width": (1, 3, 1)}, marks=pytest.mark.slow),
-    ("blast", {"protocol": "paper"})])
+    pytest.param("blast", {"protocol": "paper"}, marks=pytest.mark.slow)])
 def test_a_model_that_is_not_finite_on_the_way(name: str, options: dict[str, object]) -> None:
     """Noise around an empty tank asks for the root of a negative number; exp overflows."""
     t = np.arange(0, 2.2, 0.02)
