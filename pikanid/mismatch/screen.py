@@ -11,7 +11,7 @@ from pikanid.mismatch.detect import unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis, Start, start_from
 from pikanid.mismatch.tangent import Directions, directions
 
-EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}
+EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # of |v|, that have names
 
 
 def as_strong(h: Hypothesis, effect: Candidate, other: Candidate, n: float | None = None) -> float:

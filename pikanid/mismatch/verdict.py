@@ -12,12 +12,12 @@ from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut
 from pikanid.mismatch.result import Explanation, NamedEffect, Verdict, values_of
+from pikanid.mismatch.screen import EXPONENTS
 from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
-WHOLE = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # exponents that have names
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
 OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
 PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
@@ -207,8 +207,8 @@ def _merged(known: list[Hypothesis], tried: Sequence[Hypothesis]
                 if group(o) == group(e):
                     table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.ids)))
         for e in h.effects:
-            power = _power_law(h, e, tried) if e.ids[0] in WHOLE else None
-            if leader is h and power and _open_exponent(power, WHOLE[e.ids[0]]):
+            power = _power_law(h, e, tried) if e.ids[0] in EXPONENTS else None
+            if leader is h and power and _open_exponent(power, EXPONENTS[e.ids[0]]):
                 table[e.key] += ("power_drag",)
                 absorbed.add(power.key)
             if leader is h and e.ids[0] == "hysteresis" and (

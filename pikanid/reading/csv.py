@@ -45,6 +45,7 @@ def read(content: bytes, where: str, delimiter: str | None, decimal: str | None)
     delimiter = delimiter or _delimiter(lines[:_SAMPLE], where)
     rows, numbers = _split(lines, numbers, delimiter, where)
     rows, numbers = _squared(rows, numbers, where)
+    # rows of text are rows of objects, which lists are too strict to say
     return from_rows(where, rows, numbers, decimal or _decimal(rows, delimiter))  # type: ignore[arg-type]
 
 

@@ -119,7 +119,8 @@ def _quick(cells: Sequence[object], decimal: str) -> Array | None:
         if decimal == ",":
             if any("." in cell for cell in cells):  # type: ignore[operator]  # caught below
                 return None
-            cells = [cell.replace(",", ".") for cell in cells]  # type: ignore[attr-defined]
+            cells = [cell.replace(",", ".") for cell in cells]  # type: ignore[attr-defined]  # likewise
+        # what is no text ends in the except clause
         values = np.array([float(cell) if cell != "" else np.nan for cell in cells])  # type: ignore[arg-type]
     except (ValueError, TypeError, AttributeError, OverflowError):
         return None

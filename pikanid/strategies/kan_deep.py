@@ -135,6 +135,7 @@ def deep_fit(setup: Setup, start: RelaxedFit, shape: Shape, lam: float | None,
 def _concluded(setup: Setup, system: BorderedSystem, stop: Stop, grid: KanGrid,
                lam: float) -> RelaxedFit:
     at = stop.at
+    # of both it reads the data's rows, which networks and splines share
     sandwich, naive, effective = network_covariance(
         system, at, lambda count: row_noise(system.functional, at, count))  # type: ignore[arg-type]
     std = np.sqrt(np.diag(sandwich))
