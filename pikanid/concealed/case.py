@@ -14,6 +14,7 @@ from pikanid.concealed import excitations, files
 from pikanid.concealed import noise as noises
 from pikanid.concealed.deck import FLOW, Card
 from pikanid.concealed.effect import Effect, Scales
+from pikanid.concealed.effects import CATALOGUE
 from pikanid.concealed.experiment import Experiment
 from pikanid.concealed.noise import Noise
 from pikanid.concealed.rig import Rig
@@ -71,7 +72,8 @@ class _Hidden:
 
     train: Rig | Tank
     held_out: Rig | Tank
-    effects: list[dict[str, object]]
+    parts: tuple[Effect, ...]
+    entries: list[dict[str, object]]
     sizes: Sequence[Mapping[str, float]] = ()
 
 
@@ -110,15 +112,14 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     recordings = {
         f"{order.name}_{key}.csv": files.csv(experiments[key], noise.spoilt(clean[key], rng))
         for key in ("train", "held_out")}
-    seen = visibility(clean["train"], train, noise, base, order.card.effects, scales,
-                      hidden.sizes)
+    seen = visibility(clean["train"], train, noise, base, hidden.parts, scales, hidden.sizes)
     later = nominal_fit(noise.whitened(clean["held_out"]), held_out, noise, base).distance
     return Case(recordings, {
         "id": order.name, "class": order.card.kind,
         "files": {key: f"{order.name}_{key}.csv" for key in experiments},
         "sha256": {name: hashlib.sha256(data).hexdigest() for name, data in recordings.items()},
         "excitation": {key: e.kind for key, e in experiments.items()},
-        "base": _base_entry(base), "noise": noise.to_dict(), "effects": hidden.effects,
+        "base": _base_entry(base), "noise": noise.to_dict(), "effects": hidden.entries,
         "visibility": _visibility_entry(seen, later),
         "nameable": _nameable(order.card.effects, seen)})
 
@@ -163,7 +164,7 @@ def _in_rig(card: Card, base: Rig, train: Experiment, scales: Scales, noise: Noi
             later = effect.applied(later, afterwards)
         entries.append(_effect_entry(effect, values, afterwards))
         sizes.append(values)
-    return _Hidden(now, later, entries, sizes)
+    return _Hidden(now, later, card.effects, entries, sizes)
 
 
 def _effect_entry(effect: Effect, values: Mapping[str, float],
@@ -190,12 +191,24 @@ def _tank(rng: np.random.Generator) -> Tank:
 
 
 def _in_tank(tank: Tank) -> _Hidden:
-    numbers = {"radius": (tank.radius, "m"), "depth": (tank.depth, "m"),
-               "contact_line": (tank.contact_line, "m"), "tilt": (tank.tilt, "rad"),
-               **{f"zeta_{k + 1}": (ratio, "") for k, ratio in enumerate(tank.ratios)}}
-    listed = {name: {"value": value, "unit": unit} for name, (value, unit) in numbers.items()}
-    entry = {**_effect_entry(FLOW, {}, {}), "parameters": listed, "parameters_held_out": listed}
-    return _Hidden(tank, tank, [entry])
+    """A held contact line is dry friction, and a tilt a static bias: effects of their own."""
+    flow = {"radius": (tank.radius, "m"), "depth": (tank.depth, "m"),
+            **{f"zeta_{k + 1}": (ratio, "") for k, ratio in enumerate(tank.ratios)}}
+    found = [(FLOW, flow)]
+    if tank.contact_line:
+        found.append((_entry_of("coulomb_friction"), {"contact_line": (tank.contact_line, "m")}))
+    if tank.tilt:
+        found.append((_entry_of("static_bias"), {"tilt": (tank.tilt, "rad")}))
+    entries = []
+    for effect, numbers in found:
+        listed = {name: {"value": value, "unit": unit} for name, (value, unit) in numbers.items()}
+        entries.append({**_effect_entry(effect, {}, {}), "parameters": listed,
+                        "parameters_held_out": listed})
+    return _Hidden(tank, tank, tuple(effect for effect, _ in found), entries)
+
+
+def _entry_of(identifier: str) -> Effect:
+    return next(e for e in CATALOGUE if e.id == identifier)
 
 
 def _base_entry(base: Rig) -> dict[str, object]:

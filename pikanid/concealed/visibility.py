@@ -8,7 +8,7 @@ model is at least 5σ away and the best rival that is no twin at least 4σ.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -138,19 +138,31 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
     if true_effects and nominal.distance > 1.0:
         contest.enter(clean, nominal, rivals)
     without = [nominal.distance] * len(true_effects)
-    if len(true_effects) == 2 and nominal.distance > 1.0:
-        for k, (other, kept) in enumerate((true_effects, true_effects[::-1])):
-            half = Candidate((kept,), scales, experiment, noise, Rig())
-            at = [np.array([base.length, base.damping, *(own[q.name] for q in kept.quantities)])
-                  for own, effect in zip(sizes, true_effects, strict=False) if effect is kept]
-            fit = contest.alone(half, nominal, kept, at)
+    if len(true_effects) > 1 and nominal.distance > 1.0:
+        drawn = {effect: own for own, effect in zip(sizes, true_effects, strict=False)}
+        for k, other in enumerate(true_effects):
+            kept = [e for e in true_effects if e is not other and e.kind == "catalogue"]
+            part, fit = clean, nominal
+            for effect in kept:
+                part = replace(part, effects=(*part.effects, effect))
+                fit = contest.alone(part, fit, effect, _at_truth(part.effects, base, drawn))
             without[k] = fit.distance
-            others = [c for c in CATALOGUE
-                      if is_rival(c, other) and c.id != kept.id and c.id not in kept.twins]
-            contest.enter(half, fit, others, *IN_PAIRS)
+            same = {name for e in kept for name in (e.id, *e.twins)}
+            others = [c for c in CATALOGUE if is_rival(c, other) and c.id not in same]
+            if kept:
+                contest.enter(part, fit, others, *IN_PAIRS)
     names, distance = contest.winner()
     return Visibility(nominal.distance, names, min(distance, nominal.distance), tuple(without),
                       float(nominal.values[0]), float(nominal.values[1]))
+
+
+def _at_truth(effects: Sequence[Effect], base: Rig,
+              drawn: Mapping[Effect, Mapping[str, float]]) -> list[Array]:
+    """The true values as a start (at most one), where all are known."""
+    if not all(effect in drawn for effect in effects):
+        return []
+    return [np.array([base.length, base.damping,
+                      *(drawn[e][q.name] for e in effects for q in e.quantities)])]
 
 
 class _Contest:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,7 @@ SINGLES, PAIRS = 14, 8  # refits of one effect, of two at once
 MORE, LATER = 6, 4  # of one more beside one, beside two or three
 LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
+PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
 EFFORT = 1.2e7  # states times steps simulated, after which nothing new is begun
@@ -94,17 +95,22 @@ class Search:
         self._simplify()
         best = self.ranked()[0]
         if adequate(best):
-            # what a test of everything misses may still be worth its penalty
+            # what a test of everything misses may still be worth its penalty, or nearly
             price = float(np.log(best.whitened.rows) + 2 * np.log(self.choices))
-            self._extend(best, LATER, self.scale() * price)
-            self._exchange(best)
+            self._extend(best, LATER, self.scale() * (price - CLOSE))
+            for h in self._contenders():
+                self._exchange(h)
             self._simplify()
-        scale = self.scale()
-        ranked = self.ranked()
+        for h in self._contenders():
+            self._with_power_laws(h)
+        return self.ranked()
+
+    def _contenders(self) -> Iterator[Hypothesis]:
+        """The hypotheses that score about as well as the best."""
+        scale, ranked = self.scale(), self.ranked()
         for h in ranked[:NEAR]:
             if h.score(scale) < ranked[0].score(scale) + CLOSE and not self.tired:
-                self._with_power_laws(h)
-        return self.ranked()
+                yield h
 
     def _simplify(self) -> None:
         """Leave each effect of the best hypothesis out, or put a law that it contains in its place,
@@ -148,7 +154,8 @@ class Search:
             rest = tuple(e for e in best.effects if e is not effect)
             without = self._fit(rest, [best.point])
             if without.key == frozenset(e.key for e in rest):
-                self._extend(without, MORE)
+                gap = without.minimum.chi2 - best.minimum.chi2
+                self._extend(without, MORE, PROMISING * gap)
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""

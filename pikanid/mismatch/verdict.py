@@ -124,11 +124,14 @@ def _handicapped(h: Hypothesis, scale: float) -> float:
 
 def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothesis],
               scale: float) -> bool:
-    """Whether a hypothesis only adds effects to a better one, or to one that a test refuses but
-    that is far better.
+    """Whether a hypothesis adds effects to a far better one, or laws outside the catalogue to a
+    better one.
+
+    One more effect of the catalogue that is nearly worth its penalty may be there: then it is for
+    the reader to know.
     """
-    return any(o.key < h.key and _handicapped(o, scale) + (0.0 if o in given else WITHIN)
-               <= _handicapped(h, scale) for o in near)
+    return any(o.key < h.key and _handicapped(o, scale) + (
+        0.0 if o in given and not h.known else WITHIN) <= _handicapped(h, scale) for o in near)
 
 
 def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
