@@ -629,6 +629,12 @@ def spline_knots_unsorted() -> str:
     return "The knots of a spline must be finite and must not decrease: sort them."
 
 
+def outside_spline(start: float, stop: float) -> str:
+    return (
+        f"A spline from {start:g} to {stop:g} s has no value outside: ask for times between them."
+    )
+
+
 def degree_too_low(degree: int, order: int) -> str:
     return (
         f"Splines of degree {degree} have no derivative of order {order} to compare with the "

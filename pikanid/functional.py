@@ -19,7 +19,7 @@ from scipy import sparse
 from pikanid import errors
 from pikanid.adequacy import difference_noise
 from pikanid.approximators import Array
-from pikanid.approximators.tables import Table, anchor
+from pikanid.approximators.tables import Table, anchor, side_by_side
 from pikanid.chains import Chains
 from pikanid.evaluated import delays
 from pikanid.expressions import symbol
@@ -110,7 +110,7 @@ class Functional:
 
     def states(self, sites: Sites, coefficients: Array) -> Array:
         """Approximated states (M, n) at the sites."""
-        return _side_by_side(sites.states, coefficients)
+        return side_by_side(sites.states, coefficients)
 
     def rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> list[Rows]:
         """All residual families of recording r with derivatives: data, physics, start."""
@@ -141,7 +141,7 @@ class Functional:
         p = self.problem.parameters(theta, r)
         positions, _ = self.problem.columns(r)
         weight = np.sqrt(lam) / self.scale * sites.weight
-        tops = _side_by_side(sites.tops, c)
+        tops = side_by_side(sites.tops, c)
         if self.penalty == "roughness":
             return Rows(weight * tops, None, weight, None)
         f, fx, fp = self.vector_field.rhs_linearised(
@@ -185,13 +185,6 @@ class Functional:
             borders.append(np.vstack(border))
         return sparse.csr_array(sparse.hstack(
             [sparse.block_diag(blocks), sparse.csr_array(np.vstack(borders))]))
-
-
-def _side_by_side(tables: Sequence[Table], coefficients: Array) -> Array:
-    values = np.empty((tables[0].t.size, len(tables)))
-    for k, table in enumerate(tables):
-        values[:, k] = table.values(coefficients)
-    return values
 
 
 def bind(problem: Problem, vector_field: VectorField, chains: Chains,

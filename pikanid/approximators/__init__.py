@@ -67,3 +67,18 @@ def local_rows(matrix: sparse.csr_array) -> tuple[NDArray[np.int64], Array]:
     width = matrix.nnz // rows if rows else 0
     first = matrix.indices[::width].astype(np.int64) if width else np.zeros(rows, np.int64)
     return first, np.asarray(matrix.data, dtype=float).reshape(rows, width)
+
+
+def local_matrix(first: NDArray[np.int64], values: Array, n: int) -> sparse.csr_array:
+    """Put a local basis matrix (M, n) together again from first columns (M,), values (M, width).
+
+    >>> local_matrix(np.array([0, 1]), np.array([[1.0, 2.0], [3.0, 4.0]]), 3).toarray()
+    array([[1., 2., 0.],
+           [0., 3., 4.]])
+    """
+    rows, width = values.shape
+    columns = (first[:, None] + np.arange(width)).ravel()
+    pointers = width * np.arange(rows + 1)
+    if max(rows * width, n) < 2**31:
+        columns, pointers = columns.astype(np.int32), pointers.astype(np.int32)
+    return sparse.csr_array((values.ravel(), columns, pointers), shape=(rows, n))

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.interpolate import BSpline as SciPyBSpline
 
 from pikanid import errors
+from pikanid.approximators import local_matrix
 
 Array = NDArray[np.float64]
 
@@ -78,43 +78,21 @@ class BSpline:
 
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis matrix or its time derivative at ``t`` (M,): csr (M, n_basis), degree + 1 a row."""
-        t = np.asarray(t, dtype=float)
-        if derivative == 0:
-            return SciPyBSpline.design_matrix(t, self.knots, self.degree)
         first, values = self.local(t, derivative)
-        rows, width = values.shape
-        columns = first[:, None] + np.arange(width)
-        pointers = width * np.arange(rows + 1)
-        if max(rows * width, self.n_basis) < 2**31:
-            columns, pointers = columns.astype(np.int32), pointers.astype(np.int32)
-        return sparse.csr_array(
-            (values.ravel(), columns.ravel(), pointers), shape=(rows, self.n_basis)
-        )
+        return local_matrix(first, values, self.n_basis)
 
     def local(self, t: Array, derivative: int = 0) -> tuple[NDArray[np.int64], Array]:
         """First basis function that is not zero at ``t`` (M,), and degree + 1 values (M, degree+1).
 
-        Derivatives follow B'_{i,k} = k (B_{i,k-1}/(ξ_{i+k}-ξ_i) - B_{i+1,k-1}/(ξ_{i+k+1}-ξ_{i+1}))
-        (de Boor, A Practical Guide to Splines, ch. X), from SciPy's basis of lower degree.
+        Raises:
+            ValueError: If a time lies outside [start, stop].
         """
-        low = self.degree - derivative
-        if low < 0:
-            first, _ = self.local(t, 0)
-            return first, np.zeros((t.size, self.degree + 1))
-        # The outermost knots carry nothing of lower degree, and would hide the last piece.
-        inner = self.knots[derivative : self.knots.size - derivative]
-        matrix = SciPyBSpline.design_matrix(t, inner, low)
-        values = matrix.data.reshape(t.size, low + 1)
-        first = matrix.indices[:: low + 1].astype(np.int64) + derivative
-        for degree in range(low + 1, self.degree + 1):
-            # Column a of `values` is basis function first + a of degree - 1.
-            index = first[:, None] + np.arange(degree)
-            span = self.knots[index + degree] - self.knots[index]
-            scaled = degree * np.divide(values, span, out=np.zeros_like(values), where=span > 0)
-            values = np.zeros((t.size, degree + 1))
-            values[:, 1:] = scaled
-            values[:, :-1] -= scaled
-            first = first - 1
+        from pikanid.approximators.local_basis import tabulate
+
+        t = np.array(t, dtype=float)  # writeable and contiguous: one compiled form serves all
+        first, values = np.empty(t.size, np.int64), np.empty((t.size, self.degree + 1))
+        if not tabulate(self.knots, self.degree, derivative, t, first, values):
+            raise ValueError(errors.outside_spline(self.start, self.stop))
         return first, values
 
     def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from pikanid.approximators import Approximator, Array, LinearApproximator, is_linear, local_rows
+from pikanid.approximators import (
+    Approximator,
+    Array,
+    LinearApproximator,
+    is_linear,
+    local_matrix,
+    local_rows,
+)
+from pikanid.approximators.bspline import BSpline
 
 Matrix = Array | sparse.csr_array
 
@@ -25,7 +34,6 @@ class Table:
     t: Array = field(repr=False)
     derivative: int
     part: slice
-    matrix: sparse.csr_array | None = field(repr=False, default=None)
     first: NDArray[np.int64] | None = field(repr=False, default=None)
     local: Array | None = field(repr=False, default=None)
 
@@ -35,23 +43,18 @@ class Table:
         """Tabulate; a linear approximator is evaluated here once and for all."""
         if not is_linear(approximator):
             return Table(approximator, t, derivative, part)
-        matrix = approximator.basis(t, derivative)
-        first, local = local_rows(matrix)
-        return Table(approximator, t, derivative, part, matrix, first + part.start, local)
+        first, local = _window(approximator, t, derivative)
+        return Table(approximator, t, derivative, part, first + part.start, local)
 
     def values(self, coefficients: Array) -> Array:
         """Values (M,) for a recording's coefficients (n,)."""
-        own = coefficients[self.part]
-        if self.matrix is not None:
-            return self.matrix @ own
-        assert isinstance(self.approximator, Approximator)
-        return self.approximator.values(self.t, own, self.derivative)
+        return side_by_side([self], coefficients)[:, 0]
 
-    @property
+    @functools.cached_property
     def basis(self) -> sparse.csr_array:
         """The tabulated basis (M, n_part) of a linear approximator."""
-        assert self.matrix is not None
-        return self.matrix
+        first, local = self.window
+        return local_matrix(first - self.part.start, local, self.part.stop - self.part.start)
 
     @property
     def window(self) -> tuple[NDArray[np.int64], Array]:
@@ -61,10 +64,32 @@ class Table:
 
     def jacobian(self, coefficients: Array) -> Matrix:
         """Derivative of `values` by the approximator's own coefficients (M, n_part)."""
-        if self.matrix is not None:
-            return self.matrix
+        if self.local is not None:
+            return self.basis
         assert isinstance(self.approximator, Approximator)
         return self.approximator.jacobian(self.t, coefficients[self.part], self.derivative)
+
+
+def side_by_side(tables: Sequence[Table], coefficients: Array) -> Array:
+    """Values (M, len(tables)) of tables at the same times."""
+    from pikanid.approximators.local_basis import weigh
+
+    out = np.empty((tables[0].t.size, len(tables)))
+    for k, table in enumerate(tables):
+        if table.first is not None and table.local is not None:
+            weigh(table.first, table.local, coefficients, out, k)
+        else:
+            assert isinstance(table.approximator, Approximator)
+            own = coefficients[table.part]
+            out[:, k] = table.approximator.values(table.t, own, table.derivative)
+    return out
+
+
+def _window(approximator: LinearApproximator, t: Array, derivative: int
+            ) -> tuple[NDArray[np.int64], Array]:
+    if isinstance(approximator, BSpline):
+        return approximator.local(t, derivative)
+    return local_rows(approximator.basis(t, derivative))
 
 
 def gauss_nodes(breakpoints: Array, points: int) -> tuple[Array, Array]:
@@ -107,7 +132,7 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
     for approximator, length in zip(approximators, lengths, strict=True):
         if not is_linear(approximator):
             return None
-        windows = [local_rows(approximator.basis(at, q)) for q in range(length)]
+        windows = [_window(approximator, at, q) for q in range(length)]
         rows = np.vstack([values for _, values in windows])
         decisive = np.abs(np.triu(rows, 1)) <= 1e-9 * np.abs(rows).max(axis=1, keepdims=True)
         if not decisive.all() or any(first[0] for first, _ in windows):

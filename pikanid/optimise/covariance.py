@@ -74,6 +74,8 @@ def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
 
 def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[Array]:
     """Derivative (N, b) of every weighted data family by θ, the coefficients following θ."""
+    from pikanid.approximators.local_basis import add_weighed
+
     functional, responses = system.functional, []
     for r, part in enumerate(functional.parts):
         columns, block = system.columns[r], at.blocks[r]
@@ -87,7 +89,7 @@ def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[A
             assert row.by_theta is not None
             own = row.by_theta[:, 0].copy()
             for table, by_state in _met(sites, row):
-                own += by_state * (table.basis @ follow[table.part])
+                add_weighed(*table.window, by_state, follow, own)
             full = np.zeros((sites.t.size, at.point.theta.size))
             full[:, columns] = own
             responses.append(full)
@@ -95,10 +97,10 @@ def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[A
 
 
 def _met(sites: Sites, rows: Rows) -> Iterator[tuple[Table, Array]]:
-    """Tables of the states that a data family depends on, and the slopes (M, 1) by them."""
+    """Tables of the states that a data family depends on, and the slopes (M,) by them."""
     assert rows.by_state is not None
     for s, table in enumerate(sites.states):
-        by_state = rows.by_state[:, 0, s, None]
+        by_state = rows.by_state[:, 0, s]
         if by_state.any():
             yield table, by_state
 
@@ -108,6 +110,8 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
 
     Exact for up to 300 samples, else from at most 32 fixed random probes (Hutchinson, 1990).
     """
+    from pikanid.approximators.local_basis import scatter_weighed
+
     functional = system.functional
     rows = functional.n_data
     if rows <= EXACT_UP_TO:
@@ -128,7 +132,7 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
             probe = probes[first:first + sites.t.size]
             first += sites.t.size
             for table, by_state in _met(sites, row):
-                pulled[table.part] += table.basis.T @ (by_state * probe)
+                scatter_weighed(*table.window, by_state, probe, pulled)
             pulled_theta += row.by_theta[:, 0].T @ probe
         pulled = pulled[system.assemblers[r].order]
         k = part.held.size

@@ -1,0 +1,101 @@
+"""Compiled sums over local bases: `width` functions live at a time, consecutive ones.
+
+A sparse matrix says the same in more general terms; on a short recording, to build one and to look
+up its product takes longer than the sums themselves.  Compiled once and kept on disk by numba,
+which is why this module is imported only where it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numba import njit
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _compiled(function: _Function) -> _Function:
+    return cast(_Function, njit(cache=True, error_model="numpy", nogil=True)(function))
+
+
+@_compiled
+def tabulate(knots: np.ndarray, degree: int, derivative: int, t: np.ndarray, first: np.ndarray,
+             values: np.ndarray) -> bool:
+    """B-splines that live at t (M,), or their derivative; False where a time has none.
+
+    Fills first (M,), the first of them, and values (M, degree + 1).  Of degree - derivative by the
+    recurrence of Cox and de Boor, then up again by
+        B'_{i,k} = k (B_{i,k-1}/(ξ_{i+k}-ξ_i) - B_{i+1,k-1}/(ξ_{i+k+1}-ξ_{i+1}))
+    (de Boor, A Practical Guide to Splines, ch. X).  From the right at knots, from the left at the
+    last one.
+    """
+    count = knots.size - degree - 1
+    start, stop, low = knots[degree], knots[count], degree - derivative
+    spans = knots[:count + 1]
+    j = degree
+    for m in range(t.size):
+        x = t[m]
+        if not (start <= x <= stop):
+            return False
+        if not (knots[j] <= x < knots[j + 1]):
+            j = (np.searchsorted(spans, x) if x == stop else
+                 np.searchsorted(spans, x, side="right")) - 1
+        row = values[m]
+        first[m] = j - degree
+        if low < 0:
+            row[:] = 0.0
+            continue
+        row[0] = 1.0
+        for order in range(1, low + 1):
+            carried = 0.0
+            for i in range(order):
+                left, right = knots[j + 1 + i - order], knots[j + 1 + i]
+                share = row[i] / (right - left)
+                row[i] = carried + (right - x) * share
+                carried = (x - left) * share
+            row[order] = carried
+        for order in range(low + 1, degree + 1):
+            carried = 0.0
+            for i in range(order):
+                share = order * row[i] / (knots[j + 1 + i] - knots[j + 1 + i - order])
+                row[i] = carried - share
+                carried = share
+            row[order] = carried
+    return True
+
+
+@_compiled
+def weigh(first: np.ndarray, local: np.ndarray, c: np.ndarray, out: np.ndarray,
+          column: int) -> None:
+    """out[m, column] = Σ_a local[m, a] c[first[m] + a]."""
+    for m in range(first.size):
+        total, at = 0.0, first[m]
+        for a in range(local.shape[1]):
+            total += local[m, a] * c[at + a]
+        out[m, column] = total
+
+
+@_compiled
+def add_weighed(first: np.ndarray, local: np.ndarray, weight: np.ndarray, c: np.ndarray,
+                out: np.ndarray) -> None:
+    """out[m] += weight[m] Σ_a local[m, a] c[first[m] + a], for rows out (M, q) and c (n, q)."""
+    for m in range(first.size):
+        at = first[m]
+        for a in range(local.shape[1]):
+            share = weight[m] * local[m, a]
+            for k in range(out.shape[1]):
+                out[m, k] += share * c[at + a, k]
+
+
+@_compiled
+def scatter_weighed(first: np.ndarray, local: np.ndarray, weight: np.ndarray, rows: np.ndarray,
+                    out: np.ndarray) -> None:
+    """out[first[m] + a] += weight[m] local[m, a] rows[m], for rows (M, q) and out (n, q)."""
+    for m in range(first.size):
+        at = first[m]
+        for a in range(local.shape[1]):
+            share = weight[m] * local[m, a]
+            for k in range(rows.shape[1]):
+                out[at + a, k] += share * rows[m, k]
