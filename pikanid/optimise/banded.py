@@ -2,11 +2,12 @@
 
 A residual at time t touches only the degree + 1 coefficients that live there, so JᵀJ is a band with
 a border of a few columns, and everything below costs O(N) time and memory.  Rows between the same
-two knots share their columns; they are multiplied out together, one small dense product a stretch.
+two knots share their columns: a stretch of them is summed up before it goes to its place.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,12 +26,16 @@ ROWS_AT_ONCE = 32_768
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """Some consecutive rows of one family, grouped by the coefficients they touch."""
+    """The rows of one family, grouped by the coefficients that they touch."""
 
-    rows: slice  # which times of the family
-    by_length: tuple[tuple[Ints | None, Ints], ...]  # (times (g, L) or None = all, groups (g,))
-    part: slice  # coefficients touched, in band order
-    places: NDArray[np.int32]  # (G, pairs): where products go in the flattened (span, kd + b + 2)
+    starts: Ints  # (G + 1,): first row of each group
+    columns: Ints  # (G, w): the coefficients, in band order
+
+    def pieces(self) -> Iterator[tuple[Ints, Ints]]:
+        """Consecutive groups of some `ROWS_AT_ONCE` rows: their starts and columns."""
+        cuts = np.searchsorted(self.starts, np.arange(0, self.starts[-1], ROWS_AT_ONCE))
+        for first, last in pairwise([*np.unique(cuts).tolist(), self.starts.size - 1]):
+            yield self.starts[first:last + 1], self.columns[first:last]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +46,6 @@ class Windows:
     tops: tuple[slice, ...]
     width: int
     firsts: tuple[Ints, ...]  # first coefficient (M,) of each chain
-
-    def pairs(self, b: int) -> tuple[Ints, Ints]:
-        """Which of the products of w + b + 1 columns are kept: those of w with w, of w with b + 1.
-
-        Of the symmetric ones the lower half.
-        """
-        one, other = np.tril_indices(self.width)
-        local, beside = np.divmod(np.arange(self.width * (b + 1)), b + 1)
-        return np.append(one, local), np.append(other, self.width + beside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,70 +75,43 @@ class BandedAssembler:
         position = np.empty(self.n, dtype=np.int64)
         position[self.order] = np.arange(self.n)
         self.windows = [_windows(sites) for sites in families]
-        self.pairs = [windows.pairs(b) for windows in self.windows]
-        groups = [_columns(windows, position) for windows in self.windows]
-        self.bandwidth = max(
-            int((columns.max(axis=1) - columns.min(axis=1)).max()) for _, columns in groups)
-        self.stretches = [self._stretches(windows.width, starts, columns)
-                          for windows, (starts, columns) in zip(self.windows, groups, strict=True)]
-
-    def _stretches(self, w: int, starts: Ints, columns: Ints) -> list[Stretches]:
-        """Cut a family into pieces of some `ROWS_AT_ONCE` rows, at changes of the coefficients."""
-        cuts = np.searchsorted(starts, np.arange(0, starts[-1], ROWS_AT_ONCE))
-        cuts = np.unique(np.append(cuts, starts.size - 1))
-        a, b = np.tril_indices(w)
-        beside = self.bandwidth + 1 + np.arange(self.b + 1)
-        stride = beside[-1] + 1
-        out = []
-        for first, last in pairwise(cuts):
-            base, end = int(columns[first:last].min()), int(columns[first:last].max()) + 1
-            own = columns[first:last] - base
-            one, other = own[:, a], own[:, b]
-            band = np.minimum(one, other) * stride + np.abs(one - other)
-            right = (own[:, :, None] * stride + beside).reshape(len(own), -1)
-            out.append(Stretches(slice(int(starts[first]), int(starts[last])),
-                                 _by_length(starts[first:last + 1] - starts[first]),
-                                 slice(base, end),
-                                 np.hstack([band, right]).astype(np.int32)))
-        return out
+        self.stretches = [_stretches(windows, position) for windows in self.windows]
+        self.bandwidth = max(int(np.ptp(own.columns, axis=1).max()) for own in self.stretches)
+        self.pieces = [list(own.pieces()) for own in self.stretches]
 
     def normal(self, families: list[Sites], rows: list[Rows]) -> BandedNormal:
         """Assemble JᵀJ and Jᵀr from the residual families."""
+        from pikanid.optimise.banded_products import add_products
+
         b, kd = self.b, self.bandwidth
         whole, corner = np.zeros((self.n, kd + b + 2)), np.zeros((b + 1, b + 1))
-        costs = []
-        for pieces, windows, pairs, sites, row in zip(
-                self.stretches, self.windows, self.pairs, families, rows, strict=True):
-            cost = 0.0
-            for piece in pieces:
-                gram = _gram(piece, _stack(windows, sites, row, piece.rows, b))
-                into = whole[piece.part]
-                into += np.bincount(piece.places.ravel(), gram[:, *pairs].ravel(),
-                                    into.size).reshape(into.shape)
-                total = gram[:, windows.width:, windows.width:].sum(axis=0)
-                corner += total
-                cost += float(total[b, b])
-            costs.append(cost)
+        costs, before = [], 0.0
+        for pieces, windows, sites, row in zip(
+                self.pieces, self.windows, families, rows, strict=True):
+            for starts, columns in pieces:
+                stacked = _stack(windows, sites, row, slice(int(starts[0]), int(starts[-1])), b)
+                add_products(stacked, starts, columns, kd, whole, corner)
+            cost = float(corner[b, b])
+            costs.append(cost - before)
+            before = cost
         return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs))
 
 
 def _stack(windows: Windows, sites: Sites, rows: Rows, part: slice, b: int) -> Array:
-    """[∂r/∂local coefficients, ∂r/∂θ, r] (M + 1, E, w + b + 1) of some rows of a family.
+    """[∂r/∂local coefficients, ∂r/∂θ, r] (m, E, w + b + 1) of some rows of a family."""
+    from pikanid.optimise.banded_products import spread, spread_top
 
-    The last row is zero: it fills up the stretches that are shorter than others.
-    """
     residual, w = rows.residual[part], windows.width
-    stacked = np.zeros((residual.shape[0] + 1, residual.shape[1], w + b + 1))
-    out = stacked[:-1]
+    stacked = np.zeros((*residual.shape, w + b + 1))
     if rows.by_state is not None:
         for s, (table, at) in enumerate(zip(sites.states, windows.states, strict=True)):
-            out[:, :, at] += rows.by_state[part, :, s, None] * table.window[1][part, None, :]
+            spread(table.window[1], rows.by_state, s, part.start, at.start, stacked)
     if rows.by_top is not None:
         for e, (table, at) in enumerate(zip(sites.tops, windows.tops, strict=True)):
-            out[:, e, at] += rows.by_top[part, e, None] * table.window[1][part]
+            spread_top(table.window[1], rows.by_top, e, part.start, at.start, stacked)
     if rows.by_theta is not None:
-        out[:, :, w:w + b] = rows.by_theta[part]
-    out[:, :, -1] = residual
+        stacked[:, :, w:w + b] = rows.by_theta[part]
+    stacked[:, :, -1] = residual
     return stacked
 
 
@@ -160,35 +129,15 @@ def _windows(sites: Sites) -> Windows:
                    tuple(places[table.part.start] for table in sites.tops), width, tuple(firsts))
 
 
-def _by_length(begins: Ints) -> tuple[tuple[Ints | None, Ints], ...]:
-    """Stretches (G,) of like length together, each with the times of its rows.
-
-    Like means that the longest is at most half as long again: the others repeat the time that
-    stands for a row of zeros.
-    """
-    lengths = np.diff(begins)
-    if np.all(lengths == lengths[0]):
-        return ((None, np.arange(lengths.size)),)
-    found: list[tuple[Ints | None, Ints]] = []
-    left = lengths.copy()
-    while longest := int(left.max()):
-        which = np.flatnonzero(3 * left >= 2 * longest)
-        step = np.arange(longest)
-        inside = step < lengths[which, None]
-        found.append((np.where(inside, begins[which, None] + step, begins[-1]), which))
-        left[which] = 0
-    return tuple(found)
-
-
-def _columns(windows: Windows, position: Ints) -> tuple[Ints, Ints]:
-    """Starts of the stretches (G + 1,) and the coefficients each touches (G, w), in band order."""
+def _stretches(windows: Windows, position: Ints) -> Stretches:
+    """Where the coefficients that rows touch change, and their places in band order."""
     firsts = np.column_stack(windows.firsts)
     changes = np.flatnonzero(np.any(np.diff(firsts, axis=0) != 0, axis=1)) + 1
     starts = np.concatenate([[0], changes, [firsts.shape[0]]]).astype(np.int64)
     sizes = {at.start: at.stop - at.start for at in (*windows.states, *windows.tops)}
     columns = [firsts[starts[:-1], i][:, None] + np.arange(size)
                for i, size in enumerate(sizes.values())]
-    return starts, position[np.concatenate(columns, axis=1)]
+    return Stretches(starts, position[np.concatenate(columns, axis=1)])
 
 
 def _interleave(part: Part, n: int) -> Ints:
@@ -199,14 +148,3 @@ def _interleave(part: Part, n: int) -> Ints:
         free = table.part.start + np.flatnonzero(key[table.part] == 0.0)
         key[free] = (np.arange(free.size) + 0.5) / free.size
     return np.argsort(key, kind="stable").astype(np.int64)
-
-
-def _gram(stretches: Stretches, stacked: Array) -> Array:
-    """Products VᵀV (G, W, W) of every stretch of stacked rows V (M + 1, E, W)."""
-    width = stacked.shape[2]
-    out = np.empty((len(stretches.places), width, width))
-    for times, groups in stretches.by_length:
-        rows = stacked[:-1] if times is None else np.take(stacked, times, axis=0)
-        v = rows.reshape(groups.size, -1, width)
-        out[groups] = np.matmul(v.transpose(0, 2, 1), v)
-    return out

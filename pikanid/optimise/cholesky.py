@@ -1,13 +1,14 @@
-"""Cholesky factors of symmetric positive definite matrices, banded or small, straight from LAPACK.
+"""Cholesky factors of symmetric positive definite matrices, banded or small.
 
-SciPy's and NumPy's own functions check, convert and dispatch: on a short recording that takes
-longer than the algebra.
+Straight from LAPACK or compiled here: SciPy's and NumPy's own functions check, convert and
+dispatch, which takes longer than the algebra on a short recording.
 """
 
 from __future__ import annotations
 
+import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.linalg.lapack import dpbtrf, dpbtrs, dposv, dtbtrs
+from scipy.linalg.lapack import dpbtrf, dposv, dtbtrs
 
 from pikanid.approximators import Array
 
@@ -27,12 +28,14 @@ def factor_band(band: Array) -> Array:
 def solve_band(factor: Array, columns: Array) -> Array:
     """A⁻¹ of columns (n, q), A given by its factor.
 
-    >>> import numpy as np
     >>> solve_band(factor_band(np.array([[4.0, 5.0], [2.0, 0.0]])), np.array([[8.0], [12.0]]))
     array([[1.],
            [2.]])
     """
-    solved, _ = dpbtrs(factor, columns, lower=1)
+    from pikanid.optimise.banded_products import substitute
+
+    solved = np.array(columns, dtype=float, order="C")
+    substitute(factor, solved)
     return solved
 
 

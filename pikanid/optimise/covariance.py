@@ -6,6 +6,7 @@ covariance Σ, Cov = Zᵀ J_dᵀ Σ J_d Z, Z the θ columns of M⁻¹ (White, Ec
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -37,24 +38,31 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
     meat = np.zeros_like(bread)
     variance, count = 0.0, 0
     for jacobian, deviation in zip(data_response(system, at, step), noise, strict=True):
-        scaled = jacobian * np.reshape(deviation, (-1, 1))
-        meat += scaled.T @ scaled
-        variance += float(np.sum(np.broadcast_to(deviation, jacobian.shape[:1]) ** 2))
-        count += jacobian.shape[0]
+        rows = jacobian.shape[0]
+        if isinstance(deviation, float):
+            meat += deviation**2 * (jacobian.T @ jacobian)
+            variance += rows * deviation**2
+        else:
+            scaled = jacobian * deviation[:, None]
+            meat += scaled.T @ scaled
+            variance += float(deviation @ deviation)
+        count += rows
     sandwich, naive = bread @ meat @ bread, bread * (variance / count)
-    unseen = np.flatnonzero(inside & (np.diag(step.schur) <= 0.0))
+    unseen = np.flatnonzero(inside & (step.schur.diagonal() <= 0.0))
     sandwich[unseen, unseen] = naive[unseen, unseen] = np.inf
     return sandwich, naive
 
 
 def inside_bounds(system: BandedSystem, at: Linearisation) -> NDArray[np.bool_]:
     """Which parameters (b,) are not at a bound."""
-    problem, theta = system.functional.problem, at.point.theta
-    return ~(_meets(theta, problem.lower) | _meets(theta, problem.upper))
+    problem, theta = system.functional.problem, at.point.theta.tolist()
+    # plain numbers: for a few parameters NumPy takes longer
+    return np.array([not (_meets(q, low) or _meets(q, high)) for q, low, high in zip(
+        theta, problem.lower.tolist(), problem.upper.tolist(), strict=True)], dtype=bool)
 
 
-def _meets(theta: Array, bound: Array) -> NDArray[np.bool_]:
-    return np.abs(theta - bound) <= np.where(np.isfinite(bound), 1e-6 * np.abs(bound), -1.0)
+def _meets(value: float, bound: float) -> bool:
+    return math.isfinite(bound) and abs(value - bound) <= 1e-6 * abs(bound)
 
 
 def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:

@@ -79,6 +79,7 @@ class _Functions:
         self.exprs = exprs
         self.values = {name: self._vector(e) for name, e in exprs.items()}
         self._tables: dict[str, Any] = {}
+        self._plans: dict[tuple[str, tuple[int, ...], tuple[int, ...]], Any] = {}
 
     def arguments(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
                   ) -> list[np.ndarray]:
@@ -135,16 +136,15 @@ class _Functions:
                    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         places, function, edges = self._table(name)
         count, n, values = len(t), len(self.x), len(self.exprs[name])
-        row_at = {row: k for k, row in enumerate(rows)}
-        column_at = {int(column): k for k, column in enumerate(free)}
-        jx, jp = np.zeros((count, len(rows), n)), np.zeros((count, len(rows), len(free)))
+        row_at, column_at, by_state, by_parameter = self._plan(
+            name, tuple(rows), tuple(np.asarray(free).tolist()))
+        jx, jp = np.zeros((count, len(row_at), n)), np.zeros((count, len(row_at), len(column_at)))
         with np.errstate(all="ignore"):
             found = function(*self.arguments(t, x, u, p))
-        for (row, column), value in zip(places, found[values:], strict=False):
-            if row in row_at and column < n:
-                jx[:, row_at[row], column] = value
-            elif row in row_at and column - n in column_at:
-                jp[:, row_at[row], column_at[column - n]] = value
+        for k, row, column in by_state:
+            jx[:, row, column] = found[k]
+        for k, row, column in by_parameter:
+            jp[:, row, column] = found[k]
         inner = found[values + len(places):]
         for (row, index, order), z, weight in zip(
                 edges, inner, inner[len(edges):], strict=False):
@@ -157,6 +157,20 @@ class _Functions:
             jp[:, row_at[row], [column_at[first + k] for k in own]] += np.reshape(
                 np.broadcast_to(weight, (count,)), (-1, 1)) * basis[:, own]
         return _columns([found[row] for row in rows], count), jx, jp
+
+    def _plan(self, name: str, rows: tuple[int, ...], free: tuple[int, ...]) -> Any:
+        """Where rows and parameters stand, and (entry, row, column) of ∂/∂x and ∂/∂p wanted."""
+        if (name, rows, free) not in self._plans:
+            row_at = {row: k for k, row in enumerate(rows)}
+            column_at = {column: k for k, column in enumerate(free)}
+            n, values = len(self.x), len(self.exprs[name])
+            wanted = [(values + k, row_at[row], column)
+                      for k, (row, column) in enumerate(self._table(name)[0]) if row in row_at]
+            self._plans[name, rows, free] = (
+                row_at, column_at, [entry for entry in wanted if entry[2] < n],
+                [(k, row, column_at[column - n]) for k, row, column in wanted
+                 if column - n in column_at])
+        return self._plans[name, rows, free]
 
     def _table(self, name: str) -> Any:
         if name not in self._tables:

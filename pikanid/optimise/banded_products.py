@@ -1,0 +1,98 @@
+"""Compiled sums for the normal equations of local bases.
+
+Compiled once and kept on disk by numba, which is why this module is imported only where it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numba import njit
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _compiled(function: _Function) -> _Function:
+    return cast(_Function, njit(cache=True, error_model="numpy", nogil=True)(function))
+
+
+@_compiled
+def spread(local: np.ndarray, slopes: np.ndarray, state: int, begin: int, at: int,
+           stacked: np.ndarray) -> None:
+    """Add ∂r/∂x of one state, by its local basis (M, width), to columns at, at + 1, ...
+
+    slopes (M, E, n) and the basis count from `begin`, stacked (m, E, W) from zero.
+    """
+    for m in range(stacked.shape[0]):
+        for e in range(stacked.shape[1]):
+            slope = slopes[begin + m, e, state]
+            if slope != 0.0:  # an output mostly shows one state only
+                for a in range(local.shape[1]):
+                    stacked[m, e, at + a] += slope * local[begin + m, a]
+
+
+@_compiled
+def spread_top(local: np.ndarray, slopes: np.ndarray, e: int, begin: int, at: int,
+               stacked: np.ndarray) -> None:
+    """The same for the highest derivative of chain e, slopes (M, E), in residual e alone."""
+    for m in range(stacked.shape[0]):
+        slope = slopes[begin + m, e]
+        for a in range(local.shape[1]):
+            stacked[m, e, at + a] += slope * local[begin + m, a]
+
+
+@_compiled
+def add_products(stacked: np.ndarray, starts: np.ndarray, columns: np.ndarray, kd: int,
+                 whole: np.ndarray, corner: np.ndarray) -> None:
+    """Add VᵀV of rows V = stacked (M, E, W), stretch g being rows starts[g] to starts[g + 1].
+
+    Of its W columns the first w are the coefficients columns[g] (G, w).  Their products with each
+    other go to the band, with the others behind it: whole (n, kd + 1 + W - w); those of the others
+    to corner (W - w, W - w).
+    """
+    begin, w, width = starts[0], columns.shape[1], stacked.shape[2]
+    gram = np.empty((width, width))
+    for g in range(columns.shape[0]):
+        gram[:] = 0.0
+        for m in range(starts[g] - begin, starts[g + 1] - begin):
+            for e in range(stacked.shape[1]):
+                row = stacked[m, e]
+                for i in range(width):
+                    left = row[i]
+                    for j in range(i + 1):
+                        gram[i, j] += left * row[j]
+        for i in range(w):
+            one = columns[g, i]
+            for j in range(i + 1):
+                other = columns[g, j]
+                whole[min(one, other), abs(one - other)] += gram[i, j]
+            for k in range(w, width):
+                whole[one, kd + 1 + k - w] += gram[k, i]
+        for k in range(w, width):
+            for j in range(w, width):
+                corner[k - w, j - w] += gram[max(k, j), min(k, j)]
+
+
+@_compiled
+def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
+    """Solve LLᵀ x = b in place for columns (n, q), L the lower band factor (kd + 1, n).
+
+    Row by row, all columns at once: LAPACK takes them one after the other.
+    """
+    size, reach, count = factor.shape[1], factor.shape[0], columns.shape[1]
+    for j in range(size):
+        pivot = 1.0 / factor[0, j]
+        for c in range(count):
+            columns[j, c] *= pivot
+        for k in range(1, min(reach, size - j)):
+            for c in range(count):
+                columns[j + k, c] -= factor[k, j] * columns[j, c]
+    for j in range(size - 1, -1, -1):
+        for k in range(1, min(reach, size - j)):
+            for c in range(count):
+                columns[j, c] -= factor[k, j] * columns[j + k, c]
+        pivot = 1.0 / factor[0, j]
+        for c in range(count):
+            columns[j, c] *= pivot
