@@ -18,6 +18,7 @@ from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.force_shape import force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
+from pikanid.mismatch.latent_force import force_over_time
 from pikanid.mismatch.locate import locate, smallest
 from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.preparation import (
@@ -267,24 +268,24 @@ def _with_sigma(records: Records, model: Model) -> list[Recording]:
 def _diagnosis(case: Case, detection: Detection, answer: Answer, alpha: float, begun: float
                ) -> Diagnosis:
     best = answer.given[0] if answer.given else case.base
-    after = case.before
-    if answer.given:
-        after = as_estimate(best, case.before)
+    after = as_estimate(best, case.before) if answer.given else case.before
     proof = _proof(case, best)
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
     levels = [f"Noise of '{o}': sigma = {level.sigma:.3g}"
               + (f", correlation {level.rho:.2f} between neighbours" if level.rho else ", white")
               + f", from {level.source}."
               for levels in case.records.levels[:1] for o, level in levels.items()]
-    shape = (None if answer.verdict == "none" else
-             force_shape(case.base, case.sites[0], case.candidates))
+    shape = force = None
+    if answer.verdict != "none":
+        shape = force_shape(case.base, case.sites[0], case.candidates)
+        force = force_over_time(case.base, case.sites[0])
     return Diagnosis(
         answer.verdict, detection.p_value, alpha,
-        locate(case.base, best, answer, case.sites, shape, alpha),
+        locate(case.base, best, answer, case.sites, shape, force, alpha),
         given, rejected, case.before, after, proof, tuple(levels), tuple(case.notes),
         smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves),
-        time.perf_counter() - begun, shape)
+        time.perf_counter() - begun, shape, force)
 
 
 def _proof(case: Case, best: Hypothesis) -> Proof | None:

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: where in time, and the proof on the held-out recording."""
+"""Figures of a diagnosis: where in time, the missing force, the proof on held-out data."""
 
 from __future__ import annotations
 
@@ -12,17 +12,21 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
     from pikanid.mismatch.force_shape import ForceShape
+    from pikanid.mismatch.latent_force import ForceOverTime
     from pikanid.mismatch.result import Diagnosis
 
 BEFORE, AFTER, DATA, LOUD = "#c2410c", "#1d4ed8", "#9ca3af", "#fde68a"
 
 
 def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
-    """Residual of the nominal and of the extended model over time, loud stretches shaded; below,
-    with a held-out recording, its prediction before and after and what each leaves; at the bottom
-    the missing force over states and inputs, with its 95 % band.
+    """Residual of the nominal and of the extended model over time, and the force that would explain
+    it, the seconds of the mismatch shaded; below, with a held-out recording, its prediction before
+    and after and what each leaves; at the bottom the missing force over states and inputs, with its
+    95 % band.
     """
-    rows = 1 if dx.held_out is None else 3
+    force = dx.force_over_time
+    first = 1 if force is None else 2
+    rows = first if dx.held_out is None else first + 2
     figure = new_figure(9.0, 2.6 * (rows + (dx.shape is not None)))
     upper: matplotlib.figure.FigureBase = figure
     if dx.shape is not None:
@@ -31,23 +35,31 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
         _shape(lower, dx.shape)
     axes = np.atleast_1d(upper.subplots(rows, 1))
     _train(axes[0], dx)
+    if force is not None:
+        _force(axes[1], force)
+        axes[1].sharex(axes[0])
+    why = "band excludes zero" if force is not None and force.resolved else "louder than noise"
+    for axis in axes[:first]:
+        for k, (start, stop) in enumerate(dx.where.time):
+            axis.axvspan(start, stop, color=LOUD, alpha=0.6, lw=0, zorder=0,
+                         label=why if k == 0 else None)
     if dx.held_out is not None:
-        proof = dx.held_out
-        axes[1].plot(proof.t, proof.measured, ".", color=DATA, ms=2, label="measured")
-        axes[1].plot(proof.t, proof.before, color=BEFORE, lw=1, label="nominal model")
-        axes[1].set(ylabel=proof.unit or "output", title="Held-out recording: prediction")
-        axes[2].plot(proof.t, proof.measured - proof.before, color=BEFORE, lw=0.8,
+        proof, below = dx.held_out, axes[first:]
+        below[0].plot(proof.t, proof.measured, ".", color=DATA, ms=2, label="measured")
+        below[0].plot(proof.t, proof.before, color=BEFORE, lw=1, label="nominal model")
+        below[0].set(ylabel=proof.unit or "output", title="Held-out recording: prediction")
+        below[1].plot(proof.t, proof.measured - proof.before, color=BEFORE, lw=0.8,
                      label=f"nominal, RMSE {proof.rmse_before:.3g}")
         if dx.hypotheses:
-            axes[1].plot(proof.t, proof.after, color=AFTER, lw=1, label="extended model")
-            axes[2].plot(proof.t, proof.measured - proof.after, color=AFTER, lw=0.8,
+            below[0].plot(proof.t, proof.after, color=AFTER, lw=1, label="extended model")
+            below[1].plot(proof.t, proof.measured - proof.after, color=AFTER, lw=0.8,
                          label=f"extended, RMSE {proof.rmse_after:.3g}")
-        axes[2].axhspan(-2 * proof.noise, 2 * proof.noise, color=DATA, alpha=0.3, lw=0,
+        below[1].axhspan(-2 * proof.noise, 2 * proof.noise, color=DATA, alpha=0.3, lw=0,
                         label="±2σ of the noise")
-        axes[2].set(ylabel=proof.unit or "residual", title="Held-out recording: what is left")
+        below[1].set(ylabel=proof.unit or "residual", title="Held-out recording: what is left")
     for axis in axes:
-        axis.margins(x=0.01, y=0.2)  # room for the legend
-        axis.legend(loc="upper right", fontsize=8, ncols=3)
+        axis.margins(x=0.01, y=0.3)  # room for the legend
+        axis.legend(loc="upper right", fontsize=8, ncols=4)
         axis.grid(alpha=0.2)
     axes[-1].set_xlabel("t [s]")
     return figure
@@ -59,10 +71,20 @@ def _train(axis: matplotlib.axes.Axes, dx: Diagnosis) -> None:
     if dx.hypotheses:
         after = dx.after.fits[0]
         axis.plot(after.t, after.residual, color=AFTER, lw=0.8, label="extended model")
-    for k, (start, stop) in enumerate(dx.where.time):
-        axis.axvspan(start, stop, color=LOUD, alpha=0.6, lw=0,
-                     label="louder than noise" if k == 0 else None)
     axis.set(ylabel=fit.unit or "residual", title="What the model leaves of the recording")
+
+
+def _force(axis: matplotlib.axes.Axes, force: ForceOverTime) -> None:
+    for width, alpha, name in ((force.critical, 0.12, "95 % band, at once"),
+                               (1.96, 0.25, "pointwise")):
+        axis.fill_between(force.t, force.values - width * force.std,
+                          force.values + width * force.std, color=AFTER, alpha=alpha, lw=0,
+                          label=name)
+    axis.plot(force.t, force.values, color=AFTER, lw=1.0,
+              label=f"mean over {force.resolution:.2g} s")
+    axis.axhline(0.0, color=DATA, lw=0.8)
+    axis.set(ylabel=force.unit, title="Force that would explain it, without what the free "
+             "parameters can do")
 
 
 def _shape(figure: matplotlib.figure.FigureBase, shape: ForceShape) -> None:

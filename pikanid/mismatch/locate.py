@@ -12,6 +12,7 @@ from pikanid.mismatch.candidate import Candidate, Channel
 from pikanid.mismatch.detect import unit_columns
 from pikanid.mismatch.force_shape import ForceShape
 from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.latent_force import ForceOverTime
 from pikanid.mismatch.result import Value, Where
 from pikanid.mismatch.site import Site
 from pikanid.mismatch.tangent import directions
@@ -22,8 +23,11 @@ CLEAR = 5.0  # standard errors from which on an effect counts as detectable
 
 
 def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[Site],
-           shape: ForceShape | None, alpha: float) -> Where:
+           shape: ForceShape | None, force: ForceOverTime | None, alpha: float) -> Where:
     """The place of a mismatch, as far as the answer and the nominal residual tell.
+
+    In time it is where the force that would explain it is not zero, or, without a force that the
+    recording resolves, where the residual is louder than noise.
 
     Without an answer the shape of the missing force says what it depends on, and whether a static
     law can be all that is missing.
@@ -42,7 +46,11 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[S
         static = all(e.channel == "dynamics" and e.ids[0] in STATIC for e in best.effects)
     elif shape is not None:
         states, static = shape.depends_on(alpha), shape.static_law
-    spans = () if answer.verdict == "none" else loud_windows(base)
+    spans: tuple[tuple[float, float], ...] = ()
+    if force is not None and force.resolved:
+        spans = force.windows
+    elif answer.verdict != "none":
+        spans = loud_windows(base)
     return Where(channel, site.v, states, spans, static)
 
 

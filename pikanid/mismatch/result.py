@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
     from pikanid.mismatch.force_shape import ForceShape
+    from pikanid.mismatch.latent_force import ForceOverTime
 
 Verdict = Literal["none", "named", "set", "unconfirmed", "unnamed"]
 
@@ -108,6 +109,8 @@ class Diagnosis:
         next_experiment: A sentence; empty where none is needed.
         seconds: Of the whole diagnosis.
         shape: The missing force over each state and input, to first order; None without a mismatch.
+        force_over_time: The force that would explain the mismatch, over time, with its band; None
+            without a mismatch, or where it cannot be computed.
     """
 
     verdict: Verdict
@@ -125,6 +128,7 @@ class Diagnosis:
     next_experiment: str = ""
     seconds: float = 0.0
     shape: ForceShape | None = None
+    force_over_time: ForceOverTime | None = None
 
     @property
     def mismatch(self) -> bool:

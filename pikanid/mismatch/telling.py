@@ -16,7 +16,7 @@ def lines_of(dx: Diagnosis) -> list[str]:
     if dx.mismatch:
         place = dx.where.channel if dx.where.channel != "undecided" else "channel undecided"
         spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time[:6])
-        lines.append(f"Where: {place}" + (f"; loudest at {spans}" if spans else ""))
+        lines.append(f"Where: {place}" + (f"; in time at {spans}" if spans else ""))
     for h in dx.hypotheses:
         lines.append(f"What: {h.title} (probability {h.probability:.2f})")
         for e in h.effects:

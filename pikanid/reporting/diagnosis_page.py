@@ -27,6 +27,9 @@ code { background: #f3f4f6; padding: .1rem .3rem; } img { max-width: 100%; }
 """
 
 
+UNEXPLAINED = 1.5  # χ² per degree of freedom from which on no force explains a recording
+
+
 def page(dx: Diagnosis, title: str) -> str:
     """The page: verdict, where, what, proof, what next; figures inside.
 
@@ -54,7 +57,18 @@ def _where(dx: Diagnosis) -> str:
         dx.where.channel, "undecided between input, sensor and dynamics")
     depends = f"; depends on {', '.join(dx.where.depends_on)}" if dx.where.depends_on else ""
     return (f"<h2>Where</h2><p>Channel: {escape(channel)}{escape(depends)}. "
-            f"Louder than noise: {escape(spans)}.</p>")
+            f"In time: {escape(spans)}.{_force(dx)}</p>")
+
+
+def _force(dx: Diagnosis) -> str:
+    force = dx.force_over_time
+    if force is None:
+        return ""
+    worth = (f" The force leaves {force.left:.2g} of χ² per degree of freedom."
+             if force.left > UNEXPLAINED else "")
+    return (f" There the simultaneous 95 % band of the force that would explain it, in means over "
+            f"{force.resolution:.2g} s, excludes zero. An error of a sensor or an input can look "
+            f"like a force too.{worth}")
 
 
 def _what(dx: Diagnosis) -> str:
