@@ -37,7 +37,7 @@ class Shooting:
         self.weights = 1.0 / np.concatenate([np.empty(0), *spreads])
         self.y = np.concatenate([np.empty(0), *self.data])
         self.rows = len(self.y)
-        self._at: np.ndarray | None = None
+        self._at = b""
         self._kept: tuple[np.ndarray, np.ndarray] | None = None
         self._tried: tuple[bytes, dict[tuple[int, str, float], Response]] = (b"", {})
 
@@ -64,7 +64,7 @@ class Shooting:
                 method, finest = self.limits[r].method, self.limits[r].longest / HURRY
             trial = functools.partial(self._trial, theta, r)
             self.steps.append(simulator.choose_steps(p, tolerance, method, known, finest, trial))
-        self._at = None
+        self._at = b""
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
 
@@ -109,8 +109,9 @@ class Shooting:
         return self._evaluate(theta)[1]
 
     def _evaluate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if self._kept is None or self._at is None or (self._at != theta).any():
-            self._at, self._kept = np.array(theta), self._simulate(theta)
+        at = theta.tobytes()
+        if self._kept is None or self._at != at:
+            self._at, self._kept = at, self._simulate(theta)
         return self._kept
 
     def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +129,11 @@ class Shooting:
                 row += len(r.y)
         residual = predicted - self.y
         residual *= self.weights
-        return residual, jacobian * self.weights[:, None]
+        # column by column: of rows as short as these, broadcasting would take longer
+        weighted = np.empty(jacobian.shape)
+        for k in range(jacobian.shape[1]):
+            np.multiply(jacobian[:, k], self.weights, out=weighted[:, k])
+        return residual, weighted
 
     def adequacy(self, theta: np.ndarray) -> Adequacy:
         """The χ² verdict at θ."""

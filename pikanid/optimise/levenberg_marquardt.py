@@ -61,6 +61,9 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     def slopes(z: np.ndarray) -> np.ndarray:
         return jacobian(z * scale) * scale
 
+    def columns(z: np.ndarray) -> np.ndarray:
+        return np.ascontiguousarray(jacobian(z * scale).T) * scale[:, None]
+
     def boxed(z: np.ndarray) -> np.ndarray:
         return residual(np.clip(z * scale, lower, upper))
 
@@ -68,8 +71,8 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     if rows >= len(start):
         # MINPACK directly: least_squares(method="lm") wraps the same code and doubles its cost
         z, _, info, _, code = leastsq(
-            scaled, inside / scale, Dfun=slopes, full_output=True, ftol=tolerance, xtol=tolerance,
-            gtol=1e-15, maxfev=limit)
+            scaled, inside / scale, Dfun=columns, col_deriv=True, full_output=True, ftol=tolerance,
+            xtol=tolerance, gtol=1e-15, maxfev=limit)
         theta, best, evaluations = z * scale, 0.5 * float(info["fvec"] @ info["fvec"]), info["nfev"]
         status = code if code in (1, 2, 3, 4) else 0
     room = np.minimum(theta - lower, upper - theta)

@@ -6,6 +6,7 @@ adaptive solver over the whole interval would step over short pulses without not
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,12 @@ class Grid:
     jumps: np.ndarray
     seen: Seen
     rows: int
+
+    @functools.cached_property
+    def spacings(self) -> tuple[float, float]:
+        """Median and longest interval between stops [s]."""
+        gaps = np.diff(self.T)
+        return float(np.median(gaps)), float(gaps.max())
 
     def pieces(self, longest: float) -> np.ndarray:
         """Sub-steps of each interval (L-1,) so that none is longer than `longest` [s]."""

@@ -128,9 +128,9 @@ class Simulator:
             *self._moved(p, active), self.experiment.initial(p),
             np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active]), p, active,
             *grid.seen, X, Y, J)
-        # a sum is finite only if everything in it is, and costs a fifth of looking at each
-        with np.errstate(invalid="ignore", over="ignore"):
-            finite = status == 0 and math.isfinite(Y.sum()) and math.isfinite(J.sum())
+        # sums of squares are finite only if everything in them is, and the cheapest of all to take;
+        # a trajectory whose squares overflow is as good as infinite
+        finite = status == 0 and math.isfinite(np.vdot(Y, Y)) and math.isfinite(np.vdot(J, J))
         return Response(Y, J, grid.T, X, finite, float(grid.T[stop]), int(status))
 
     def _moved(self, p: np.ndarray, active: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -145,9 +145,14 @@ class Simulator:
         return dtau_in, dtau_out, True
 
     def _pieces(self, grid: Grid, longest: float) -> np.ndarray:
-        if self._kept.get("pieces_of") is not grid or self._kept.get("longest") != longest:
-            self._kept.update(pieces_of=grid, longest=longest, pieces=grid.pieces(longest))
-        return self._kept["pieces"]
+        """Sub-steps; those of the last two lengths are kept, between which accuracies alternate."""
+        kept = self._kept.get("pieces", ())
+        for of, length, pieces in kept:
+            if of is grid and length == longest:
+                return pieces
+        pieces = grid.pieces(longest)
+        self._kept["pieces"] = ((grid, longest, pieces), *kept[:1])
+        return pieces
 
     def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
                      method: MethodChoice = "auto", known: Steps | None = None,
@@ -174,16 +179,16 @@ class Simulator:
             def trial(steps: Steps, _: bool) -> Response:
                 return self._outputs(p, steps)
         grid = self.grid(p)
-        spacing = float(np.median(np.diff(grid.T)))
         if known is not None and tolerance:
             foretold = _foretold(trial, tolerance, known)
             if foretold is not None:
                 return foretold
+        spacing, gap = grid.spacings
         candidates: list[Method] = ["explicit", "implicit"] if method == "auto" else [method]
         best: Steps | None = None
         failure = Response(*(np.empty(0),) * 4)
         for candidate in candidates:
-            longest = float(np.max(np.diff(grid.T)))
+            longest = gap
             rough = trial(Steps(candidate, longest), True)
             while longest > max(spacing / FINEST, finest):
                 fine = trial(Steps(candidate, longest / 2), False)
