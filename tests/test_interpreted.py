@@ -104,3 +104,21 @@ def test_delay_of_an_output_moves_it_and_is_differentiated() -> None:
     np.testing.assert_allclose(late.y[100:], now.y[97:-3], atol=1e-9)
     slope = np.gradient(now.y, recording.t)[97:-3]
     np.testing.assert_allclose(late.sensitivity[100:, 0], -slope, atol=0.05 * np.abs(slope).max())
+
+
+def test_stopping_at_a_stiff_wall_needs_no_fine_steps() -> None:
+    """Contacts with a wall of 1e4/s² last three samples: run through, its corner leaves an error of
+    low order.
+    """
+    model = systems.sloshing().with_term("theta_dot", "-k*max(theta - w, 0)", [
+        Parameter("k", 1e4), Parameter("w", 0.03)])
+    experiment = bind(model, recorded(model))
+    p = values(model)
+    through = Interpreted(model, experiment)
+    stopping = Interpreted(model, experiment, located=True)
+    exact = stopping.run(p, steps=Steps("explicit", 2e-5)).y
+    coarse, fine = (float(np.abs(s.run(p, steps=Steps("explicit", h)).y - exact).max())
+                    for s, h in ((stopping, 0.00125), (through, 0.00125)))
+    assert through.corners and not stopping.corners
+    assert coarse < 2e-6
+    assert fine > 50 * coarse

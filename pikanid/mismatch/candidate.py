@@ -72,8 +72,8 @@ class Candidate:
         known: Whether the catalogue holds it; a guard only keeps wrong names away.
         fits: Whether it can be added and refitted, not only looked for.
         covers: Keys of candidates that it contains as special cases.
-        rugged: Whether χ² has many local minima along its size, as where a motion comes to rest
-            between two samples.
+        hills: Factors of its first parameter by which χ² may have other minima, as where a motion
+            comes to rest between two samples.
     """
 
     ids: tuple[str, ...]
@@ -91,7 +91,7 @@ class Candidate:
     known: bool = True
     fits: bool = True
     covers: tuple[str, ...] = ()
-    rugged: bool = False
+    hills: tuple[float, ...] = ()
 
     @property
     def key(self) -> str:

@@ -18,14 +18,14 @@ INF = float("inf")
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
          shape: Callable[[View], np.ndarray], *, one_sided: bool, twin: str = "",
-         variant: str = "", known: bool = True, rugged: bool = False) -> Candidate:
+         variant: str = "", known: bool = True, hills: tuple[float, ...] = ()) -> Candidate:
     """A force with one parameter: `shape` (L,) is what it adds to q'' at size 1."""
     def signs(view: View) -> list[Sign]:
         return [Sign({size.name: 1.0}, force=shape(view), one_sided=one_sided)]
 
     return Candidate((identifier,), name, expression, "dynamics", site, (size,),
                      lambda m: m.with_term(site.v, expression), signs, variant, twin, known=known,
-                     rugged=rugged)
+                     hills=hills)
 
 
 def sense(view: View, v: str) -> np.ndarray:
@@ -39,7 +39,7 @@ def coulomb_friction(site: Site) -> list[Candidate]:
     """Dry friction: the same force at every speed, against the motion."""
     c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
     return [term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-                 lambda w: -sense(w, site.v), one_sided=True, rugged=True)]
+                 lambda w: -sense(w, site.v), one_sided=True, hills=(0.6, 0.8, 1.25, 1.6))]
 
 
 def quadratic_drag(site: Site) -> list[Candidate]:
@@ -130,12 +130,21 @@ def parameter_drift(site: Site) -> list[Candidate]:
 
 
 def wall_impact(site: Site) -> list[Candidate]:
-    """A stiff stop on one side."""
+    """A stiff stop on one side that dissipates: k δ (1 + α δ'), δ how deep the wall gives way.
+
+    K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42, 1975.
+    """
+    # a contact shorter than from one sample to the next looks the same, however short
+    stiffest = max((np.pi / site.interval) ** 2, 1e4)
+    # with more, it would hold fast what leaves it at full speed
+    most = 1.0 / max(site.swing * site.rate, 1e-3)
+
     def one(side: int) -> Candidate:
         w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
-        k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, 1e7))
-        text = (f"-{k.name}*max({site.q} - {w.name}, 0)" if side > 0
-                else f"{k.name}*max(-{site.q} - {w.name}, 0)")
+        k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
+        a = Parameter(site.name("a_wall"), 0.0, f"s/({site.unit})", (0.0, most))
+        text = (f"-{k.name}*max({site.q} - {w.name}, 0)*(1 + {a.name}*{site.v})" if side > 0
+                else f"{k.name}*max(-{site.q} - {w.name}, 0)*(1 - {a.name}*{site.v})")
 
         def signs(view: View) -> list[Sign]:
             x = side * view.x[site.q]
@@ -145,9 +154,10 @@ def wall_impact(site: Site) -> list[Candidate]:
                          scales=False)
                     for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5) for s in (1e4,)] if top else []
 
-        return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
+        return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k, a),
                          lambda m: m.with_term(site.v, text), signs,
-                         variant="" if side > 0 else "negative side")
+                         variant="" if side > 0 else "negative side",
+                         hills=(0.985, 0.993, 0.997, 1.003, 1.007, 1.015))
 
     return [one(1), one(-1)]
 

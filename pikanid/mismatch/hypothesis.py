@@ -17,8 +17,7 @@ HURRIED = 12  # and of one among gross misfits
 FAR = 2.0  # times the closest χ², and that of the noise: fits above both together are given up
 WILD = 1000.0  # times both, for a start
 GLANCE = 1e4  # χ² per row that is good enough to see that
-HILLS = 4  # times that a minimum is left along a rugged parameter, if that leads lower
-STEPS = (0.6, 0.8, 1.25, 1.6)  # and how far
+HILLS = 4  # times that a minimum is left over a hill, if that leads lower
 COARSE = 5  # iterations that each of several starts gets before the best one goes on
 
 
@@ -148,19 +147,19 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
             return None
     if best.chi2 < reach:
         for effect in effects:
-            if effect.rugged:
-                best = _over_hills(whitened, best, effect.parameters[0].name, limit)
+            if effect.hills:
+                best = _over_hills(whitened, best, effect, limit)
     penalty = _penalty(effects, whitened.rows, choices)
     return Hypothesis(tuple(effects), model, whitened, best, penalty)
 
 
-def _over_hills(whitened: Whitened, best: Minimum, name: str, limit: int) -> Minimum:
+def _over_hills(whitened: Whitened, best: Minimum, effect: Candidate, limit: int) -> Minimum:
     """The lowest of the minima that steps in one parameter lead to, from the lowest so far."""
     problem = whitened.problem
-    at = [k for k, f in enumerate(problem.free) if f.name == name]
+    at = [k for k, f in enumerate(problem.free) if f.name == effect.parameters[0].name]
     for _ in range(HILLS):
         found = []
-        for share in STEPS:
+        for share in effect.hills:
             theta = best.theta.copy()
             theta[at] *= share
             found.append(minimise(whitened.residual, theta, problem.lower, problem.upper, COARSE,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import sympy as sp
 
 from pikanid import errors
@@ -27,6 +28,7 @@ class Site:
         rest: Whether the model starts in equilibrium.
         span: First and last time [s] of the first recording.
         swing: Half the range of the output there, in its unit.
+        interval: Between its samples, as a rule [s].
         suffix: Distinguishes names where a model has several coordinates.
     """
 
@@ -40,6 +42,7 @@ class Site:
     rest: bool
     span: tuple[float, float]
     swing: float
+    interval: float
     suffix: str = ""
 
     @property
@@ -105,22 +108,25 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
     starts = [s.initial for s in model.states if s.name in (q, v)]
     return Site(model, q, v, output, inputs, extra, k**0.5 if k > 0 else 0.0,
                 sp.simplify(force) == 0 and all(e == 0 for e in starts),
-                (first.start, first.stop), _swing(first, output.name), suffix)
+                (first.start, first.stop), _swing(first, output.name),
+                _interval(first, output.name), suffix)
+
+
+def _interval(recording: Recording, name: str) -> float:
+    if name not in recording:
+        name = recording.names[0]  # an experiment that is only planned
+    return float(np.median(np.diff(recording[name].time)))
 
 
 def _swing(recording: Recording, name: str) -> float:
-    import numpy as np
-
     if name not in recording:
-        return 0.0  # an experiment that is only planned
+        return 0.0
     values = recording[name].values
     seen = values[np.isfinite(values)]
     return float(np.ptp(seen)) / 2 if len(seen) else 0.0
 
 
 def _moves(recording: Recording, name: str) -> bool:
-    import numpy as np
-
     values = recording[name].values
     return bool(np.all(np.isfinite(values)) and np.ptp(values) > 0)
 

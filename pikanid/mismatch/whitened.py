@@ -16,6 +16,7 @@ from pikanid.simulation.simulator import Response, Steps
 
 CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
 FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
+SHARP = 4  # steps a sample from which on it is better to stop at corners than to run through them
 GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
 
 
@@ -76,17 +77,24 @@ class Whitened:
         for r, simulator in enumerate(self.simulators):
             sigma = min(level.sigma for level in self.records.levels[r].values())
             allowed = share * sigma * max(1.0, 0.2 * misfit**0.5)
-            try:
-                steps = simulator.choose_steps(
-                    self.problem.parameters(theta, r), allowed, "explicit",
-                    finest=self._spacing(r) / finest)
-            except errors.SimulationFailed:
-                return False
-            if steps.error > 20 * allowed:
+            steps = self._steps(r, theta, allowed, SHARP if simulator.corners else finest)
+            if simulator.corners and (steps is None or steps.error > allowed):
+                self.simulators[r] = Interpreted(
+                    simulator.model, simulator.experiment, located=True)
+                steps = self._steps(r, theta, allowed, finest)
+            if steps is None or steps.error > 20 * allowed:
                 return False
             found.append(steps)
         self.steps = found
         return True
+
+    def _steps(self, r: int, theta: np.ndarray, allowed: float, finest: int) -> Steps | None:
+        try:
+            return self.simulators[r].choose_steps(
+                self.problem.parameters(theta, r), allowed, "explicit",
+                finest=self._spacing(r) / finest)
+        except errors.SimulationFailed:
+            return None
 
     def _spacing(self, r: int) -> float:
         samples = self.problem.experiments[r].samples[0]

@@ -47,7 +47,8 @@ PRELUDE, F, H, H_RATE, G, G_RATE = range(6)
 class Interpreted(Simulator):
     """A `Simulator` that interprets: for models that are simulated a few dozen times only.
 
-    Models with spline functions are compiled as usual.
+    Models with spline functions are compiled as usual.  `located`: the integrator stops at the
+    corners of the right-hand side, which pays where they are sharp.
 
     >>> import numpy as np
     >>> from pikanid import excitation, systems
@@ -58,12 +59,19 @@ class Interpreted(Simulator):
     2
     """
 
+    located: bool = False
+
+    @property
+    def corners(self) -> bool:
+        """Whether it runs through corners that it could stop at."""
+        return can_run(self.model) and tape(Structure(self.model), self.located).corners > 0
+
     def module(self, method: Method) -> Any:
         """The interpreter, bound to the model's tape."""
         if method != "explicit" or not can_run(self.model):
             return super().module(method)
         if method not in self._kept:
-            self._kept[method] = Machine(tape(Structure(self.model)))
+            self._kept[method] = Machine(tape(Structure(self.model), self.located))
         return self._kept[method]
 
 

@@ -7,7 +7,7 @@ three to five times slower, the same integrators and events, derivatives exact b
 
 A formula that is continuous where a sign in it changes (|v|v, clip) is run through like any other;
 only where the right-hand side jumps (dry friction) does a sign become a switching function that the
-integrator stops at.
+integrator stops at.  Where corners are sharp (a stiff wall) they can be made such functions too.
 
 Registers hold time, states, inputs, parameters, signs of the switching functions, rates of the
 inputs, constants and what the operations compute.  What depends on parameters alone is computed
@@ -43,8 +43,8 @@ class Tape:
     """Operations (ops, 4) of each group: opcode, two arguments, result; all by register.
 
     `outputs` names the registers that hold a group's results; `constants` the registers and values
-    to set beforehand; `sizes` = states, inputs, parameters, outputs,
-    switching functions at which the right-hand side jumps.
+    to set beforehand; `sizes` = states, inputs, parameters, outputs, switching functions that the
+    integrator stops at; `corners` counts those of the states that it runs through.
     """
 
     code: dict[str, np.ndarray]
@@ -52,12 +52,13 @@ class Tape:
     registers: int
     constants: tuple[np.ndarray, np.ndarray]
     sizes: tuple[int, int, int, int, int]
+    corners: int
 
 
 @functools.lru_cache(maxsize=512)
-def tape(structure: Structure) -> Tape:
-    """The tape of a model's formulas."""
-    return _Recorder(structure.model, lower_model(structure.model)).tape()
+def tape(structure: Structure, located: bool = False) -> Tape:
+    """The tape of a model's formulas; `located`: the integrator stops at corners, too."""
+    return _Recorder(structure.model, lower_model(structure.model)).tape(located)
 
 
 def can_run(model: Model) -> bool:
@@ -80,9 +81,10 @@ class _Recorder:
     kinks: dict[sp.Expr, sp.Expr] = field(default_factory=dict)
     count: int = 0
 
-    def tape(self) -> Tape:
+    def tape(self, located: bool) -> Tape:
         f, h = self.lowered.rhs, self.lowered.outputs
-        jumps = [k for k in range(self.lowered.n_dynamic) if self._jumps(k)]
+        jumps = [k for k in range(self.lowered.n_dynamic)
+                 if (located and self._moves(k)) or self._jumps(k)]
         x, u, p = self._lay_out(jumps)
         self.kinks = {switch_symbol(k): e for k, e in enumerate(self.lowered.switches)
                       if k not in jumps}
@@ -102,7 +104,13 @@ class _Recorder:
             code, outputs, self.count,
             (np.array(list(self.numbers.values()), np.int64),
              np.array(list(self.numbers), float)),
-            (len(x), len(u), len(p), len(h), len(g)))
+            (len(x), len(u), len(p), len(h), len(g)),
+            sum(self._moves(k) for k in range(self.lowered.n_dynamic) if k not in jumps))
+
+    def _moves(self, k: int) -> bool:
+        """Whether the k-th switching function depends on the states."""
+        states = {symbol(n) for n in self.model.state_names}
+        return bool(states & self.lowered.switches[k].free_symbols)
 
     def _jumps(self, k: int) -> bool:
         """Whether the right-hand side jumps where the k-th switching function is zero."""
