@@ -56,6 +56,18 @@ def test_derivative_above_the_degree_is_zero() -> None:
     assert np.all(spline.values(np.linspace(0, 3, 7), np.ones(spline.n_basis), 3) == 0.0)
 
 
+@pytest.mark.parametrize("t", [-1e-9, 3.0 + 1e-9, np.nan])
+def test_a_time_outside_is_refused(t: float) -> None:
+    with pytest.raises(ValueError, match="no value outside"):
+        repeated(3, 1).basis(np.array([1.0, t]))
+
+
+def test_times_need_no_order() -> None:
+    spline, t = repeated(5, 4), np.random.default_rng(4).uniform(0.0, 3.0, 50)
+    c = np.random.default_rng(5).normal(size=spline.n_basis)
+    assert np.allclose(spline.values(t, c, 2), SciPyBSpline(spline.knots, c, 5)(t, nu=2))
+
+
 @given(degree=st.integers(1, 6), intervals=st.integers(1, 30), seed=st.integers(0, 99))
 def test_partition_of_unity_and_local_rows(degree: int, intervals: int, seed: int) -> None:
     spline = BSpline(degree, uniform_knots(-1.0, 4.0, intervals=intervals, degree=degree))
