@@ -3,13 +3,13 @@
     -r = J dθ + G δ + e,   e white of unit variance,   δ(t) = Σ c_k B_k(t)
 
 with r the whitened residual, J its derivatives by the free parameters, and G δ what a force in the
-equation of a coordinate shows, integrated along the motion to first order: at first along the
-fitted motion, then along the one that the force makes.  δ is a cubic
-spline with penalised differences and sizes of its coefficients (P. H. C. Eilers and B. D. Marx,
-Stat. Sci. 11, 1996): the prior of a force that forgets itself, after a fraction of a period or
-hardly ever.  Which of the two, how strong it is and how large the noise, restricted maximum
-likelihood says (S. N. Wood, J. R. Stat. Soc. B 73, 2011).  Standard errors are posterior ones,
-which hold what the penalty hides, on average over time (D. Nychka, J. Am. Stat. Assoc. 83, 1988).
+equation of a coordinate shows, integrated to first order: along the fitted motion, and then along
+the motion that the force of this first pass makes.  δ is a cubic spline with penalised differences
+and sizes of its coefficients (P. H. C. Eilers and B. D. Marx, Stat. Sci. 11, 1996): the prior of a
+force that forgets itself, after a fraction of a period or hardly ever.  Which of the two, how
+strong it is and how large the noise, restricted maximum likelihood says (S. N. Wood, J. R. Stat.
+Soc. B 73, 2011).  Standard errors are posterior ones, which hold what the penalty hides on average
+over time (D. Nychka, J. Am. Stat. Assoc. 83, 1988); sharp peaks come out too low.
 
 A force shows only after it has been integrated twice, so that its quick changes drown in noise.
 Given are means over the time that one effective coefficient has: a finer course cannot be told.
@@ -25,31 +25,27 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.linalg import cho_solve, solve_triangular
-from scipy.optimize import brentq
-from scipy.stats import norm
+from scipy.linalg import solve_triangular
 
 from pikanid.channel import Channel
 from pikanid.mismatch.candidate import Candidate, Sign
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import MOST_ROWS, condensed
+from pikanid.mismatch.penalised import Penalised, critical_value
 from pikanid.mismatch.site import Site
 from pikanid.mismatch.tangent import TOGETHER, Tangent
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model_parts import Input
 
 DEGREE = 3
-A_PERIOD = 8  # knots in a natural period: friction's third harmonic still fits between them
+A_PERIOD = 6  # knots in a natural period: friction's third harmonic still fits between them
 LEAST, MOST = 8, 800  # knot intervals
+SLOW = 200  # of them where even the most follow no oscillation, but only what changes slowly
 ROWS_EACH = 5  # samples to a knot interval, at least
 RESOLVED = 4  # knots in a natural period from which on a force that follows the motion shows
 POINTS = 4  # of the drawn grid to a knot interval
 LEVEL = 0.95  # of the simultaneous band
-MEMORIES = (2.0, 50.0)  # of the force, in knot intervals: it follows an oscillation, or does not
-DECADES = 13  # of the penalty's weight, from almost no force downwards
-HOPELESS = 60.0  # of -2 ln likelihood above the best: lighter weights only get worse
 PASSES = 2  # the second along the motion that the force of the first one makes
-GAUGE = 1e-6  # of the prior: tells apart forces that do the same as a parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,21 +117,23 @@ def force_over_time(base: Hypothesis, site: Site) -> ForceOverTime | None:
     if nominal is None or motion is None:
         return None
     rows = len(nominal.r)
-    intervals = int(min(max(A_PERIOD * (stop - start) / period, LEAST) if period else MOST, MOST,
-                        rows // ROWS_EACH))
+    intervals = _intervals(stop - start, period, rows)
     if intervals < LEAST:
         return None
     edges = np.linspace(start, stop, intervals + 1)
     knots = np.concatenate([[start] * DEGREE, edges, [stop] * DEGREE])
     together = -(-rows // MOST_ROWS)
-    fitted: _Fitted | None = None
+    fitted: Penalised | None = None
     force = np.zeros(len(knots) - DEGREE - 1)
     for _ in range(PASSES):
         D = motion.columns(knots, together)
         if not np.isfinite(D).all():
             return None
         J, r = (condensed(part, rows, together) for part in (motion.J, motion.r))
-        fitted = _Fitted(D, J, D @ force - r, fitted)
+        try:
+            fitted = Penalised(D, J, D @ force - r, fitted)
+        except np.linalg.LinAlgError:  # forces that differ by less than rounding
+            return None
         force = fitted.gauge @ fitted.coefficients
         t = motion.line.t
         pushed = _Motion.of(base, site, t, BSpline(knots, force, DEGREE)(t))
@@ -153,24 +151,13 @@ def force_over_time(base: Hypothesis, site: Site) -> ForceOverTime | None:
                          f"{site.unit}/s^2", (stop - start) / intervals, period)
 
 
-def critical_value(spread: np.ndarray, level: float) -> float:
-    """Half the width, in standard errors, of a band that holds a whole Gaussian curve.
-
-    The curve's unit vectors run on a sphere; the longer their way κ, the more independent chances
-    there are to leave the band:  κ/π exp(-z²/2) + 2 (1 - Φ(z)) = 1 - level  (J. Sun and C. R.
-    Loader, Ann. Stat. 22, 1994).  It grows with the effective degrees of freedom, as κ does.
-
-    Args:
-        spread: (K, G) root of the curve's covariance, which is spreadᵀ spread.
-        level: Probability, between 0 and 1.
-
-    >>> round(critical_value(np.ones((1, 5)), 0.95), 2)     # a constant: a single chance
-    1.96
-    """
-    unit = spread / np.maximum(np.linalg.norm(spread, axis=0), 1e-300)
-    way = float(np.sum(np.linalg.norm(np.diff(unit, axis=1), axis=0)))
-    return float(brentq(lambda z: way / np.pi * np.exp(-z * z / 2) + 2 * norm.sf(z) - (1 - level),
-                        0.0, 40.0))
+def _intervals(span: float, period: float, rows: int) -> int:
+    """Number of knot intervals, as fine as the motion asks for and the recording can pay."""
+    most = min(MOST, rows // ROWS_EACH)
+    if not period:
+        return most
+    periods = span / period
+    return min(SLOW if RESOLVED * periods > MOST else max(int(A_PERIOD * periods), LEAST), most)
 
 
 def _means(t: np.ndarray, knots: np.ndarray, width: float) -> np.ndarray:
@@ -224,76 +211,3 @@ class _Motion:
             columns = self.line.columns([(candidate, Sign({}, force=f)) for f in forces])
             blocks.append(condensed(self.whitened.whiten(0, columns), len(columns), together))
         return np.concatenate(blocks, axis=1)
-
-
-class _Fitted:
-    """Penalised least squares of a target (N,) on columns D (N, K) beside J (N, p).
-
-    Attributes:
-        coefficients: (K,).
-        root: (K, K) lower triangular; root rootᵀ is the penalised information at unit noise.
-        gauge: (K, K) takes out of coefficients what J can do.
-        freedom: Effective number of coefficients.
-        left: Variance of what is left.
-    """
-
-    def __init__(self, D: np.ndarray, J: np.ndarray, target: np.ndarray, before: _Fitted | None):
-        norms = np.linalg.norm(J, axis=0)
-        u, s, _ = np.linalg.svd(J[:, norms > 0] / norms[norms > 0], full_matrices=False)
-        q = u[:, s > 1e-9 * s[0]] if len(s) else u
-        target = target - q @ (q.T @ target)
-        inside, whole = q.T @ D, D.T @ D
-        self.information = whole - inside.T @ inside
-        self.pull = D.T @ target
-        self.power = float(target @ target)
-        self.count = len(target) - q.shape[1]
-        self.weight, self.memory = self._coarse() if before is None else self._near(before)
-        penalty = self.weight * _prior(len(whole), self.memory)
-        self.root = np.linalg.cholesky(self.information + penalty)
-        self.coefficients = cho_solve((self.root, True), self.pull)
-        held = solve_triangular(self.root, np.linalg.cholesky(penalty), lower=True)
-        self.freedom = len(whole) - float(np.sum(held**2))
-        self.left = (self.power - float(self.pull @ self.coefficients)) / self.count
-        alike = cho_solve((np.linalg.cholesky(whole + GAUGE * penalty), True), inside.T)
-        self.gauge = np.eye(len(whole)) - alike @ inside
-
-    def _coarse(self) -> tuple[float, float]:
-        """(weight, memory) of the most likely prior.
-
-        The heaviest weight leaves about one effective coefficient: an estimate of nothing at all
-        would have no band.
-        """
-        found: list[tuple[float, float, float]] = []
-        for memory in MEMORIES:
-            prior = _prior(len(self.pull), memory)
-            most = float(np.trace(np.linalg.solve(prior, self.information)))
-            volume, least = float(np.linalg.slogdet(prior)[1]), np.inf
-            for weight in most * 10.0 ** -np.arange(DECADES):
-                criterion = self._unlikely(weight, prior) - volume
-                found.append((criterion, float(weight), memory))
-                least = min(least, criterion)
-                if criterion > least + HOPELESS:
-                    break
-        return min(found)[1:]
-
-    def _near(self, before: _Fitted) -> tuple[float, float]:
-        """(weight, memory) about those of another fit."""
-        prior = _prior(len(self.pull), before.memory)
-        weights = before.weight * 10.0 ** np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
-        return float(min(weights, key=lambda w: self._unlikely(w, prior))), before.memory
-
-    def _unlikely(self, weight: float, prior: np.ndarray) -> float:
-        """-2 ln of the restricted likelihood, the noise's variance profiled, + ln |prior|."""
-        root = np.linalg.cholesky(self.information + weight * prior)
-        explained = float(np.sum(solve_triangular(root, self.pull, lower=True) ** 2))
-        left = max(self.power - explained, 1e-12 * self.power)
-        return float(self.count * np.log(left / self.count) + 2 * np.sum(np.log(np.diag(root)))
-                     - len(root) * np.log(weight))
-
-
-def _prior(count: int, memory: float) -> np.ndarray:
-    """(K, K) inverse covariance, up to its size, of coefficients that forget after `memory` steps:
-    those of an Ornstein-Uhlenbeck process.
-    """
-    steps = np.diff(np.eye(count), axis=0)
-    return np.asarray(steps.T @ steps + np.eye(count) / memory**2)

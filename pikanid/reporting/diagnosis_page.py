@@ -57,17 +57,17 @@ def _where(dx: Diagnosis) -> str:
         dx.where.channel, "undecided between input, sensor and dynamics")
     depends = f"; depends on {', '.join(dx.where.depends_on)}" if dx.where.depends_on else ""
     return (f"<h2>Where</h2><p>Channel: {escape(channel)}{escape(depends)}. "
-            f"In time: {escape(spans)}.{_force(dx)}</p>")
+            f"In time: {escape(spans)}.{_force(dx) if dx.where.time else ''}</p>")
 
 
 def _force(dx: Diagnosis) -> str:
     force = dx.force_over_time
-    if force is None:
-        return ""
-    worth = (f" The force leaves {force.left:.2g} of χ² per degree of freedom."
-             if force.left > UNEXPLAINED else "")
-    return (f" There the simultaneous 95 % band of the force that would explain it, in means over "
-            f"{force.resolution:.2g} s, excludes zero. An error of a sensor or an input can look "
+    if force is None or not force.resolved:
+        return " There the residual is louder than noise."
+    worth = (f" It leaves {force.left:.2g} of χ² per degree of freedom: no force explains "
+             "everything." if force.left > UNEXPLAINED else "")
+    return (" There the simultaneous 95 % band of the force that would explain it excludes zero "
+            f"(means over {force.resolution:.2g} s). What a sensor or an input gets wrong can look "
             f"like a force too.{worth}")
 
 
