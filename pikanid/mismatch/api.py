@@ -15,7 +15,7 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.catalogue import candidates as catalogue_of
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
-from pikanid.mismatch.force_shape import force_shape
+from pikanid.mismatch.force_shape import ForceShape, force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.latent_force import force_over_time
@@ -31,7 +31,8 @@ from pikanid.mismatch.preparation import (
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
-from pikanid.mismatch.verdict import WORTH, Answer, explanations, settle
+from pikanid.mismatch.symbols import symbolic_candidates
+from pikanid.mismatch.verdict import WORTH, Answer, explanations, settle, with_formulas
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 from pikanid.recording import Recording
@@ -107,7 +108,16 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         case.clear_later(ranked[0])
         answer = settle(ranked, search.scale(), case.test, case.predicted,
                         case.later is not None, case.proves)
-    return _diagnosis(case, detection, answer, alpha, begun)
+    shape = None
+    if answer.verdict != "none":
+        shape = force_shape(case.base, case.sites[0], case.candidates)
+    if shape is not None and answer.verdict == "unnamed" and not answer.contested:
+        tell("laws outside the catalogue")
+        search = case.search
+        search.offer(symbolic_candidates(shape, case.sites[0]))
+        answer = with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
+                               case.later is not None, case.proves)
+    return _diagnosis(case, detection, answer, shape, alpha, begun)
 
 
 @dataclass
@@ -265,8 +275,8 @@ def _with_sigma(records: Records, model: Model) -> list[Recording]:
             for r, levels in zip(records.recordings, records.levels, strict=True)]
 
 
-def _diagnosis(case: Case, detection: Detection, answer: Answer, alpha: float, begun: float
-               ) -> Diagnosis:
+def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceShape | None,
+               alpha: float, begun: float) -> Diagnosis:
     best = answer.given[0] if answer.given else case.base
     after = as_estimate(best, case.before) if answer.given else case.before
     proof = _proof(case, best)
@@ -275,10 +285,7 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, alpha: float, b
               + (f", correlation {level.rho:.2f} between neighbours" if level.rho else ", white")
               + f", from {level.source}."
               for levels in case.records.levels[:1] for o, level in levels.items()]
-    shape = force = None
-    if answer.verdict != "none":
-        shape = force_shape(case.base, case.sites[0], case.candidates)
-        force = force_over_time(case.base, case.sites[0])
+    force = None if answer.verdict == "none" else force_over_time(case.base, case.sites[0])
     return Diagnosis(
         answer.verdict, detection.p_value, alpha,
         locate(case.base, best, answer, case.sites, shape, force, alpha),

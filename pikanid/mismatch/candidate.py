@@ -14,6 +14,7 @@ from pikanid.model_parts import Parameter
 
 Channel = Literal["dynamics", "input", "sensor"]
 Array = np.ndarray
+SYMBOLIC = "symbolic:"  # before the formula, in the id of a law that no catalogue holds
 
 
 @dataclass(frozen=True)

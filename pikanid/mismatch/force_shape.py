@@ -13,7 +13,7 @@ hidden mode, memory, something that happens once, or of second order: then nothi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -26,9 +26,11 @@ from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import residual_tests
 from pikanid.mismatch.site import Site
 from pikanid.mismatch.tangent import directions
+from pikanid.symbolic.curve import Curve
 
 INTERVALS, DEGREE = 8, 3
 GRID = 101  # points at which an edge is drawn
+TYPICAL = 120  # and visited ones at which laws are compared with it
 GAUGE = 1e-3  # of a coefficient's sign: less is left when the free parameters can do the same
 LINEAR = 0.05  # of a straight line's sign: with less left the line is the free parameters' own
 ADEQUATE = 0.01
@@ -39,7 +41,9 @@ OWN = 0.1  # of what all edges explain: so much must be an edge's alone to count
 class Edge:
     """One edge: values (G,) and standard errors (G,) over its argument (G,), [unit of q''].
 
-    `own` is the share of what all edges explain that this one alone can.
+    `own` is the share of what all edges explain that no other edge can; `alone` the share that this
+    one can without the others, and `curve` what the data say of it then, for laws to be compared
+    with.
     """
 
     argument: str
@@ -48,6 +52,8 @@ class Edge:
     std: np.ndarray
     own: float
     p_value: float
+    alone: float
+    curve: Curve = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +100,18 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
         line = spline.sites()
         removed = np.linalg.norm(rest[:, own] @ line) < LINEAR * np.linalg.norm(D[:, own] @ line)
         values, std = spline.drawn(coefficients[own], covariance[np.ix_(own, own)], bool(removed))
+        seen = _without_constant(rest[:, own])
+        at = spline.typical()
+        curve = Curve.of_likelihood(
+            at, spline.matrix(at), coefficients[own], covariance[np.ix_(own, own)], seen.T @ seen,
+            seen.T @ target, samples=len(target),
+            free=at[:, None] if removed else np.empty((len(at), 0)), argument=name,
+            unit=f"{site.unit}/s^2")
+        lone = _explained((rest / size)[:, own], target)[0]
         edges.append(Edge(name, spline.grid, values, std,
                           float(gain / max(everything[0], 1e-300)),
-                          float(chi2.sf(gain, freedom)) if freedom > 0 else 1.0))
+                          float(chi2.sf(gain, freedom)) if freedom > 0 else 1.0,
+                          float(lone / max(everything[0], 1e-300)), curve))
     left = residual_tests(whitened, fit.theta, fit.r, np.hstack([fit.J, D]), candidates, site.rate)
     static: Literal[True] | None = True if left.p_value >= ADEQUATE else None
     return ForceShape(tuple(edges), f"{site.unit}/s^2", static)
@@ -122,6 +137,11 @@ class _Spline:
         """Coefficients (n,) of the identity (Greville's abscissae)."""
         t = self._knots()
         return np.array([t[i + 1:i + DEGREE + 1].mean() for i in range(len(t) - DEGREE - 1)])
+
+    def typical(self) -> np.ndarray:
+        """Some of the visited values, each once."""
+        visited = np.sort(self.visits)
+        return np.unique(visited[np.linspace(0, len(visited) - 1, TYPICAL).round().astype(int)])
 
     @property
     def grid(self) -> np.ndarray:
@@ -183,6 +203,13 @@ def _smoothed(rest: np.ndarray, target: np.ndarray, owner: np.ndarray, size: np.
     inverse = np.linalg.inv(chosen) if len(s) else np.zeros((0, 0))
     back = vt.T / size[:, None]
     return back @ inverse @ (s * pull), back @ inverse @ back.T
+
+
+def _without_constant(columns: np.ndarray) -> np.ndarray:
+    """Columns (rows, n) of an edge without what a constant force, the sum of them, can do."""
+    constant = columns.sum(axis=1)
+    constant = constant / max(float(np.linalg.norm(constant)), 1e-300)
+    return np.asarray(columns - np.outer(constant, constant @ columns))
 
 
 def _explained(columns: np.ndarray, target: np.ndarray) -> tuple[float, int]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pikanid.mismatch.candidate import Candidate, Sign
+from pikanid.mismatch.candidate import SYMBOLIC, Candidate, Sign
 from pikanid.mismatch.least_squares import Minimum, minimise
 from pikanid.mismatch.whitened import CERTAIN, GROSS, Records, Whitened
 from pikanid.model import Model
@@ -45,6 +45,11 @@ class Hypothesis:
     def known(self) -> bool:
         """Whether all effects are entries of the catalogue."""
         return all(e.known for e in self.effects)
+
+    @property
+    def symbolic(self) -> bool:
+        """Whether an effect is a formula that was read, not an entry of the catalogue."""
+        return any(e.ids[0].startswith(SYMBOLIC) for e in self.effects)
 
     @property
     def far(self) -> bool:

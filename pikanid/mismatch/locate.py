@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
-from pikanid.mismatch.candidate import Candidate, Channel
+from pikanid.mismatch.candidate import SYMBOLIC, Candidate, Channel
 from pikanid.mismatch.detect import unit_columns
 from pikanid.mismatch.force_shape import ForceShape
 from pikanid.mismatch.hypothesis import Hypothesis
@@ -40,10 +41,12 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[S
         channel = next(iter(channels))
     # what the new terms are made of
     states = tuple(n for n in site.model.state_names
-                   if any(n in e.expression for e in best.effects)) if answer.given else ()
+                   if any(re.search(rf"\b{n}\b", e.expression) for e in best.effects)
+                   ) if answer.given else ()
     static: bool | None = None
     if answer.given:
-        static = all(e.channel == "dynamics" and e.ids[0] in STATIC for e in best.effects)
+        static = all(e.channel == "dynamics" and (
+            e.ids[0] in STATIC or e.ids[0].startswith(SYMBOLIC)) for e in best.effects)
     elif shape is not None:
         states, static = shape.depends_on(alpha), shape.static_law
     spans: tuple[tuple[float, float], ...] = ()

@@ -157,6 +157,13 @@ class Search:
                 gap = without.minimum.chi2 - best.minimum.chi2
                 self._extend(without, MORE, PROMISING * gap)
 
+    def offer(self, formulas: Sequence[Candidate]) -> None:
+        """Fit laws that no catalogue holds, each alone."""
+        self.candidates += tuple(formulas)
+        for candidate in formulas:
+            if not self.tired:
+                self._fit((candidate,), [self.base().point])
+
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
         new = dataclasses.replace(self, records=records, fits={})

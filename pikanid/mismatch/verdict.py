@@ -35,6 +35,7 @@ class Answer:
     """Verdict, hypotheses given (most probable first) and the closest ones not given.
 
     `twins` lists, for a hypothesis given, the effects that stand for each other in it.
+    `contested`: entries of the catalogue would do, but so would laws outside it.
     """
 
     verdict: Verdict
@@ -42,6 +43,7 @@ class Answer:
     others: tuple[Hypothesis, ...]
     twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = field(default_factory=dict)
     reasons: dict[frozenset[str], str] = field(default_factory=dict)
+    contested: bool = False
 
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
@@ -86,7 +88,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             merged, twins = _merged(list(most), tried)
             return Answer("unconfirmed", tuple(merged),
                           tuple(h for h in rest if h not in most)[:5], twins, reasons)
-        return Answer("unnamed", (), rest[:5], {}, reasons)
+        return Answer("unnamed", (), rest[:5], {}, reasons, bool(known))
     merged, twins = _merged(known, tried)
     verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
@@ -130,8 +132,25 @@ def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothe
     One more effect of the catalogue that is nearly worth its penalty may be there: then it is for
     the reader to know.
     """
+    if h.symbolic and any(o.symbolic and len(o.minimum.theta) < len(h.minimum.theta)
+                          and o.score(scale) <= h.score(scale) for o in given):
+        return True  # a longer formula for the same
     return any(o.key < h.key and _handicapped(o, scale) + (
         0.0 if o in given and not h.known else WITHIN) <= _handicapped(h, scale) for o in near)
+
+
+def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, test: Test,
+                  predict: Predict, checked: bool, proves: bool) -> Answer:
+    """The answer where nothing in the catalogue would do, after formulas have been fitted as well.
+
+    A formula stands for the law outside the catalogue that kept names away; it is given where it
+    explains about as much as the best of those and predicts what is held out.
+    """
+    laws = [h.minimum.chi2 for h in ranked if h.symbolic]
+    if not laws or min(laws) > ranked[0].minimum.chi2 + WITHIN * scale:
+        return answer
+    found = settle([h for h in ranked if h.known], scale, test, predict, checked, proves)
+    return found if found.given and all(h.symbolic for h in found.given) else answer
 
 
 def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
