@@ -17,6 +17,10 @@ from pikanid.recording import Recording
 
 LONGEST = 50  # samples of a gap that a line across it is followed over
 QUIET = 100  # samples of a quiet stretch that say something about low frequencies
+ABOVE = 6.0  # natural frequencies from which on a residual is noise
+BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
+BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
+CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
         level: So far.
         channel: Of the output.
         t, residual: (N,) of the fit at the samples that are there.
-        rate: Natural frequency [rad/s]: the residual counts from six times that on.
+        rate: Natural frequency [rad/s]: the residual counts from `ABOVE` times that on.
         quiet: Stretch in which nothing moves, if one is known.
     """
     from scipy.signal.windows import tukey
@@ -98,7 +102,8 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     omega = np.linspace(0, np.pi, len(power))
     power /= np.maximum(bridged(grid), 0.1)
     # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
-    high = (omega > np.clip(6 * rate * h, 0.25 * np.pi, 0.6 * np.pi)) & (omega < 0.97 * np.pi)
+    low, top = (share * np.pi for share in BEGINS)
+    high = (omega > np.clip(ABOVE * rate * h, low, top)) & (omega < 0.97 * np.pi)
     spectra = [(omega[high], power[high], 0.9 * share)]
     source = "the residual's highest frequencies"
     found = quiet or level.stretch
@@ -157,7 +162,7 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
             w * np.sum(np.log(s)) for (_, _, w), s in zip(spectra, shapes, strict=True)))
         scales.append(scale)
     best = int(np.argmin(costs))
-    if costs[0] - costs[best] < 0.5 * np.log(total):
+    if costs[0] - costs[best] < BELIEVED * np.log(total):
         best = 0
     rho, scale = float(grid[best]), float(scales[best])
     curve = 0.0
@@ -170,6 +175,6 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
 
 
 def _calm(ratio: np.ndarray) -> np.ndarray:
-    """Ordinates limited to seven times their median's mean: a line in the band is no noise."""
-    return np.minimum(ratio, 7 * float(np.median(ratio)) / np.log(2))
+    """Ordinates limited to `CALM` times their median's mean: a line in the band is no noise."""
+    return np.minimum(ratio, CALM * float(np.median(ratio)) / np.log(2))
 

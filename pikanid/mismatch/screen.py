@@ -11,6 +11,7 @@ from pikanid.mismatch.detect import unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis, Start, start_from
 from pikanid.mismatch.tangent import Directions, directions
 
+FAINT, FAINT_PAIR = 3.0, 6.0  # χ² that one effect, and two, must gain to first order to be tried
 EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # of |v|, that have names
 
 
@@ -71,7 +72,7 @@ class Screen:
                        key=lambda k: -self.gain[several[k][0]])
         listed: list[tuple[Candidate, list[Start]]] = []
         for k in order:
-            if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < 3.0 and listed):
+            if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < FAINT and listed):
                 break
             candidate = self.found.candidates[k]
             signs = several[k] if len(candidate.parameters) > 1 or not self.found.signs[
@@ -112,7 +113,7 @@ class Screen:
             i, j = divmod(int(flat), len(z))
             pair = (int(owner[i]), int(owner[j]))
             a, b = (self.found.candidates[k] for k in pair)
-            if gain[i, j] < 6.0 or len(listed) == count:
+            if gain[i, j] < FAINT_PAIR or len(listed) == count:
                 break
             if pair in taken or (a.twin and a.twin == b.twin):
                 continue
