@@ -21,12 +21,15 @@ from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.latent_force import force_over_time
 from pikanid.mismatch.locate import locate, smallest
 from pikanid.mismatch.outliers import without_lone
+from pikanid.mismatch.patch import patch
 from pikanid.mismatch.preparation import (
     check_pair,
+    held_as_recorded,
     oversampling,
     prepared,
     set_aside,
     with_refined_noise,
+    with_sigma,
 )
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
@@ -117,7 +120,12 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         search.offer(symbolic_candidates(shape, case.sites[0]))
         answer = with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
                                case.later is not None, case.proves)
-    return _diagnosis(case, detection, answer, shape, alpha, begun)
+    mend = None
+    if shape is not None and answer.verdict == "unnamed" and case.later is not None:
+        mend = patch(case.base, case.model, shape, case.sites[0], case.records, case.later,
+                     case.predicted)
+    return replace(_diagnosis(case, detection, answer, shape, alpha), patch=mend,
+                   seconds=time.perf_counter() - begun)
 
 
 @dataclass
@@ -231,7 +239,7 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
         check_pair(train, later)
     else:
         train, later = set_aside(train, model, notes)
-    model = _held_as_recorded(model, train)
+    model = held_as_recorded(model, train)
     tell("nominal fit")
     together = oversampling(model, train)
     if together > 1:
@@ -239,9 +247,9 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
                      "them moves fast enough to need more.")
     records = prepared(model, train, quiet, notes, together)
     short = records.beginning(SEARCHED)
-    before = NLS().fit(model, _with_sigma(short, model))
+    before = NLS().fit(model, with_sigma(short, model))
     if short is not records:
-        before = NLS(starts=1).fit(before.fitted_model, _with_sigma(records, model))
+        before = NLS(starts=1).fit(before.fitted_model, with_sigma(records, model))
     nominal = before.fitted_model
     rate = sites(nominal, records.recordings)[0].rate
     records, count = with_refined_noise(records, before, rate, quiet)
@@ -263,20 +271,8 @@ def _note_outliers(count: int, where: str, notes: list[str]) -> None:
         notes.append(f"{count} more outliers of {where} show beside a fit and are left out.")
 
 
-def _held_as_recorded(model: Model, train: tuple[Recording, ...]) -> Model:
-    """A recording that declares how an input is held overrides the model."""
-    return model.replace(inputs=tuple(
-        replace(i, hold=train[0][i.name].hold or i.hold) if i.name in train[0] else i
-        for i in model.inputs))
-
-
-def _with_sigma(records: Records, model: Model) -> list[Recording]:
-    return [r.with_sigma({o: levels[o].sigma for o in model.output_names})
-            for r, levels in zip(records.recordings, records.levels, strict=True)]
-
-
 def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceShape | None,
-               alpha: float, begun: float) -> Diagnosis:
+               alpha: float) -> Diagnosis:
     best = answer.given[0] if answer.given else case.base
     after = as_estimate(best, case.before) if answer.given else case.before
     proof = _proof(case, best)
@@ -292,7 +288,7 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
         given, rejected, case.before, after, proof, tuple(levels), tuple(case.notes),
         smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves),
-        time.perf_counter() - begun, shape, force)
+        shape=shape, force_over_time=force)
 
 
 def _proof(case: Case, best: Hypothesis) -> Proof | None:

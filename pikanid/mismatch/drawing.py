@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from pikanid.mismatch.force_shape import ForceShape
     from pikanid.mismatch.latent_force import ForceOverTime
+    from pikanid.mismatch.patch import Patch
     from pikanid.mismatch.result import Diagnosis
 
 BEFORE, AFTER, DATA, LOUD = "#c2410c", "#1d4ed8", "#9ca3af", "#fde68a"
@@ -31,8 +32,8 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
     upper: matplotlib.figure.FigureBase = figure
     if dx.shape is not None:
         upper, lower = figure.subfigures(
-            2, 1, squeeze=False, height_ratios=[rows, 1.1])[:, 0]
-        _shape(lower, dx.shape)
+            2, 1, squeeze=False, height_ratios=[rows, 1.2])[:, 0]
+        _shape(lower, dx.shape, dx.patch)
     axes = np.atleast_1d(upper.subplots(rows, 1))
     _train(axes[0], dx)
     if force is not None:
@@ -87,15 +88,25 @@ def _force(axis: matplotlib.axes.Axes, force: ForceOverTime) -> None:
              "parameters can do")
 
 
-def _shape(figure: matplotlib.figure.FigureBase, shape: ForceShape) -> None:
+def _shape(figure: matplotlib.figure.FigureBase, shape: ForceShape, patch: Patch | None) -> None:
     figure.suptitle("Missing force, without what the free parameters can do (to first order)",
                     fontsize="medium")
-    axes = np.atleast_1d(figure.subplots(1, len(shape.edges)))
-    for axis, edge in zip(axes, shape.edges, strict=True):
+    count = len(shape.edges)
+    axes = np.atleast_1d(figure.subplots(1, count + (patch is not None)))
+    for axis, edge in zip(axes[:count], shape.edges, strict=True):
         axis.fill_between(edge.grid, edge.values - 1.96 * edge.std, edge.values + 1.96 * edge.std,
                           color=AFTER, alpha=0.2, lw=0)
         axis.plot(edge.grid, edge.values, color=AFTER, lw=1.2)
         axis.axhline(0.0, color=DATA, lw=0.8)
-        axis.set_xlabel(f"{edge.argument}   ({100 * edge.own:.0f} % explained by it alone)")
+        axis.set_xlabel(f"{edge.argument}\n({100 * edge.alone:.0f} % explained)")
+        axis.grid(alpha=0.2)
+    if patch is not None:
+        axis = axes[-1]
+        axis.fill_between(patch.grid, patch.values - 1.96 * patch.std,
+                          patch.values + 1.96 * patch.std, color=BEFORE, alpha=0.2, lw=0)
+        axis.plot(patch.grid, patch.values, color=BEFORE, lw=1.2)
+        axis.axhline(0.0, color=DATA, lw=0.8)
+        axis.set_title("KAN patch, refitted", fontsize="medium")
+        axis.set_xlabel(f"{patch.argument}\n(nothing beyond)")
         axis.grid(alpha=0.2)
     axes[0].set_ylabel(shape.unit)

@@ -144,3 +144,16 @@ def check_pair(train: tuple[Recording, ...], later: tuple[Recording, ...]) -> No
                 raise errors.BadRecording(errors.held_out_channels(b.name, missing))
             if all(np.array_equal(a[n].values, b[n].values, equal_nan=True) for n in a.names):
                 raise errors.BadRecording(errors.held_out_same(a.name, b.name))
+
+
+def held_as_recorded(model: Model, train: tuple[Recording, ...]) -> Model:
+    """A recording that declares how an input is held overrides the model."""
+    return model.replace(inputs=tuple(
+        replace(i, hold=train[0][i.name].hold or i.hold) if i.name in train[0] else i
+        for i in model.inputs))
+
+
+def with_sigma(records: Records, model: Model) -> list[Recording]:
+    """The recordings with the standard deviation of the noise that was found."""
+    return [r.with_sigma({o: levels[o].sigma for o in model.output_names})
+            for r, levels in zip(records.recordings, records.levels, strict=True)]

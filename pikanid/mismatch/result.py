@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from pikanid.mismatch.force_shape import ForceShape
     from pikanid.mismatch.latent_force import ForceOverTime
+    from pikanid.mismatch.patch import Patch
 
 Verdict = Literal["none", "named", "set", "unconfirmed", "unnamed"]
 
@@ -111,6 +112,8 @@ class Diagnosis:
         shape: The missing force over each state and input, to first order; None without a mismatch.
         force_over_time: The force that would explain the mismatch, over time, with its band; None
             without a mismatch, or where it cannot be computed.
+        patch: An edge without a name that improves the prediction; None where something is named,
+            or where it is no help.
     """
 
     verdict: Verdict
@@ -129,6 +132,7 @@ class Diagnosis:
     seconds: float = 0.0
     shape: ForceShape | None = None
     force_over_time: ForceOverTime | None = None
+    patch: Patch | None = None
 
     @property
     def mismatch(self) -> bool:

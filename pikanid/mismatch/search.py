@@ -83,9 +83,10 @@ class Search:
             if adequate(best) or self.tired:
                 break
             self.tell(f"{count + 1} effects together")
-            leading = [h for h in self.ranked() if h.effects][: LEADING if count == 1 else 1]
-            near = FAR * (best.minimum.chi2 + best.whitened.rows)
-            leading = [h for h in leading if h.minimum.chi2 < near]
+            leading = self._leading()[: LEADING if count == 1 else 1]
+            rows = best.whitened.rows
+            near = rows + FAR * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
+            leading = [h for h in leading if h is best or h.minimum.chi2 < near]
             for hypothesis in leading:
                 if len(hypothesis.effects) < MOST:
                     self._extend(hypothesis, MORE if count == 1 else LATER)
@@ -104,6 +105,14 @@ class Search:
         for h in self._contenders():
             self._with_power_laws(h)
         return self.ranked()
+
+    def _leading(self) -> list[Hypothesis]:
+        """Hypotheses to extend, best first: none that only adds effects to a better one."""
+        found: list[Hypothesis] = []
+        for h in self.ranked():
+            if h.effects and not any(o.key < h.key for o in found):
+                found.append(h)
+        return found
 
     def _contenders(self) -> Iterator[Hypothesis]:
         """The hypotheses that score about as well as the best."""

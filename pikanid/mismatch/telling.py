@@ -29,6 +29,9 @@ def lines_of(dx: Diagnosis) -> list[str]:
         p = dx.held_out
         lines.append(f"Proof: held-out RMSE {p.rmse_before:.3g} -> {p.rmse_after:.3g} {p.unit} "
                      f"(noise {p.noise:.3g}), p = {p.p_value:.2g}")
+    if dx.patch is not None:
+        unit = dx.held_out.unit if dx.held_out is not None else ""
+        lines.append(f"Patch: {dx.patch.sentence(unit)}.")
     if dx.next_experiment:
         lines.append(f"Next: {dx.next_experiment}")
     return [*lines, *dx.noise, *dx.notes]

@@ -16,7 +16,7 @@ from pikanid.simulation.simulator import Response, Steps
 
 CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
 FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
-SHARP = 4  # steps a sample from which on it is better to stop at corners than to run through them
+SHARP = 8  # steps a sample from which on it is better to stop at corners than to run through them
 GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
 
 

@@ -41,7 +41,7 @@ def page(dx: Diagnosis, title: str) -> str:
         f"<h1>What is missing? {escape(title)}</h1>",
         f'<p class="verdict {dx.verdict}">{escape(dx.sentence())}</p>',
         _where(dx) if dx.mismatch else "",
-        _what(dx), _figure(dx), _proof(dx), _next(dx),
+        _what(dx), _figure(dx), _proof(dx), _patch(dx), _next(dx),
         "<h2>Noise and notes</h2><ul>" + "".join(
             f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes)) + "</ul>",
         f'<p class="small">p = {dx.p_value:.2g} at a false-alarm rate of {dx.alpha:g}; '
@@ -122,6 +122,13 @@ def _proof(dx: Diagnosis) -> str:
         return "<p>There is no held-out recording: nothing can be proved.</p>"
     return (f"<p>Held-out RMSE: {proof.rmse_before:.3g} before, {proof.rmse_after:.3g} after, "
             f"noise {proof.noise:.3g} {escape(proof.unit)}; p = {proof.p_value:.2g}.</p>")
+
+
+def _patch(dx: Diagnosis) -> str:
+    if dx.patch is None:
+        return ""
+    unit = dx.held_out.unit if dx.held_out is not None else ""
+    return f"<h2>Until it is understood</h2><p>Patch: {escape(dx.patch.sentence(unit))}.</p>"
 
 
 def _next(dx: Diagnosis) -> str:

@@ -1,0 +1,73 @@
+"""Laws outside the catalogue: formulas that are read and confirmed, and edges without a name."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+import pikanid as pk
+from pikanid import excitation, simulate, systems
+from pikanid.mismatch.api import Case, _opened
+from pikanid.mismatch.candidate import SYMBOLIC
+from pikanid.mismatch.force_shape import force_shape
+from pikanid.mismatch.patch import patch
+from pikanid.mismatch.symbols import symbolic_candidates
+
+SIGMA = 0.1 * np.pi / 180
+EVEN = systems.sloshing().with_term(
+    "theta_dot", "-k*theta**2", [pk.Parameter("k", -60.0, "1/(s^2*rad)")])
+
+
+def recorded(truth: pk.Model, seed: int, duration: float = 8.0) -> pk.Recording:
+    moves = excitation.planar_moves(4, duration, seed=seed)
+    return simulate(truth, moves, sigma=SIGMA, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return _opened(systems.sloshing(), (recorded(EVEN, 1),), (recorded(EVEN, 2),), None,
+                   lambda text: None)
+
+
+def test_the_missing_law_is_among_the_formulas(case: Case) -> None:
+    shape = force_shape(case.base, case.sites[0], case.candidates)
+    formulas = [c.ids[0] for c in symbolic_candidates(shape, case.sites[0])]
+    assert f"{SYMBOLIC}a_theta*theta**2" in formulas
+    assert f"{SYMBOLIC}a_theta*theta**3" not in formulas  # the catalogue's own
+
+
+def test_a_patch_predicts_better_inside_its_range(case: Case) -> None:
+    shape = force_shape(case.base, case.sites[0], case.candidates)
+    found = patch(case.base, case.model, shape, case.sites[0], case.records, case.later,
+                  case.predicted)
+    assert found is not None and found.argument == "theta"
+    assert found.rmse_after < 1.3 * SIGMA < found.rmse_before
+    assert np.corrcoef(found.values, bent(found.grid, 60.0 * found.grid**2))[0, 1] > 0.98
+    # the B-spline in the model is the edge that was fitted
+    spline = found.model.splines[0]
+    coefficients = [found.model.values[n] for n in spline.coefficient_names]
+    edge = BSpline(spline.knots, coefficients, spline.degree)(found.grid)
+    np.testing.assert_allclose(bent(found.grid, edge), found.values, atol=1e-9)
+
+
+def bent(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Without its best straight line."""
+    return y - np.polynomial.Polynomial.fit(x, y, 1)(x)
+
+
+def test_a_clean_recording_offers_no_patch() -> None:
+    opened = _opened(systems.sloshing(), (recorded(systems.sloshing(), 1),),
+                     (recorded(systems.sloshing(), 2),), None, lambda text: None)
+    shape = force_shape(opened.base, opened.sites[0], opened.candidates)
+    assert patch(opened.base, opened.model, shape, opened.sites[0], opened.records, opened.later,
+                 opened.predicted) is None
+
+
+@pytest.mark.slow
+def test_a_law_outside_the_catalogue_is_named_as_a_formula() -> None:
+    dx = pk.diagnose(systems.sloshing(), recorded(EVEN, 1, 20.0), recorded(EVEN, 2, 20.0))
+    assert dx.verdict == "named"
+    effect = dx.hypotheses[0].effects[0]
+    assert effect.ids == (f"{SYMBOLIC}a_theta*theta**2",)
+    value = next(iter(effect.parameters.values()))
+    assert abs(value.value - 60.0) < 4 * value.std
+    assert value.unit == "1/(rad*s^2)"
