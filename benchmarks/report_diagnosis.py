@@ -1,7 +1,8 @@
 """How good are diagnoses?  Open sets of concealed recordings, scored: `reports/diagnosis.md`.
 
     python benchmarks/report_diagnosis.py [FOLDER] [--work build/diagnosis] [--cases 60]
-        [--workers 2] [--only rich ...] [--alarms 400] [--recordings silverbox ...]
+        [--workers 2] [--only rich ...] [--alarms 400] [--thresholds 8]
+        [--recordings silverbox ...]
 
 Every set is made from its seed, every diagnosis is kept in the work folder: an interrupted run goes
 on where it stopped.  Nothing of the truth reaches a diagnosis.
@@ -21,6 +22,7 @@ from typing import Any
 
 import diagnosis_alarms
 import diagnosis_real
+import diagnosis_thresholds
 import numpy as np
 from provenance import provenance
 
@@ -60,6 +62,9 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--alarms", type=int, default=400,
                         help="clean recordings of each noise; 0 for none")
+    parser.add_argument("--thresholds", type=int, default=8,
+                        help="cases of each set that are diagnosed again with every threshold "
+                             "changed; 0 for none")
     parser.add_argument("--only", choices=[s.name for s in SETS], action="append")
     parser.add_argument("--recordings", choices=list(diagnosis_real.RECORDINGS), nargs="*",
                         default=list(diagnosis_real.RECORDINGS), help="real ones to diagnose")
@@ -70,6 +75,9 @@ def main() -> None:
         parts.append(_section(one, list(_diagnosed(one, given.work, given.cases, given.workers))))
     if given.alarms:
         parts.append(diagnosis_alarms.section(given.alarms, given.work, given.workers))
+    if given.thresholds:
+        parts.append(diagnosis_thresholds.section(
+            given.thresholds, given.work, given.workers, [s.name for s in chosen]))
     if not given.only:
         parts.append(_real(given.work, given.recordings))
     atomically(given.folder / "diagnosis.md", "\n".join(parts).encode())
