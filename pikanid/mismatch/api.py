@@ -277,10 +277,7 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
     after = as_estimate(best, case.before) if answer.given else case.before
     proof = _proof(case, best)
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
-    levels = [f"Noise of '{o}': sigma = {level.sigma:.3g}"
-              + (f", correlation {level.rho:.2f} between neighbours" if level.rho else ", white")
-              + f", from {level.source}."
-              for levels in case.records.levels[:1] for o, level in levels.items()]
+    levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, case.sites[0])
     return Diagnosis(
         answer.verdict, detection.p_value, alpha,

@@ -43,6 +43,11 @@ class Level:
     source: str
     stretch: tuple[float, float] | None = None
 
+    def sentence(self, output: str) -> str:
+        """What was found."""
+        colour = f"correlation {self.rho:.2f} between neighbours" if self.rho else "white"
+        return f"Noise of '{output}': sigma = {self.sigma:.3g}, {colour}, from {self.source}."
+
     def whiten(self, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Rows (N,) or (N, k) at times t as white noise of unit variance.
 
