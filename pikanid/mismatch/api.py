@@ -42,6 +42,8 @@ from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
 SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
+EXPLAINED = 0.05  # p-value above which a search need not go on
+SAME, SAME_RHO = 0.05, 0.06  # changes of a noise level, and its correlation, that make none
 BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
 Recordings = Recording | Sequence[Recording]
 
@@ -89,7 +91,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         raise errors.BadModel(errors.nothing_free(model.name))
     case = _opened(model, _several(train), None if held_out is None else _several(held_out),
                    quiet, tell)
-    tell("noise and detection")
+    tell("detection")
     detection = case.test(case.base)
     if detection.p_value >= alpha:
         answer = Answer("none", (), ())
@@ -173,7 +175,7 @@ class Case:
         new, count = with_refined_noise(self.records, fit, self.rate, quiet)
         _note_outliers(count, "the recording", self.notes)
         same = all(
-            abs(np.log(a[o].sigma / b[o].sigma)) < 0.05 and abs(a[o].rho - b[o].rho) < 0.06
+            abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO
             for a, b in zip(self.records.levels, new.levels, strict=True) for o in a)
         if same and not count:
             return False
@@ -196,7 +198,7 @@ class Case:
 
     def adequate(self, h: Hypothesis) -> bool:
         """Whether nothing is left in the train recordings."""
-        return not h.far and self.test(h).p_value > 0.05
+        return not h.far and self.test(h).p_value > EXPLAINED
 
     def test(self, h: Hypothesis) -> Detection:
         """What is left in the train recordings."""
@@ -275,26 +277,23 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
                alpha: float) -> Diagnosis:
     best = answer.given[0] if answer.given else case.base
     after = as_estimate(best, case.before) if answer.given else case.before
-    proof = _proof(case, best)
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
     levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, case.sites[0])
     return Diagnosis(
         answer.verdict, detection.p_value, alpha,
         locate(case.base, best, answer, case.sites, shape, force, alpha),
-        given, rejected, case.before, after, proof, tuple(levels), tuple(case.notes),
+        given, rejected, case.before, after, _proof(case, best), tuple(levels), tuple(case.notes),
         smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves),
         shape=shape, force_over_time=force)
 
 
 def _proof(case: Case, best: Hypothesis) -> Proof | None:
-    if case.later is None:
-        return None
     before, after = case.predicted(case.base), case.predicted(best)
-    if before is None or after is None:
+    if case.later is None or before is None or after is None:
         return None
-    output = case.model.outputs[0]
     sigma = next(iter(case.later.levels[0].values())).sigma
-    return Proof(before.rmse, after.rmse, sigma, output.unit, after.detection.p_value, after.t,
-                 after.measured, before.predicted, after.predicted)
+    return Proof(before.rmse, after.rmse, sigma, case.model.outputs[0].unit,
+                 after.detection.p_value, after.t, after.measured, before.predicted,
+                 after.predicted)

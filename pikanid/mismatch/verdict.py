@@ -19,6 +19,7 @@ WITHIN = 6.0  # difference of the criterion below which hypotheses are not told 
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
+WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
 OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
 PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
 NARROW = 0.03  # of the swing: a loop no wider is dry friction that gives a little before it slips
@@ -156,7 +157,7 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
 def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
     """A power law whose exponent is sharply a whole number is left to the law of that name."""
     kept = [h for h in near if not any(
-        (gap := _exponent_gap(h, whole)) is not None and gap < 1 and _sharp(h)
+        (gap := _exponent_gap(h, whole)) is not None and gap < WHOLE and _sharp(h)
         for whole in (0, 1, 2))]
     return kept or near
 
@@ -184,7 +185,7 @@ def _sharp(h: Hypothesis) -> bool:
 def _open_exponent(h: Hypothesis, whole: float) -> bool:
     """Whether the exponent of a hypothesis' power law may be `whole`, or something else as well."""
     gap = _exponent_gap(h, whole)
-    return gap is not None and gap < OPEN and not (gap < 1 and _sharp(h))
+    return gap is not None and gap < OPEN and not (gap < WHOLE and _sharp(h))
 
 
 def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) -> Hypothesis | None:
