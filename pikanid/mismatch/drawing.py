@@ -59,7 +59,9 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
                         label="±2σ of the noise")
         below[1].set(ylabel=proof.unit or "residual", title="Held-out recording: what is left")
     for axis in axes:
-        axis.margins(x=0.01, y=0.3)  # room for the legend
+        axis.margins(x=0.01)
+        if axis.get_autoscaley_on():
+            axis.margins(y=0.3)  # room for the legend
         axis.legend(loc="upper right", fontsize=8, ncols=4)
         axis.grid(alpha=0.2)
     axes[-1].set_xlabel("t [s]")
@@ -84,6 +86,9 @@ def _force(axis: matplotlib.axes.Axes, force: ForceOverTime) -> None:
     axis.plot(force.t, force.values, color=AFTER, lw=1.0,
               label=f"mean over {force.resolution:.2g} s")
     axis.axhline(0.0, color=DATA, lw=0.8)
+    # a spike, as where a recording begins beside its model, must not flatten all the rest
+    reach = np.quantile(np.abs(force.values) + force.critical * force.std, 0.98)
+    axis.set_ylim(-1.1 * reach, 1.7 * reach)
     axis.set(ylabel=force.unit, title="Force that would explain it, without what the free "
              "parameters can do")
 

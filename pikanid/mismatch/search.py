@@ -22,6 +22,7 @@ PROMISING = 0.5  # of what an effect gained, to first order, that another in its
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
 EFFORT = 1.2e7  # states times steps simulated, after which nothing new is begun
+WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
 
@@ -103,7 +104,7 @@ class Search:
                 self._exchange(h)
             self._simplify()
         for h in self._contenders():
-            self._with_power_laws(h)
+            self._with_wider_laws(h)
         return self.ranked()
 
     def _leading(self) -> list[Hypothesis]:
@@ -184,16 +185,25 @@ class Search:
                 new._fit(h.effects, [h.point])
         return new
 
-    def _with_power_laws(self, best: Hypothesis) -> None:
-        """Fit the law of free exponent beside each law of whole exponent that it contains."""
+    def _with_wider_laws(self, best: Hypothesis) -> None:
+        """Fit what contains a law of a hypothesis as a special case in its place: the law of free
+        exponent, and laws outside the catalogue.
+        """
         for effect in best.effects:
             for other in self.candidates:
-                if other.known and effect.key in other.covers:
-                    rest = [e for e in best.effects if e is not effect and e is not other]
+                if effect.key not in other.covers:
+                    continue
+                rest = [e for e in best.effects if e is not effect and e is not other]
+                size, *more = other.parameters
+                if other.known:
                     n = {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8)
-                    size = {other.parameters[0].name: as_strong(best, effect, other, n),
-                            other.parameters[1].name: n}
-                    self._fit((*rest, other), [{**best.point, **size}])
+                    starts = [{size.name: as_strong(best, effect, other, n), more[0].name: n}]
+                else:
+                    starts = [{size.name: as_strong(best, effect, other),
+                               **{p.name: p.value for p in more},
+                               more[-1].name: share * more[-1].value} for share in WIDER]
+                self._fit((*rest, other), [{**best.point, **start} for start in starts],
+                          again=not other.known)
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""

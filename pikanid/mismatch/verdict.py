@@ -16,6 +16,7 @@ from pikanid.mismatch.screen import EXPONENTS
 from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
+BEHIND = 3.0  # times that, and a hypothesis can still be the one that predicts best
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
@@ -67,22 +68,31 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     near = [h for h in tried if _handicapped(h, scale) < lowest + WITHIN
             or (not h.known and h.score(scale) < lowest + RIVAL)]
     near = _integer_laws(near)
-    given = []
-    for h in near:
+
+    def total(h: Hypothesis) -> float:
+        return _total(h, predict(h), scale) if predict(h) or not checked else np.inf
+
+    def passes(h: Hypothesis) -> bool:
         if test(h).p_value < ADEQUATE:
             reasons[h.key] = "leaves something unexplained in the recording"
         elif checked and ((prediction := predict(h)) is None
                          or prediction.detection.p_value < ADEQUATE):
             reasons[h.key] = "does not predict the held-out recording"
-        else:
-            given.append(h)
+        return h.key not in reasons
+
+    given = [h for h in near if passes(h)]
     given = [h for h in given if not _needless(h, near, given, scale)]
+    if checked:
+        # what the recording itself speaks against a little, the held-out one may speak for clearly
+        best = min(map(total, near))
+        given += [h for h in _integer_laws(tried) if h not in near
+                  and h.score(scale) < lowest + BEHIND * WITHIN and total(h) < best and passes(h)]
     if checked and len(given) > 1:
-        given = _by_evidence(given, predict, scale, reasons)
+        given = _by_evidence(given, total, reasons)
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
-    if not known or (outside and min(h.score(scale) for h in outside)
-                     < min(h.score(scale) for h in known) + RIVAL):
+    if not known or (outside and min(map(total, outside)) - GUARD
+                     < min(map(total, known)) + RIVAL):
         rest = tuple(h for h in near if h not in given) + tuple(given)
         most = _largest_part(base, tried, scale, predict) if not given else ()
         if most:
@@ -123,6 +133,11 @@ def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
 
 def _handicapped(h: Hypothesis, scale: float) -> float:
     return h.score(scale) + GUARD * sum(not e.known for e in h.effects)
+
+
+def _total(h: Hypothesis, predicted: HeldOut | None, scale: float) -> float:
+    """The criterion over the recording and the held-out one, where there is one."""
+    return _handicapped(h, scale) + (0.0 if predicted is None else predicted.evidence / scale)
 
 
 def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothesis],
@@ -195,13 +210,12 @@ def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) ->
                  if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
 
 
-def _by_evidence(given: list[Hypothesis], predict: Predict, scale: float,
+def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
                  reasons: dict[frozenset[str], str]) -> list[Hypothesis]:
     """Without those that predict the held-out recording clearly worse than another does."""
-    found = {h.key: p.evidence / scale + _handicapped(h, scale) for h in given
-             if (p := predict(h)) is not None}
+    found = {h.key: total(h) for h in given}
     best = min(found.values())
-    kept = [h for h in given if found.get(h.key, np.inf) < best + WITHIN]
+    kept = [h for h in given if found[h.key] < best + WITHIN]
     for h in given:
         if h not in kept:
             reasons[h.key] = "predicts the held-out recording worse"
@@ -247,11 +261,7 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict
     if not pool:
         return (), ()
 
-    def total(h: Hypothesis) -> float:
-        p = predict(h) if h in answer.given else None
-        return _handicapped(h, scale) + (p.evidence / scale if p is not None else 0.0)
-
-    scores = np.array([total(h) for h in answer.given] or [0.0])
+    scores = np.array([_total(h, predict(h), scale) for h in answer.given] or [0.0])
     weights = np.exp(-0.5 * (scores - scores.min()))
     weights = weights / weights.sum()
 
