@@ -155,9 +155,7 @@ class Case:
     def begin_search(self) -> Search:
         """A search on as much of the recordings as can be searched in a minute."""
         short = self.records.beginning(SEARCHED)
-        if short is self.records:
-            return self.search
-        return self.resumed(self.search, short)
+        return self.search if short is self.records else self.resumed(self.search, short)
 
     def resumed(self, search: Search, records: Records | None = None) -> Search:
         """A search with what it has found, on other records: by default on all."""
@@ -283,17 +281,19 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
     return Diagnosis(
         answer.verdict, detection.p_value, alpha,
         locate(case.base, best, answer, case.sites, shape, force, alpha),
-        given, rejected, case.before, after, _proof(case, best), tuple(levels), tuple(case.notes),
-        smallest(case.base, case.candidates),
-        advice(answer.verdict, given, case.records, case.rate, case.proves),
-        shape=shape, force_over_time=force)
+        given, rejected, case.before, after, _proof(case, answer, best), tuple(levels),
+        tuple(case.notes), smallest(case.base, case.candidates),
+        advice(answer.verdict, given, case.records, case.rate, case.proves), shape=shape,
+        force_over_time=force)
 
 
-def _proof(case: Case, best: Hypothesis) -> Proof | None:
+def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
     before, after = case.predicted(case.base), case.predicted(best)
     if case.later is None or before is None or after is None:
         return None
-    sigma = next(iter(case.later.levels[0].values())).sigma
+    # all that a named model leaves is noise, not its highest frequencies alone
+    share = best.noise if answer.verdict in ("named", "set") else 1.0
+    sigma = next(iter(case.later.levels[0].values())).sigma * share
     return Proof(before.rmse, after.rmse, sigma, case.model.outputs[0].unit,
                  after.detection.p_value, after.t, after.measured, before.predicted,
                  after.predicted)

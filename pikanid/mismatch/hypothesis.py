@@ -57,6 +57,11 @@ class Hypothesis:
         return self.minimum.chi2 > CERTAIN * max(self.whitened.rows, 1)
 
     @property
+    def noise(self) -> float:
+        """Standard deviation of what is left, in units of the noise that was assumed."""
+        return (self.minimum.chi2 / max(self.whitened.rows - len(self.minimum.theta), 1)) ** 0.5
+
+    @property
     def values(self) -> dict[str, float]:
         """Estimates by name; the first recording's where each has its own."""
         both = list(zip(self.whitened.problem.free, self.minimum.theta, strict=True))
