@@ -16,7 +16,7 @@ from pikanid.mismatch.screen import EXPONENTS
 from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
-BEHIND = 3.0  # times that, and a hypothesis can still be the one that predicts best
+BEHIND = 3.0  # times that, and a law outside the catalogue can still be what predicts best
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
@@ -83,9 +83,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     given = [h for h in near if passes(h)]
     given = [h for h in given if not _needless(h, near, given, scale)]
     if checked:
-        # what the recording itself speaks against a little, the held-out one may speak for clearly
+        # a law outside the catalogue that the recording speaks against a little may predict better
         best = min(map(total, near))
-        given += [h for h in _integer_laws(tried) if h not in near
+        given += [h for h in tried if not h.known and h not in near
                   and h.score(scale) < lowest + BEHIND * WITHIN and total(h) < best and passes(h)]
     if checked and len(given) > 1:
         given = _by_evidence(given, total, reasons)
