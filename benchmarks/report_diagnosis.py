@@ -30,6 +30,7 @@ from pikanid.concealed.generate import generate
 from pikanid.concealed.score import Score, Share, judge, reliability, tally
 from pikanid.concealed.seal import Settings
 from pikanid.errors import DatasetUnavailable
+from pikanid.plots import new_figure, save_figure
 from pikanid.writing import atomically
 
 DEGREE = math.pi / 180
@@ -71,8 +72,13 @@ def main() -> None:
     given = parser.parse_args()
     chosen = [s for s in SETS if not given.only or s.name in given.only]
     parts = ["# Diagnoses of concealed recordings\n", provenance(), INTRODUCTION]
+    every: list[Score] = []
     for one in chosen:
-        parts.append(_section(one, list(_diagnosed(one, given.work, given.cases, given.workers))))
+        found = list(_diagnosed(one, given.work, given.cases, given.workers))
+        parts.append(_section(one, found))
+        every += [score for score, _ in found]
+    if len(chosen) > 1:
+        parts.append(_together(every, given.folder))
     if given.alarms:
         parts.append(diagnosis_alarms.section(given.alarms, given.work, given.workers))
     if given.thresholds:
@@ -81,6 +87,34 @@ def main() -> None:
     if not given.only:
         parts.append(_real(given.work, given.recordings))
     atomically(given.folder / "diagnosis.md", "\n".join(parts).encode())
+
+
+def _together(scores: list[Score], folder: Path) -> str:
+    """The sets taken together, and how true the stated probabilities are."""
+    (folder / "figures").mkdir(parents=True, exist_ok=True)
+    rows = reliability(scores)
+    figure = new_figure(4.5, 4.0)
+    axis = figure.subplots()
+    axis.plot([0, 1], [0, 1], color="#9ca3af", lw=1, label="ideal")
+    stated = [p for p, _ in rows]
+    true = [share.count / share.n for _, share in rows]
+    bars = np.array([share.interval for _, share in rows]).T
+    reach = np.clip([np.array(true) - bars[0], bars[1] - np.array(true)], 0.0, None)
+    axis.errorbar(stated, true, yerr=reach, fmt="o", color="#1d4ed8", capsize=3,
+                  label="answers, 95 %")
+    for p, t, (_, share) in zip(stated, true, rows, strict=True):
+        axis.annotate(f"{share.count}/{share.n}", (p, t), textcoords="offset points",
+                      xytext=(-6, -14), ha="right", fontsize=8)
+    axis.set(xlabel="probability stated of the first hypothesis", ylabel="share that was true",
+             xlim=(0, 1.05), ylim=(0, 1.05))
+    axis.legend(loc="upper left", fontsize=8)
+    save_figure(figure, folder / "figures" / "diagnosis_reliability.png")
+    lines = [f"\n## All {len(scores)} cases together\n", "| what | share |", "| --- | --- |"]
+    lines += [f"| {name.replace('_', ' ')} | {share} |" for name, share in tally(scores).items()]
+    lines += ["", "| probability stated | true |", "| --- | --- |"]
+    lines += [f"| {p:.2f} | {share} |" for p, share in rows]
+    return "\n".join([*lines, "", "![stated probability against truth]"
+                      "(figures/diagnosis_reliability.png)"]) + "\n"
 
 
 def _real(work: Path, names: Sequence[str]) -> str:
@@ -106,8 +140,10 @@ diagnosis gets the nominal model and the recordings. *Right*: the truth is among
 hypotheses, of the cases that the recordings could tell ("nameable": the nominal model is at least
 5 sigma away, the best rival 4 sigma). *Wrong*: an answer without the truth, of all cases. Of two
 hidden effects one may be too weak for anybody (the recording without it fits to less than 4 sigma);
-to name the other one alone is neither right nor wrong, but *wrong strictly*. Intervals are Wilson's
-at 95 %.
+to name the other one alone is neither right nor wrong, but *wrong strictly*. A *formula* is an
+answer `symbolic:...` where the truth is in no catalogue. Noise of a case: white, coloured, with
+outliers, dropouts or quantised. Held-out RMSEs are of plain predictions: they carry the parameters'
+error. Intervals are Wilson's at 95 %.
 """
 
 
