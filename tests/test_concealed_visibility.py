@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from pikanid.concealed import visibility as room
+from pikanid.concealed.case import in_tank
 from pikanid.concealed.deck import FLOW
 from pikanid.concealed.effect import Effect, Scales
 from pikanid.concealed.effects import CATALOGUE, variants
@@ -180,3 +181,23 @@ def test_tank_is_no_pendulum() -> None:
     found = visibility(truth, two_pulse(), NOISE, base, [FLOW], Scales(0.2, 1.0, 5.0, 23.4))
     assert found.nominal > 20
     assert found.length == pytest.approx(tank.length, rel=0.05)
+
+
+def test_tilt_and_contact_line_of_a_tank_are_effects_of_their_own() -> None:
+    hidden = in_tank(Tank(0.033, 0.09, contact_line=1e-4, tilt=-0.004))
+    assert [entry["id"] for entry in hidden.entries] == [
+        "potential_flow", "coulomb_friction", "static_bias"]
+    assert [part.kind for part in hidden.parts] == ["outside", "catalogue", "catalogue"]
+    assert [entry["id"] for entry in in_tank(Tank(0.033, 0.09)).entries] == ["potential_flow"]
+
+
+@pytest.mark.slow
+def test_what_a_tank_hides_is_seen_part_by_part() -> None:
+    tank = Tank(0.033, 0.09, contact_line=2e-4, tilt=0.02)
+    base = Rig(length=tank.length, damping=2 * 0.01 * np.sqrt(9.81 / tank.length) * 0.3)
+    noise = Noise("white", 0.04)
+    found = visibility(measured(tank, two_pulse()), two_pulse(), noise, base,
+                       in_tank(tank).parts, Scales(0.2, 1.0, 5.0, 23.4))
+    flow, friction, bias = found.effects
+    # coarse noise hides that the liquid is no pendulum, not that it is held and tilted
+    assert flow < 4 < min(friction, bias) and max(friction, bias) <= found.nominal

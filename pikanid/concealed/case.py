@@ -104,7 +104,7 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     train, held_out = excitations.pair(
         order.excitation, rng, frequency, lambda e: measured(base, e), swing)
     scales = _scales(base, train, held_out)
-    hidden = (_in_tank(tank) if tank
+    hidden = (in_tank(tank) if tank
               else _in_rig(order.card, base, train, scales, noise, rng))
     experiments = {"train": train, "held_out": held_out}
     clean = {"train": measured(hidden.train, train),
@@ -190,7 +190,7 @@ def _tank(rng: np.random.Generator) -> Tank:
     return Tank(float(f"{radius:.5g}"), PAPER_DEPTH, ratios, contact, tilt)
 
 
-def _in_tank(tank: Tank) -> _Hidden:
+def in_tank(tank: Tank) -> _Hidden:
     """A held contact line is dry friction, and a tilt a static bias: effects of their own."""
     flow = {"radius": (tank.radius, "m"), "depth": (tank.depth, "m"),
             **{f"zeta_{k + 1}": (ratio, "") for k, ratio in enumerate(tank.ratios)}}

@@ -1,0 +1,94 @@
+"""From ranked hypotheses to an answer, on hypotheses made up for the purpose."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+
+from pikanid.mismatch.candidate import SYMBOLIC, Candidate
+from pikanid.mismatch.detect import Detection
+from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.judge import HeldOut
+from pikanid.mismatch.least_squares import Minimum
+from pikanid.mismatch.verdict import Answer, settle, with_formulas
+from pikanid.mismatch.whitened import Whitened
+from pikanid.model_parts import Parameter
+from pikanid.systems import sloshing
+
+SITE = SimpleNamespace(suffix="", swing=1.0)
+ROWS = 1000
+
+
+def effect(name: str, known: bool = True) -> Candidate:
+    return Candidate((name,), name, name, "dynamics", SITE,  # type: ignore[arg-type]  # a stand-in
+                     (Parameter(f"p_{name}", 0.0),), lambda m: m, lambda view: (), known=known)
+
+
+A, B, GUARD = effect("a"), effect("b"), effect("outside", known=False)
+LAW = effect(f"{SYMBOLIC}k*q**2")
+
+
+def hypothesis(chi2: float, *effects: Candidate) -> Hypothesis:
+    """A fit that leaves χ², at a price of 14 for each effect."""
+    count = 2 + len(effects)
+    r = np.full(ROWS, np.sqrt(chi2 / ROWS))
+    whitened = cast(Whitened, SimpleNamespace(rows=ROWS, problem=SimpleNamespace(free=())))
+    return Hypothesis(tuple(effects), sloshing(), whitened,
+                      Minimum(np.zeros(count), r, np.zeros((ROWS, count)), True),
+                      14.0 * len(effects))
+
+
+def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
+             refused: tuple[str, ...] = ()) -> Answer:
+    """The answer with these held-out evidences (0 unless given), some effects refuted there."""
+    def found(h: Hypothesis) -> Detection:
+        p = 1e-6 if h.key & set(refused) else 0.5
+        return cast(Detection, SimpleNamespace(p_value=p))
+
+    def predicted(h: Hypothesis) -> HeldOut:
+        value = (evidence or {}).get("+".join(sorted(h.key)), 0.0)
+        return cast(HeldOut, SimpleNamespace(detection=found(h), evidence=value, rmse=1.0))
+
+    def adequate(h: Hypothesis) -> Detection:
+        return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
+
+    ranked = sorted(fits, key=lambda h: h.score())
+    answer = settle([h for h in ranked if not h.symbolic], 1.0, adequate, predicted, True, True)
+    return with_formulas(answer, ranked, 1.0, adequate, predicted, True, True) if (
+        answer.verdict == "unnamed" and not answer.contested) else answer
+
+
+BASE = hypothesis(2000.0)
+
+
+def test_one_more_effect_that_is_nearly_worth_its_price_is_given_as_well() -> None:
+    given = answered([BASE, hypothesis(1000.0, A), hypothesis(989.0, A, B)])
+    assert given.verdict == "set"
+    assert [sorted(h.key) for h in given.given] == [["a"], ["a", "b"]]
+    given = answered([BASE, hypothesis(1000.0, A), hypothesis(996.0, A, B)])
+    assert given.verdict == "named" and given.given[0].key == {"a"}
+
+
+def test_the_held_out_recording_decides_between_them() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(989.0, A, B)]
+    assert answered(fits, {"a": 10.0}).given[0].key == {"a", "b"}
+    assert answered(fits, {"a+b": 10.0}).given[0].key == {"a"}
+
+
+def test_a_law_outside_the_catalogue_that_predicts_far_better_keeps_names_away() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1010.0, GUARD)]
+    assert answered(fits).verdict == "named"
+    assert answered(fits, {"a": 50.0}).verdict == "unnamed"
+
+
+def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1001.0, GUARD), hypothesis(1000.0, LAW)]
+    contested = answered(fits[:3])
+    assert contested.verdict == "unnamed" and contested.contested
+    refuted = answered(fits, refused=("a",))
+    assert refuted.verdict == "named" and refuted.given[0].symbolic
+    # a formula that explains far less than the law outside the catalogue is none
+    poor = [*fits[:3], hypothesis(1012.0, LAW)]
+    assert answered(poor, refused=("a",)).verdict == "unnamed"
