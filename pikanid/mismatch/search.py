@@ -21,7 +21,7 @@ CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explain
 PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
-EFFORT = 1.2e7  # states times steps simulated, after which nothing new is begun
+EFFORT = 1.2e7  # states times steps simulated for combinations, before nothing new is begun
 WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
@@ -68,6 +68,7 @@ class Search:
         self.tell("single effects")
         for candidate, starts in screen.singles(SINGLES):
             self._fit((candidate,), starts)
+        self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
         if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
