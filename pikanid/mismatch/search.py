@@ -103,6 +103,11 @@ class Search:
             self._extend(best, LATER, self.scale() * (price - CLOSE))
             for h in self._contenders():
                 self._exchange(h)
+            for h in self.ranked()[:NEAR]:
+                # fewer effects that explain almost as much: with another one they may do
+                if 0 < len(h.effects) < len(best.effects) and not self.tired and not adequate(h) \
+                        and h.score(self.scale()) < best.score(self.scale()) + 2 * CLOSE:
+                    self._extend(h, MORE)
             self._simplify()
         for h in self._contenders():
             self._with_wider_laws(h)
