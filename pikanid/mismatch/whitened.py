@@ -82,6 +82,9 @@ class Whitened:
                 self.simulators[r] = Interpreted(
                     simulator.model, simulator.experiment, located=True)
                 steps = self._steps(r, theta, allowed, finest)
+                if steps is None:  # a motion at rest on a corner meets it without end
+                    self.simulators[r] = simulator
+                    steps = self._steps(r, theta, allowed, finest)
             if steps is None or steps.error > 20 * allowed:
                 return False
             found.append(steps)

@@ -183,7 +183,7 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
     prepare(b, p, act, delayed)
     x, S, xs, Ss, xn, Sn = (x0.copy(), S0.T.copy(), x0.copy(), S0.T.copy(), x0.copy(), S0.T.copy())
     kx, kS, before = np.empty((4, n)), np.empty((4, n, A)), np.empty(n)
-    mode = np.ones(b.sizes[4])
+    mode, all_events = np.ones(b.sizes[4]), 0
     for q in range(L):
         u, v = U[q], V[q]
         if jumps[q]:
@@ -253,7 +253,8 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
                     done += part
                     passed(b, which, T[q] + done, x, S, u, v, done, dtau_in, delayed, mode, before)
                     events += 1
-                    if events > 1000:
+                    all_events += 1
+                    if events > 1000 or all_events > L + 200:
                         return 2, q
                 else:
                     done = goal
