@@ -185,9 +185,10 @@ def reliability(scores: Iterable[Score],
                 ) -> list[tuple[float, Share]]:
     """For each interval of stated probability that occurs: its mean, and how often it was true.
 
-    Only the most probable hypothesis of each answer counts.
+    Only the most probable hypothesis of each answer counts, and no formula: ids cannot judge it.
     """
-    stated = [(s.probability, s.first_is_truth) for s in scores if s.probability is not None]
+    stated = [(s.probability, s.first_is_truth) for s in scores
+              if s.probability is not None and s.outcome != "formula"]
     rows = []
     for low, high in pairwise(edges):
         inside = [(p, hit) for p, hit in stated
