@@ -2,9 +2,9 @@
 
 An answer is `named` or `set`; every other verdict names nothing.  It is *right* if one of at most
 two hypotheses is the truth, *wrong* if none is.  Twins count as one effect.  A hypothesis is the
-truth only if it holds every hidden effect and no other.  One of several hidden effects may be too
-weak to be told (the recording without it fits to less than 4σ): who then names the others alone has
-named a *visible* part, and is neither right nor wrong.
+truth only if it holds every hidden effect and no other.  Of two hidden effects one may be too weak
+to be told (the recording without it fits to less than 4σ): who then names the other one alone has
+named the *visible* part, and is neither right nor wrong.
 """
 
 from __future__ import annotations
@@ -143,8 +143,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
         str(case["id"]), case["class"], bool(case["nameable"]),
         float(case["visibility"]["nominal"]), verdict, mismatch, outcome, reason, len(given),
         given[0][1] if answered else None,
-        answered and any(_same(explanations[0], t)
-                         for t in (truth, *_visible_parts(case, truth)) if t),
+        answered and any(_same(explanations[0], t) for t in (truth, _visible(case, truth)) if t),
         _within(case["base"], diagnosis), _held_out(diagnosis))
 
 
@@ -209,9 +208,9 @@ def _outcome(case: Entry, truth: list[set[str]], verdict: str, mismatch: bool,
         return "wrong", "nothing"
     if any(_same(explanation, truth) for explanation in explanations):
         return ("right" if len(explanations) <= MOST_HYPOTHESES else "long"), ""
-    parts = _visible_parts(case, truth)
-    if len(explanations) <= MOST_HYPOTHESES and any(
-            _same(explanation, part) for explanation in explanations for part in parts):
+    visible = _visible(case, truth)
+    if visible and len(explanations) <= MOST_HYPOTHESES and any(
+            _same(explanation, visible) for explanation in explanations):
         return "visible", ""
     known = all(effect.get("kind", "catalogue") == "catalogue" or effect["id"] == "power_drag"
                 for effect in case["effects"])
@@ -222,15 +221,9 @@ def _outcome(case: Entry, truth: list[set[str]], verdict: str, mismatch: bool,
     return "wrong", _reason(case, truth, explanations)
 
 
-def _visible_parts(case: Entry, truth: list[set[str]]) -> list[list[set[str]]]:
-    """What of several effects may be named alone: those too weak to be told left out, or any one
-    without which the others fit.
-    """
-    weak = [d < FROM_RIVAL for d in case["visibility"]["effects"]]
-    strong = [effect for effect, faint in zip(truth, weak, strict=True) if not faint]
-    parts = [strong] + [[e for e in truth if e is not effect]
-                        for effect, faint in zip(truth, weak, strict=True) if faint]
-    return [part for part in parts if part and len(part) < len(truth)]
+def _visible(case: Entry, truth: list[set[str]]) -> list[set[str]]:
+    return [effect for effect, distance in zip(truth, case["visibility"]["effects"], strict=True)
+            if distance >= FROM_RIVAL]
 
 
 def _reason(case: Entry, truth: list[set[str]], explanations: list[list[set[str]]]) -> str:
