@@ -642,6 +642,13 @@ def degree_too_low(degree: int, order: int) -> str:
     )
 
 
+def backlash_twice(name: str) -> str:
+    return (
+        f"Input '{name}' has a backlash already: change the parameter that it names instead of "
+        "adding a second one."
+    )
+
+
 def relaxation_cannot_see(names: Sequence[str], why: str) -> str:
     return (
         f"A relaxation cannot estimate {_listed(names)} ({why}): fix it, or fit with the "

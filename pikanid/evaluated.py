@@ -1,4 +1,4 @@
-"""Formulas of parameters alone, as numbers: the delays of channels and the initial state."""
+"""Formulas of parameters alone, as numbers: delays and play of channels, the initial state."""
 
 from __future__ import annotations
 
@@ -32,6 +32,12 @@ def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray)
     table = dict(zip(model.parameter_names, p, strict=True))
     return np.array([[_number(item.delay.diff(symbol(n)), table) for n in model.parameter_names]
                      for item in items]).reshape(len(items), len(p))
+
+
+def backlashes(model: Model, p: np.ndarray) -> np.ndarray:
+    """Half the play of every input (m,), in its own unit, at parameters p (P,)."""
+    table = dict(zip(model.parameter_names, p, strict=True))
+    return np.array([_number(item.backlash, table) for item in model.inputs])
 
 
 def _number(expr: sp.Expr, table: dict[str, float]) -> float:

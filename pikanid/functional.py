@@ -199,7 +199,8 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
     data by their σ (where it is unknown, by the visible noise if there are several outputs).
 
     Raises:
-        BadSetting: If a delay is to be estimated, which no functional over fixed sites can see.
+        BadSetting: If a delay or a backlash is to be estimated: no functional over fixed sites can
+            see them.
     """
     late = _output_delays(problem)
     parts = []
@@ -255,4 +256,9 @@ def _output_delays(problem: Problem) -> Array:
             if names:
                 raise errors.BadSetting(errors.relaxation_cannot_see(
                     names, f"the delay of {what} '{item.name}'"))
+    for item in model.inputs:
+        names = sorted(s.name for s in item.backlash.free_symbols & free)
+        if names:
+            raise errors.BadSetting(errors.relaxation_cannot_see(
+                names, f"the backlash of input '{item.name}'"))
     return delays(model.outputs, model, np.array(list(model.values.values())))

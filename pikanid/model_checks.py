@@ -50,6 +50,7 @@ def validate(model: Model) -> None:
             raise errors.BadModel(errors.spline_at_start(state.name, str(splines.pop())))
     for item in model.inputs:
         _check_symbols(item.delay, constants, f"The delay of input '{item.name}'", model)
+        _check_symbols(item.backlash, constants, f"The backlash of input '{item.name}'", model)
         if item.hold not in ("zero", "first"):
             raise errors.BadModel(errors.bad_value(
                 f"The hold of input '{item.name}'", item.hold, "'zero' or 'first'"))

@@ -119,7 +119,8 @@ def to_dict(model: Model) -> dict[str, Any]:
     if model.inputs:
         content["inputs"] = {i.name: _drop({
             "unit": i.unit, "hold": i.hold, "default": i.default,
-            "delay": None if i.delay == 0 else _plain(i.delay)}) for i in model.inputs}
+            "delay": None if i.delay == 0 else _plain(i.delay),
+            "backlash": None if i.backlash == 0 else _plain(i.backlash)}) for i in model.inputs}
     if model.parameters:
         content["parameters"] = {p.name: _drop({
             "unit": p.unit, ("guess" if p.free else "value"): float(p.value),

@@ -25,13 +25,18 @@ class State:
 
 @dataclass(frozen=True)
 class Input:
-    """A recorded input.  `hold` says what happens between its samples, `delay` [s] shifts it."""
+    """A recorded input.  `hold` says what happens between its samples, `delay` [s] shifts it.
+
+    `backlash`, in the input's unit, is half the play that the recorded signal has to cross before
+    anything moves, each time that it turns round.
+    """
 
     name: str
     unit: str = ""
     hold: Hold = "zero"
     default: float | None = None
     delay: sp.Expr = sp.S.Zero
+    backlash: sp.Expr = sp.S.Zero
 
 
 @dataclass(frozen=True)

@@ -14,58 +14,10 @@ from typing import Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.evaluated import InitialState, delays, initial_state
+from pikanid.evaluated import InitialState, backlashes, delays, initial_state
+from pikanid.held import HeldInput, PiecewiseInput, with_backlash
 from pikanid.model import Input, Model, Output
 from pikanid.recording import Recording
-
-
-@dataclass(frozen=True)
-class HeldInput:
-    """An input as a function of time: samples (N,) and what happens between them."""
-
-    name: str
-    time: np.ndarray
-    values: np.ndarray
-    hold: Literal["zero", "first"]
-
-    def at(self, t: np.ndarray, delay: float = 0.0, side: Literal["left", "right"] = "right"
-           ) -> np.ndarray:
-        """Values at times t (M,), `delay` seconds late; outside the record its end values."""
-        if len(self.time) == 1:
-            return np.full(len(t), self.values[0])
-        shifted = np.asarray(t, float) - delay
-        if self.hold == "first":
-            return np.interp(shifted, self.time, self.values)
-        # a sample time met up to rounding belongs to the interval that starts there
-        slack = 1e-9 * self._spacing
-        probe = shifted + (slack if side == "right" else -slack)
-        index = np.searchsorted(self.time, probe, side="right") - 1
-        return self.values[np.clip(index, 0, len(self.time) - 1)]
-
-    def slope(self, t: np.ndarray, delay: float = 0.0) -> np.ndarray:
-        """du/dt inside the intervals that hold the times t."""
-        if self.hold == "zero" or len(self.time) < 2:
-            return np.zeros(len(t))
-        index = np.searchsorted(self.time, np.asarray(t) - delay, side="right") - 1
-        inside = (index >= 0) & (index < len(self.time) - 1)
-        index = np.clip(index, 0, len(self.time) - 2)
-        slopes = np.diff(self.values) / np.diff(self.time)
-        return np.where(inside, slopes[index], 0.0)
-
-    @functools.cached_property
-    def switches(self) -> np.ndarray:
-        """Times at which the value (zero-order hold) or the slope (first-order) changes."""
-        if len(self.time) < 2:
-            return np.empty(0)
-        if self.hold == "zero":
-            return self.time[1:][np.diff(self.values) != 0]
-        slopes = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.time), [0.0]])
-        change = np.abs(np.diff(slopes)) > 1e-9 * np.max(np.abs(slopes), initial=0.0)
-        return self.time[change]
-
-    @functools.cached_property
-    def _spacing(self) -> float:
-        return float(np.min(np.diff(self.time))) if len(self.time) > 1 else 1.0
 
 
 @dataclass(frozen=True)
@@ -101,14 +53,29 @@ class Experiment:
 
     def inputs(self, t: np.ndarray, side: Literal["left", "right"] = "right") -> np.ndarray:
         """Inputs (M, m) at times t (M,), right-continuous at switches unless `side="left"`."""
-        columns = [h.at(t, d, side) for h, d in zip(self.held, self.fixed_delays, strict=True)]
-        return np.stack(columns, axis=1) if columns else np.empty((len(t), 0))
+        columns = np.zeros((len(t), len(self.held)))
+        for j, (parts, late) in enumerate(zip(self._parts, self.fixed_delays, strict=True)):
+            for part, factor in parts:
+                columns[:, j] += factor * part.at(t, late, side)
+        return columns
 
     def breakpoints(self) -> np.ndarray:
         """Interior times at which an input jumps or kinks, sorted, after its delay."""
-        pairs = zip(self.held, self.fixed_delays, strict=True)
-        times = np.concatenate([np.empty(0), *(h.switches + d for h, d in pairs)])
+        pairs = zip(self._parts, self.fixed_delays, strict=True)
+        times = np.concatenate([np.empty(0), *(
+            part.switches + late for parts, late in pairs for part, _ in parts)])
         return np.unique(times[(times > self.t0) & (times < self.t1)])
+
+    @functools.cached_property
+    def _parts(self) -> list[list[tuple[HeldInput | PiecewiseInput, float]]]:
+        """What each input (m,) is the sum of at the model's own parameter values, with factors."""
+        values = np.array(list(self.model.values.values()))
+        found: list[list[tuple[HeldInput | PiecewiseInput, float]]] = []
+        for held, item, half in zip(self.held, self.model.inputs,
+                                    backlashes(self.model, values), strict=True):
+            carrier, side = with_backlash(held, half) if item.backlash != 0 else (held, None)
+            found.append([(carrier, 1.0)] if side is None else [(carrier, 1.0), (side, half)])
+        return found
 
     def initial(self, p: np.ndarray) -> np.ndarray:
         """The initial state x0 (n,) for all parameters p (P,)."""

@@ -26,7 +26,7 @@ ROWS = (
      "half_derivative", "excitation"),
     ("noise",),
     ("systems", "datasets", "tracking"),
-    ("evaluated",),
+    ("evaluated", "held"),
     ("problem",),
     ("simulation",),
     ("adequacy", "plots"),

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pikanid import errors, excitation, systems
+from pikanid.held import HeldInput
 from pikanid.model import Model, Parameter, Spline
-from pikanid.problem import HeldInput, Problem, bind
+from pikanid.problem import Problem, bind
 from pikanid.recording import Channel, Recording
 
 T = np.array([0.0, 0.1, 0.25, 0.4, 0.5])

@@ -13,9 +13,9 @@ ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
     forces.cubic_stiffness, forces.static_bias, forces.parameter_drift, channels.second_mode,
     forces.wall_impact, channels.cross_axis, forces.disturbance, forces.boundary_layer,
     forces.hysteresis, channels.delay, channels.lags, channels.input_gain, channels.sensor_gain,
-    channels.input_limits, channels.sensor_offset, channels.sensor_drift,
-    channels.sensor_saturation, channels.sensor_nonlinearity, forces.initial_state,
-    channels.input_hold)
+    channels.input_limits, channels.input_backlash, channels.sensor_offset,
+    channels.sensor_drift, channels.sensor_saturation, channels.sensor_nonlinearity,
+    forces.initial_state, channels.input_hold)
 GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
     guards.even_stiffness, guards.quintic_stiffness, guards.one_way_friction,
     guards.stribeck_friction, guards.velocity_coupled_drive, guards.soft_saturation,
@@ -30,7 +30,7 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known for c in found), found[0].key
-    (27, 'coulomb_friction')
+    (28, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, which has one sensor

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pikanid.expressions import symbol
+from pikanid.held import HeldInput, with_backlash
 from pikanid.mismatch.candidate import Candidate, Channel, Sign, View
 from pikanid.mismatch.site import Site
 from pikanid.model import Model
@@ -129,11 +130,11 @@ def lags(site: Site) -> list[Candidate]:
 
 def _input(site: Site, u: str, identifier: str, name: str, parameters: tuple[Parameter, ...],
            expression: str, signs: Callable[[View], Sequence[Sign]], twin: str = "",
-           channel: Channel = "input", **maps: object) -> Candidate:
+           channel: Channel = "input", variant: str = "", **maps: object) -> Candidate:
     several = len(site.inputs) > 1
     return Candidate((identifier,), name, expression, channel, site, parameters,
                      lambda m: m.map_input(u, **maps), signs,  # type: ignore[arg-type]  # all text
-                     u if several else "", twin)
+                     ",".join([variant] * bool(variant) + [u] * several), twin)
 
 
 def input_gain(site: Site) -> list[Candidate]:
@@ -175,6 +176,29 @@ def input_limits(site: Site) -> list[Candidate]:
                    f"clip({u}, -{limit.name}, {limit.name})", clipped, saturation=limit.name),
             _input(site, u, "input_dead_zone", "a dead zone of the input", (width,),
                    f"dead_zone({u}, {width.name})", dead, dead_zone=width.name)]
+    return found
+
+
+def input_backlash(site: Site) -> list[Candidate]:
+    """Play behind the input: each time that it turns round it moves nothing for a while."""
+    found = []
+    for u in site.inputs:
+        half = Parameter(site.name("half_play"), 0.0, site.model.input(u).unit, (0.0, INF))
+
+        def signs(view: View, u: str = u, half: Parameter = half) -> list[Sign]:
+            d = HeldInput(u, view.t, view.u[u], "zero")
+            top = float(np.abs(d.values).max(initial=0.0))
+            found = []
+            for size in top * np.array([0.003, 0.01, 0.03, 0.08, 0.2, 0.4]) if top else ():
+                carrier, side = with_backlash(d, size)
+                acts = carrier.at(view.t) + size * side.at(view.t)
+                found.append(Sign({half.name: float(size)}, push={u: acts - d.values},
+                                  one_sided=True, scales=False))
+            return found
+
+        found.append(_input(site, u, "hysteresis", "backlash of the input", (half,),
+                            f"{u} behind a play of ±{half.name}", signs, variant="backlash",
+                            backlash=half.name))
     return found
 
 

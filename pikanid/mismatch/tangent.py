@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid.expressions import symbol
+from pikanid.held import HeldInput
 from pikanid.mismatch.candidate import Candidate, Sign, View
 from pikanid.mismatch.whitened import Whitened
 from pikanid.model import Model
-from pikanid.problem import HeldInput
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 
@@ -63,8 +63,8 @@ class Tangent:
     """The motion in one recording and its linearisation."""
 
     def __init__(self, whitened: Whitened, theta: np.ndarray, r: int, states: np.ndarray):
-        self.model: Model = whitened.problem.model
         self.simulator = whitened.simulators[r]
+        self.model: Model = self.simulator.acting
         experiment = whitened.problem.experiments[r]
         p = whitened.problem.parameters(theta, r)
         grid = self.simulator.grid(p)

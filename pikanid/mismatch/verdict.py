@@ -248,7 +248,7 @@ def _merged(known: list[Hypothesis], tried: Sequence[Hypothesis]
             if leader is h and power and _open_exponent(power, EXPONENTS[e.ids[0]]):
                 table[e.key] += ("power_drag",)
                 absorbed.add(power.key)
-            if leader is h and e.ids[0] == "hysteresis" and (
+            if leader is h and e.ids[0] == "hysteresis" and e.channel == "dynamics" and (
                     h.values[e.parameters[1].name] < NARROW * e.site.swing):
                 table[e.key] += ("coulomb_friction",)
     return [h for h in first.values() if h.key not in absorbed], twins

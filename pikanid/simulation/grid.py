@@ -7,10 +7,12 @@ adaptive solver over the whole interval would step over short pulses without not
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from pikanid.held import HeldInput, PiecewiseInput
 from pikanid.problem import Experiment
 from pikanid.simulation.layout import Seen
 
@@ -42,8 +44,9 @@ class Grid:
         return np.maximum(counts, 1).astype(np.int64)
 
 
-def build_grid(experiment: Experiment, delay_in: np.ndarray, delay_out: np.ndarray) -> Grid:
-    """Lay out the stops of one experiment for given input and output delays [s].
+def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput],
+               delay_in: np.ndarray, delay_out: np.ndarray) -> Grid:
+    """Lay out the stops of one experiment for given inputs (m) and input and output delays [s].
 
     Observations are numbered output by output, in the order of `experiment.samples`.  A delayed
     output shows the initial state until t0 + delay.
@@ -51,7 +54,7 @@ def build_grid(experiment: Experiment, delay_in: np.ndarray, delay_out: np.ndarr
     t0 = experiment.t0
     wanted = [np.maximum(s.t - delay_out[s.output], t0) for s in experiment.samples]
     end = max([experiment.t1 if not wanted else t0, *(w[-1] for w in wanted if len(w))])
-    pairs = list(zip(experiment.held, delay_in, strict=True))
+    pairs = list(zip(held, delay_in, strict=True))
     breaks = [b[(b > t0) & (b < end)] for b in (h.switches + d for h, d in pairs)]
     T = _merge(np.concatenate([[t0, end], *breaks, *wanted]), 1e-11 * max(end - t0, 1e-300))
     if len(T) < 2:

@@ -64,14 +64,14 @@ class Interpreted(Simulator):
     @property
     def corners(self) -> bool:
         """Whether it runs through corners that it could stop at."""
-        return can_run(self.model) and tape(Structure(self.model), self.located).corners > 0
+        return can_run(self.acting) and tape(Structure(self.acting), self.located).corners > 0
 
     def module(self, method: Method) -> Any:
         """The interpreter, bound to the model's tape."""
-        if method != "explicit" or not can_run(self.model):
+        if method != "explicit" or not can_run(self.acting):
             return super().module(method)
         if method not in self._kept:
-            self._kept[method] = Machine(tape(Structure(self.model), self.located))
+            self._kept[method] = Machine(tape(Structure(self.acting), self.located))
         return self._kept[method]
 
 

@@ -12,9 +12,10 @@ from typing import Any, Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.evaluated import delay_jacobian, delays
+from pikanid.evaluated import backlashes, delay_jacobian, delays
 from pikanid.model import Input, Model, Output
 from pikanid.problem import Experiment
+from pikanid.simulation.backlash import split, with_sides
 from pikanid.simulation.compiled import Method, compiled
 from pikanid.simulation.grid import Grid, build_grid
 
@@ -73,8 +74,13 @@ class Simulator:
     def module(self, method: Method) -> ModuleType:
         """The compiled functions."""
         if method not in self._kept:
-            self._kept[method] = compiled(self.model, method)
+            self._kept[method] = compiled(self.acting, method)
         return self._kept[method]
+
+    @functools.cached_property
+    def acting(self) -> Model:
+        """The model with the inputs of `grid`: where one has backlash, its side is another."""
+        return with_sides(self.model)
 
     @functools.cached_property
     def _delayed_by(self) -> np.ndarray:
@@ -90,20 +96,23 @@ class Simulator:
         return not any(delayed)
 
     def grid(self, p: np.ndarray) -> Grid:
-        """The stops at parameters p; kept, since only delays change them."""
-        if self._undelayed:
+        """The stops at parameters p; kept, since only delays and backlash change them."""
+        if self._undelayed and self.acting is self.model:
             return self._fixed_grid
-        delay_in = delays(self.model.inputs, self.model, p)
+        delay_in = delays(self.acting.inputs, self.model, p)
         delay_out = delays(self.model.outputs, self.model, p)
-        key = delay_in.tobytes() + delay_out.tobytes()
+        halves = backlashes(self.model, p)
+        key = delay_in.tobytes() + delay_out.tobytes() + halves.tobytes()
         if self._kept.get("delays") != key:
-            self._kept.update(delays=key, grid=build_grid(self.experiment, delay_in, delay_out))
+            held = split(self.model, self.experiment.held, halves)
+            self._kept.update(
+                delays=key, grid=build_grid(self.experiment, held, delay_in, delay_out))
         return self._kept["grid"]
 
     @functools.cached_property
     def _fixed_grid(self) -> Grid:
         zeros = np.zeros(len(self.model.inputs)), np.zeros(len(self.model.outputs))
-        return build_grid(self.experiment, *zeros)
+        return build_grid(self.experiment, self.experiment.held, *zeros)
 
     def run(self, p: np.ndarray, active: np.ndarray | None = None, steps: Steps | None = None,
             states: bool = False) -> Response:
@@ -137,10 +146,10 @@ class Simulator:
         """∂delay/∂θ of inputs and outputs (channels, A), and whether any is not zero."""
         if self._undelayed or not np.any(self._delayed_by[active]):
             A = len(active)
-            return (np.zeros((len(self.model.inputs), A)), np.zeros((len(self.model.outputs), A)),
+            return (np.zeros((len(self.acting.inputs), A)), np.zeros((len(self.model.outputs), A)),
                     False)
         both = (delay_jacobian(c, self.model, p)[:, active]
-                for c in (self.model.inputs, self.model.outputs))
+                for c in (self.acting.inputs, self.model.outputs))
         dtau_in, dtau_out = map(np.ascontiguousarray, both)
         return dtau_in, dtau_out, True
 

@@ -1,0 +1,112 @@
+"""Backlash of an input against an independent oracle, and its sensitivities."""
+
+from __future__ import annotations
+
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pikanid as pk
+from pikanid import errors
+from pikanid.concealed import signals
+from pikanid.held import HeldInput, with_backlash
+from pikanid.mismatch.catalogue import candidates
+from pikanid.mismatch.site import sites
+from pikanid.model_parts import Hold, Parameter
+from pikanid.problem import bind
+from pikanid.simulation.interpreted import Interpreted
+from pikanid.simulation.simulator import Simulator
+
+HOLDS: tuple[Hold, ...] = ("zero", "first")
+HALF = 0.3
+
+
+def loose(hold: Hold = "zero") -> pk.Model:
+    half = Parameter("b", HALF, "m/s^2", (0.0, 10.0))
+    return pk.systems.sloshing().map_input("u_x", [half], hold=hold, backlash="b")
+
+
+def wandering(hold: Hold = "zero", count: int = 600) -> pk.Recording:
+    u = 0.1 * np.cumsum(np.random.default_rng(0).normal(size=count))
+    return pk.Recording.from_arrays(0.01 * np.arange(count), {"u_x": u},
+                                    units={"u_x": "m/s^2"}, hold={"u_x": hold})
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=40), st.floats(0.0, 3.0),
+       st.sampled_from(HOLDS), st.randoms(use_true_random=False))
+def test_what_follows_equals_the_oracle(values: list[float], half: float, hold: Hold,
+                                        chance: Random) -> None:
+    t, u = np.arange(len(values), dtype=float), np.array(values)
+    made = signals.zero_order if hold == "zero" else signals.first_order
+    expected = signals.played(made(t, u), half)
+    carrier, side = with_backlash(HeldInput("u", t, u, hold), half)
+    probe = np.sort([chance.uniform(0.0, t[-1] - 1e-6) for _ in range(200)])
+    probe = probe[np.abs(probe - np.round(probe)) > 1e-6]
+    found = carrier.at(probe) + half * side.at(probe)
+    assert found == pytest.approx(expected.at(probe), abs=1e-9)
+    assert set(side.values) <= {-1.0, 0.0, 1.0}
+
+
+@pytest.mark.parametrize("hold", HOLDS)
+@pytest.mark.parametrize("kind", [Simulator, Interpreted])
+def test_sensitivities_are_those_of_differences(kind: type[Simulator], hold: Hold) -> None:
+    model = loose(hold)
+    simulator = kind(model, bind(model, pk.simulate(model, wandering(hold), sigma=0.0)))
+    p, active = np.array([0.045, 0.15, 0.3, 9.81, HALF]), np.array([0, 1, 4])
+    steps = simulator.choose_steps(p, 1e-10)
+    found = simulator.run(p, active, steps)
+    for column, k in enumerate(active):
+        aside = np.zeros(5)
+        aside[k] = 1e-6
+        up, down = (simulator.run(p + s * aside, active, steps).y for s in (1, -1))
+        expected = (up - down) / 2e-6
+        scale = np.abs(expected).max()
+        assert found.sensitivity[:, column] == pytest.approx(expected, abs=1e-6 * scale)
+
+
+def test_simulated_motion_is_that_under_the_signal_behind_the_play() -> None:
+    rec = wandering()
+    acts = signals.played(signals.zero_order(rec["u_x"].time, rec["u_x"].values), HALF)
+    behind = pk.Recording.from_arrays(rec["u_x"].time, {"u_x": acts.at(rec["u_x"].time + 1e-9)},
+                                      units={"u_x": "m/s^2"}, hold={"u_x": "zero"})
+    found = pk.simulate(loose(), rec, sigma=0.0)["theta"].values
+    expected = pk.simulate(pk.systems.sloshing(), behind, sigma=0.0)["theta"].values
+    rigid = pk.simulate(pk.systems.sloshing(), rec, sigma=0.0)["theta"].values
+    assert found == pytest.approx(expected, abs=1e-9)
+    assert np.abs(found - rigid).max() > 1e-3
+
+
+def test_fit_finds_the_play() -> None:
+    rec = pk.simulate(loose(), wandering(), sigma=0.002, seed=1)
+    est = pk.NLS().fit(loose().with_values(b=0.1), rec)
+    assert abs(est.value("b") - HALF) < 4 * est.std("b") < 0.1
+
+
+def test_files_and_dicts_keep_it() -> None:
+    text = loose().to_dict()["inputs"]["u_x"]
+    assert text["backlash"] == "b"
+    assert pk.Model.from_dict(loose().to_dict()) == loose()
+
+
+def test_a_relaxation_sees_a_known_play_and_refuses_an_unknown_one() -> None:
+    rec = pk.simulate(loose(), wandering(), sigma=0.0005, seed=1)
+    with pytest.raises(errors.BadSetting, match="backlash of input 'u_x'"):
+        pk.IPDA().fit(loose(), rec)
+    known = pk.IPDA().fit(loose().fix("b"), rec)
+    assert abs(known.value("l_theta") - 0.045) < 5 * known.std("l_theta")
+
+
+def test_a_second_play_is_refused() -> None:
+    with pytest.raises(errors.BadModel, match="has a backlash already"):
+        loose().map_input("u_x", backlash=0.1)
+
+
+def test_the_catalogue_offers_it_for_every_input() -> None:
+    model, rec = pk.systems.sloshing(), pk.excitation.two_pulse()
+    found = [c for c in candidates(sites(model, (rec,))) if c.variant.startswith("backlash")]
+    assert [c.ids for c in found] == [("hysteresis",)]
+    assert found[0].applied(model).inputs[0].backlash.free_symbols
