@@ -15,6 +15,7 @@ class BoundTape(NamedTuple):
     `code` (ops, 4) of all groups, `span` (groups, 3) first and last operation and number of results
     of each, `out` (groups, results) their registers; values `r` (R,), derivatives `d` (R, lanes)
     and `ds` (R, switches) by the signs, which of them are not all zero (`live`, `signed`);
+    `matrix`, `again`, `right` and `change` are scratch for signs that are held at zero;
     `sizes` states, inputs, parameters, outputs, switching functions.  `group` and `flag` hold the
     numbers of the groups and (0, 1): a constant in a call would have the callee compiled for it.
     """
@@ -30,6 +31,10 @@ class BoundTape(NamedTuple):
     sizes: np.ndarray
     group: np.ndarray
     flag: np.ndarray
+    matrix: np.ndarray
+    again: np.ndarray
+    right: np.ndarray
+    change: np.ndarray
 
 
 def bound(tape: Tape, lanes: int) -> BoundTape:
@@ -47,4 +52,5 @@ def bound(tape: Tape, lanes: int) -> BoundTape:
     return BoundTape(
         np.concatenate([tape.code[g] for g in GROUPS]), span.astype(np.int64), out, r,
         np.zeros((R, lanes)), np.zeros((R, K)), np.zeros(R, np.bool_), np.zeros(R, np.bool_),
-        np.array(tape.sizes, np.int64), np.arange(len(GROUPS)), np.array([0, 1]))
+        np.array(tape.sizes, np.int64), np.arange(len(GROUPS)), np.array([0, 1]),
+        np.zeros((K, K)), np.zeros((K, K)), np.zeros((K, 1)), np.zeros((K, lanes)))

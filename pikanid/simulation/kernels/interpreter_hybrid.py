@@ -1,4 +1,4 @@
-@njit(cache=True, error_model="numpy")
+@called
 def put_signs(b, mode, slide):
     """Signs into their registers; those held at zero by d g/dt = G(s) = 0, which is linear in s.
 
@@ -18,8 +18,11 @@ def put_signs(b, mode, slide):
         return False
     values(b, b.group[G_RATE])
     differentiate(b.code, b.span[G_RATE, 0], b.span[G_RATE, 1], b.r, b.ds, b.signed)
-    matrix, right = np.zeros((K, K)), np.zeros((K, 1))
+    matrix, right, again, change = b.matrix, b.right, b.again, b.change
     for k in range(K):
+        right[k, 0] = 0.0
+        for j in range(K):
+            matrix[k, j] = 0.0
         matrix[k, k] = 1.0
         o = b.out[G_RATE, k]
         if mode[k] == 0.0:
@@ -27,7 +30,9 @@ def put_signs(b, mode, slide):
             for j in range(K):
                 if mode[j] == 0.0:
                     matrix[k, j] = b.ds[o, j] if b.signed[o] else 0.0
-    again = matrix.copy()
+    for k in range(K):
+        for j in range(K):
+            again[k, j] = matrix[k, j]
     solve_small(matrix, right)
     for k in range(K):
         if mode[k] == 0.0:
@@ -37,9 +42,10 @@ def put_signs(b, mode, slide):
     # now that the signs are known: dG = 0 holds them as parameters vary
     values(b, b.group[G_RATE])
     tangents(b, b.group[G_RATE])
-    change = np.zeros((K, b.d.shape[1]))
     for k in range(K):
         o = b.out[G_RATE, k]
+        for a in range(b.d.shape[1]):
+            change[k, a] = 0.0
         if mode[k] == 0.0 and b.live[o]:
             for a in range(b.d.shape[1]):
                 change[k, a] = -b.d[o, a]
@@ -51,7 +57,7 @@ def put_signs(b, mode, slide):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@called
 def take_step(b, t, h, x, S, u, v, gap, dtau, delayed, mode, slopes_on, kx, kS, xs, Ss, xn, Sn):
     """One Runge-Kutta step of length h in the present modes; `gap` after the stop of u, v."""
     n, A = b.sizes[0], S.shape[1]
@@ -85,7 +91,7 @@ def take_step(b, t, h, x, S, u, v, gap, dtau, delayed, mode, slopes_on, kx, kS, 
                     kS[0, i, a] + 2.0 * kS[1, i, a] + 2.0 * kS[2, i, a] + kS[3, i, a])
 
 
-@njit(cache=True, error_model="numpy")
+@called
 def margin(b, t, x, u, v, gap, mode):
     """How far the modes are from their ends (>= 0 while they hold), and which is the closest."""
     K = b.sizes[4]
@@ -103,7 +109,7 @@ def margin(b, t, x, u, v, gap, mode):
     return least, which
 
 
-@njit(cache=True, error_model="numpy")
+@called
 def rate_of(b, k, mode):
     """d g_k/dt at what is put, in the given modes."""
     put_signs(b, mode, b.flag[0])
@@ -111,7 +117,7 @@ def rate_of(b, k, mode):
     return b.r[b.out[G_RATE, k]]
 
 
-@njit(cache=True, error_model="numpy")
+@called
 def settled(b, k, mode):
     """The mode of a switching function that is at zero: the flow beside its surface decides."""
     kept = mode[k]
@@ -127,7 +133,7 @@ def settled(b, k, mode):
     return 1.0 if above + below > 0.0 else -1.0
 
 
-@njit(cache=True, error_model="numpy")
+@called
 def passed(b, k, t, x, S, u, v, gap, dtau, delayed, mode, before):
     """End mode k at the point reached: pass, stick, or come loose; derivatives jump.
 
@@ -161,7 +167,7 @@ def passed(b, k, t, x, S, u, v, gap, dtau, delayed, mode, before):
             S[i, a] += (before[i] - b.r[out[i]]) * when
 
 
-@njit(cache=True, error_model="numpy")
+@called
 def begin(b, t, x, u, v, mode):
     """Choose the modes after inputs have changed."""
     put(b, t, x, u, v, 0.0)
@@ -175,15 +181,29 @@ def begin(b, t, x, u, v, mode):
             mode[k] = settled(b, k, mode)
 
 
-@njit(cache=True, error_model="numpy")
-def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first,
-                   output, row, inside, X, Y, J):
+@called
+def next_share(a, at_a, b, at_b, c, at_c):
+    """How far from a to b a zero between them is guessed, the last guesses being a and c.
+
+    Inverse quadratic interpolation where that is safe, else half-way (T. R. Chandrupatla, Advances
+    in Engineering Software 28, 1997).
+    """
+    if at_a in (at_b, at_c) or at_b in (at_c, 0.0) or c == b:
+        return 0.5
+    place, value = (a - b) / (c - b), (at_a - at_b) / (at_c - at_b)
+    if not (value * value < place and (1.0 - value) * (1.0 - value) < 1.0 - place):
+        return 0.5
+    return (at_a / (at_b - at_a) * at_c / (at_b - at_c)
+            + (c - a) / (b - a) * at_a / (at_c - at_a) * at_b / (at_c - at_b))
+
+
+@called
+def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, first, output, row,
+             inside, X, Y, J, x, S, xs, Ss, xn, Sn, kx, kS, before, mode):
     """The classical Runge-Kutta method, stopping where the right-hand side jumps; see `run`."""
     n, A, L, out = b.sizes[0], len(act), len(T), b.out[F]
+    all_events = 0
     prepare(b, p, act, delayed)
-    x, S, xs, Ss, xn, Sn = (x0.copy(), S0.T.copy(), x0.copy(), S0.T.copy(), x0.copy(), S0.T.copy())
-    kx, kS, before = np.empty((4, n)), np.empty((4, n, A)), np.empty(n)
-    mode, all_events = np.ones(b.sizes[4]), 0
     for q in range(L):
         u, v = U[q], V[q]
         if jumps[q]:
@@ -225,21 +245,28 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
                 crossing = end < -1e-13
                 if crossing:
                     low, high, at_low, at_high = 0.0, part, 0.0, end
-                    for count in range(60):
-                        if high - low <= 1e-13 * part:
+                    if done == 0.0:
+                        # behind another event one function is at zero, up to rounding
+                        at_low, _ = margin(b, T[q], x, u, v, done, mode)
+                    latest, at_latest, other, at_other = high, at_high, low, at_low
+                    share = at_high / (at_high - at_low) if at_low > 0.0 else 0.5
+                    for _ in range(60):
+                        least = 0.5e-13 * part / (high - low)
+                        if least > 0.5:
                             break
-                        middle = 0.5 * (low + high)
-                        if at_low > 0.0 and count % 3 != 2:
-                            middle = low + (high - low) * at_low / (at_low - at_high)
-                            edge = 1e-4 * (high - low) if count % 3 == 0 else 0.0
-                            middle = min(max(middle, low + edge), high - edge)
+                        middle = latest + min(max(share, least), 1.0 - least) * (other - latest)
                         take_step(b, T[q] + done, middle, x, S, u, v, done, dtau_in, delayed, mode,
                                   b.flag[0], kx, kS, xs, Ss, xn, Sn)
                         room, k = margin(b, T[q] + done + middle, xn, u, v, done + middle, mode)
+                        third, at_third = latest, at_latest
+                        if (room < 0.0) != (at_latest < 0.0):
+                            third, at_third, other, at_other = other, at_other, latest, at_latest
+                        latest, at_latest = middle, room
                         if room < 0.0:
-                            high, at_high, which = middle, room, k
+                            high, which = middle, k
                         else:
-                            low, at_low = middle, room
+                            low = middle
+                        share = next_share(latest, at_latest, other, at_other, third, at_third)
                     part = high
                     take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode,
                               b.flag[1], kx, kS, xs, Ss, xn, Sn)
@@ -259,3 +286,14 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
                 else:
                     done = goal
     return 0, L - 1
+
+
+@njit(cache=True, error_model="numpy")
+def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first,
+                   output, row, inside, X, Y, J):
+    """`run_tape` with its scratch; the only function that Python calls."""
+    n, A, S = b.sizes[0], len(act), S0.T.copy()
+    return run_tape(
+        b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, first, output, row, inside,
+        X, Y, J, x0.copy(), S, x0.copy(), S.copy(), x0.copy(), S.copy(), np.empty((4, n)),
+        np.empty((4, n, A)), np.empty(n), np.ones(b.sizes[4]))
