@@ -144,8 +144,8 @@ class Case:
     base: Hypothesis
     before: Estimate
     notes: list[str]
-    tests: dict[frozenset[str], Detection]
-    predictions: dict[frozenset[str], HeldOut | None]
+    tests: dict[tuple[frozenset[str], float], Detection]
+    predictions: dict[tuple[frozenset[str], float], HeldOut | None]
 
     @property
     def rate(self) -> float:
@@ -200,19 +200,19 @@ class Case:
 
     def test(self, h: Hypothesis) -> Detection:
         """What is left in the train recordings."""
-        if h.key not in self.tests:
-            self.tests[h.key] = residual_tests(
+        if h.fit not in self.tests:
+            self.tests[h.fit] = residual_tests(
                 h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, self.candidates, self.rate)
-        return self.tests[h.key]
+        return self.tests[h.fit]
 
     def predicted(self, h: Hypothesis) -> HeldOut | None:
         """What is left in the held-out recordings."""
         if self.later is None:
             return None
-        if h.key not in self.predictions:
-            self.predictions[h.key] = held_out(h, self.model, self.later, self.candidates,
+        if h.fit not in self.predictions:
+            self.predictions[h.fit] = held_out(h, self.model, self.later, self.candidates,
                                                self.rate)
-        return self.predictions[h.key]
+        return self.predictions[h.fit]
 
     def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
         """Whether a hypothesis is worth its effects beyond another one.

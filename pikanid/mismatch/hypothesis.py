@@ -42,6 +42,11 @@ class Hypothesis:
         return frozenset(e.key for e in self.effects)
 
     @property
+    def fit(self) -> tuple[frozenset[str], float]:
+        """Identifies this fit of the effects: another one may find a lower χ²."""
+        return self.key, self.minimum.chi2
+
+    @property
     def known(self) -> bool:
         """Whether all effects are entries of the catalogue."""
         return all(e.known for e in self.effects)
