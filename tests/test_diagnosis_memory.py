@@ -10,8 +10,9 @@ from pikanid.mismatch.api import _opened
 
 def test_a_better_fit_of_the_same_effects_is_tested_anew() -> None:
     model = pk.systems.sloshing()
-    rec = pk.simulate(model, pk.excitation.two_pulse(), sigma=0.002, seed=0)
-    case = _opened(model, (rec,), None, None, lambda text: None)
+    rec, later = (pk.simulate(model, pk.excitation.two_pulse(), sigma=0.002, seed=seed)
+                  for seed in (0, 1))
+    case = _opened(model, (rec,), (later,), None, lambda text: None)
     h = case.base
     better = replace(h, minimum=replace(h.minimum, r=0.5 * h.minimum.r,
                                         chi2=0.25 * h.minimum.chi2))
