@@ -8,24 +8,28 @@ from __future__ import annotations
 
 import functools
 import sys
+import threading
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from pikanid.simulation.bound_tape import bound
+from pikanid.simulation.bound_tape import NOTHING, BoundTape, bound
 from pikanid.simulation.compiled import Method, kernel_text, written
+from pikanid.simulation.native_tape import Native, native
 from pikanid.simulation.simulator import Simulator
 from pikanid.simulation.structure import Structure
 from pikanid.simulation.tape import Tape, can_run, tape
 
+OFTEN = 8000  # steps of a tape after which translating it takes less than interpreting it has
 _HEADER = '''"""The interpreter of tapes; generated from the kernels."""
 import math
 
 import numpy as np
 from numba import njit
 
+from pikanid.simulation.native_call import call_native
 from pikanid.simulation.support import (
     log_abs, positive_power, power_slope, sgn, solve_small)
 from pikanid.simulation.tape import (
@@ -76,25 +80,38 @@ class Interpreted(Simulator):
 
 
 class Machine:
-    """What `Simulator` asks of a compiled module: `integrate`."""
+    """What `Simulator` asks of a compiled module: `integrate`; each thread has its own registers.
+
+    What has been interpreted for as long as a translation takes is translated to machine code.
+    """
 
     def __init__(self, program: Tape):
         self.program = program
         self.kernel = _kernel(program.sizes[4] > 0)
-        self.bound = bound(program, 0)
+        self.own = threading.local()
+        self.steps = 0
 
     def integrate(self, T: np.ndarray, pieces: np.ndarray, U: np.ndarray, V: np.ndarray,
                   jumps: np.ndarray, dtau_in: np.ndarray, dtau_out: np.ndarray, delayed: bool,
                   x0: np.ndarray, S0: np.ndarray, p: np.ndarray, act: np.ndarray,
                   *rest: np.ndarray) -> tuple[int, int]:
         """As that of a compiled model."""
-        lanes = len(act)
-        if self.bound.d.shape[1] != lanes:
-            self.bound = bound(self.program, lanes)
+        self.steps += int(pieces.sum())
         status, stop = self.kernel.integrate_tape(
-            self.bound, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed,
-            x0, S0, p, act, *rest)
+            self._bound(tuple(act.tolist()), delayed), T, pieces, U, V, jumps, dtau_in, dtau_out,
+            delayed, x0, S0, p, act, *rest)
         return int(status), int(stop)
+
+    def _bound(self, active: tuple[int, ...], delayed: bool) -> BoundTape:
+        """The tape with registers for these derivatives."""
+        kept: dict[tuple[tuple[int, ...], bool, bool], tuple[BoundTape, Native | None]]
+        kept = self.own.__dict__.setdefault("kept", {})
+        often = self.steps > OFTEN
+        key = (active, delayed, often)
+        if key not in kept:
+            code = native(self.program, active, delayed) if often else None
+            kept[key] = bound(self.program, len(active), code.addresses if code else NOTHING), code
+        return kept[key][0]
 
 
 @functools.cache

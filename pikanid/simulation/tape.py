@@ -38,7 +38,7 @@ _UNARY = {sp.sin: SIN, sp.cos: COS, sp.tan: TAN, sp.exp: EXP, sp.log: LOG, sp.ta
 GROUPS = ("prelude", "f", "h", "h_rate", "g", "g_rate")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tape:
     """Operations (ops, 4) of each group: opcode, two arguments, result; all by register.
 

@@ -184,12 +184,27 @@ def put_rates(b, v):
 
 @called
 def values(b, group):
-    compute(b.code, b.span[group, 0], b.span[group, 1], b.r)
+    if b.native[0, group] != 0:
+        call_native(b.native[0, group], b.r, b.d)
+    else:
+        compute(b.code, b.span[group, 0], b.span[group, 1], b.r)
 
 
 @called
 def tangents(b, group):
-    differentiate(b.code, b.span[group, 0], b.span[group, 1], b.r, b.d, b.live)
+    if b.native[1, group] != 0:
+        call_native(b.native[1, group], b.r, b.d)
+    elif b.d.shape[1] > 0:
+        differentiate(b.code, b.span[group, 0], b.span[group, 1], b.r, b.d, b.live)
+
+
+@called
+def by_signs(b):
+    """Derivatives of the switching functions' rates by the signs."""
+    if b.native[2, G_RATE] != 0:
+        call_native(b.native[2, G_RATE], b.r, b.ds)
+    else:
+        differentiate(b.code, b.span[G_RATE, 0], b.span[G_RATE, 1], b.r, b.ds, b.signed)
 
 
 @called

@@ -17,7 +17,7 @@ def put_signs(b, mode, slide):
     if held == 0:
         return False
     values(b, b.group[G_RATE])
-    differentiate(b.code, b.span[G_RATE, 0], b.span[G_RATE, 1], b.r, b.ds, b.signed)
+    by_signs(b)
     matrix, right, again, change = b.matrix, b.right, b.again, b.change
     for k in range(K):
         right[k, 0] = 0.0
@@ -288,12 +288,12 @@ def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, firs
     return 0, L - 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first,
                    output, row, inside, X, Y, J):
     """`run_tape` with its scratch; the only function that Python calls."""
-    n, A, S = b.sizes[0], len(act), S0.T.copy()
+    n, A, x, S = b.sizes[0], len(act), x0.copy(), S0.T.copy()
     return run_tape(
         b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, first, output, row, inside,
-        X, Y, J, x0.copy(), S, x0.copy(), S.copy(), x0.copy(), S.copy(), np.empty((4, n)),
+        X, Y, J, x, S, x.copy(), S.copy(), x.copy(), S.copy(), np.empty((4, n)),
         np.empty((4, n, A)), np.empty(n), np.ones(b.sizes[4]))

@@ -1,12 +1,10 @@
-@njit(cache=True, error_model="numpy")
-def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first,
-                   output, row, inside, X, Y, J):
+@called
+def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, first, output, row,
+             inside, X, Y, J, x, S, xs, Ss, kx, kS):
     """The classical Runge-Kutta method on a model without jumps; see `run` for the arguments."""
     n, A, L = b.sizes[0], len(act), len(T)
     r, d, live, out = b.r, b.d, b.live, b.out[F]
     prepare(b, p, act, delayed)
-    x, S, xs, Ss = x0.copy(), S0.T.copy(), x0.copy(), S0.T.copy()
-    kx, kS = np.empty((4, n)), np.empty((4, n, A))
     for q in range(L):
         if delayed and jumps[q] and q > 0 and A > 0:
             # an input that comes later switches later: the state moves by (f- - f+) ddelay
@@ -53,3 +51,13 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
                     S[i, a] += h / 6.0 * (
                         kS[0, i, a] + 2.0 * kS[1, i, a] + 2.0 * kS[2, i, a] + kS[3, i, a])
     return 0, L - 1
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first,
+                   output, row, inside, X, Y, J):
+    """`run_tape` with its scratch; the only function that Python calls."""
+    n, A, S = b.sizes[0], len(act), S0.T.copy()
+    return run_tape(
+        b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, first, output, row, inside,
+        X, Y, J, x0.copy(), S, x0.copy(), S.copy(), np.empty((4, n)), np.empty((4, n, A)))

@@ -1,0 +1,300 @@
+"""Tapes as machine code: what an interpreter would do operation by operation, in one piece.
+
+Only tapes that are run often are worth the few milliseconds which that takes.  The text is written
+for LLVM (C. Lattner and V. Adve, Proc. CGO 2004), without its optimisers: a tape is in static
+single assignment form as it stands.  Every operation rounds as in the interpreter, so that both
+give the same numbers, bit by bit.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pikanid.simulation import tape as ops
+from pikanid.simulation.tape import GROUPS, Tape
+
+NATIVE = ("f", "g_rate")  # groups that are run at every stage of a step
+WIDEST = 4  # derivatives that one instruction carries
+_BINARY = {ops.ADD: "fadd", ops.MUL: "fmul", ops.DIV: "fdiv"}
+_CALLED = {ops.SIN: "sin", ops.COS: "cos", ops.TAN: "tan", ops.EXP: "exp", ops.TANH: "tanh",
+           ops.SINH: "sinh", ops.COSH: "cosh", ops.ATAN: "atan"}
+_INSIDE = {ops.LOG: ("log", "ogt", "0.0"), ops.SQRT: ("llvm.sqrt.f64", "oge", "0.0"),
+           ops.ASIN: ("asin", "ole", "1.0"), ops.ACOS: ("acos", "ole", "1.0")}
+_TWO = (ops.ADD, ops.MUL, ops.DIV, ops.POSITIVE_POWER, ops.POWER, ops.ATAN2)
+_NAN = "0x7FF8000000000000"
+_STEEP = "0x3EB0C6F7A0B5ED8D"  # 1e-6
+_lock = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Native:
+    """Addresses (3, groups) of functions of (registers, derivatives): values, derivatives by the
+    estimated parameters, derivatives by signs; zero where there is none.  `code` keeps them alive.
+    """
+
+    addresses: np.ndarray
+    code: Any
+
+
+@functools.lru_cache(maxsize=512)
+def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
+    """The functions of a tape for derivatives by the `active` parameters and initial states.
+
+    `moving_inputs`: the inputs move with the parameters, too, as where delays are estimated.
+    """
+    n, m, P, _, K = tape.sizes
+    states, inputs = range(1, 1 + n), range(1 + n, 1 + n + m)
+    signs = [1 + n + m + P + k for k in range(K)]
+    seeds = {*states, *(inputs if moving_inputs else ()), *(1 + n + m + a for a in active if a < P),
+             *signs}
+    live, signed = _reached(tape, seeds), _reached(tape, set(signs))
+    names, text = {}, [_HELPERS]
+    for number, group in enumerate(GROUPS):
+        if group not in NATIVE or not len(tape.code[group]):
+            continue
+        names[0, number] = f"values_{group}"
+        text.append(_values(tape, group))
+        if active:
+            names[1, number] = f"tangents_{group}"
+            text.append(_tangents(tape, group, names[1, number], live, len(active)))
+        if K and group == "g_rate":
+            names[2, number] = f"signs_{group}"
+            text.append(_tangents(tape, group, names[2, number], signed, K))
+    addresses = np.zeros((3, len(GROUPS)), np.int64)
+    code = _compiled("\n".join(text))
+    for place, name in names.items():
+        addresses[place] = code.get_function_address(name)
+    return Native(addresses, code)
+
+
+def _compiled(text: str) -> Any:
+    from llvmlite import binding
+
+    with _lock:
+        binding.initialize_native_target()
+        binding.initialize_native_asmprinter()
+        machine = binding.Target.from_default_triple().create_target_machine(
+            opt=1, cpu=binding.get_host_cpu_name(),
+            features=binding.get_host_cpu_features().flatten())
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(text), machine)
+        engine.finalize_object()
+        return engine
+
+
+def _reached(tape: Tape, seeds: set[int]) -> set[int]:
+    """Registers that depend on the seeds."""
+    live = set(seeds)
+    for group in GROUPS:
+        for op, i, j, o in tape.code[group].tolist():
+            if op != ops.SGN and (i in live or (op in _TWO and j in live)):
+                live.add(o)
+    return live
+
+
+class _Writer:
+    """Lines of one function; %n are numbered in the order in which they are needed."""
+
+    def __init__(self, name: str):
+        self.name, self.lines, self.count = name, list[str](), 0
+
+    def put(self, right: str) -> str:
+        self.count += 1
+        self.lines.append(f"  %t{self.count} = {right}")
+        return f"%t{self.count}"
+
+    def load(self, array: str, place: int, kind: str = "double") -> str:
+        at = self.put(f"getelementptr double, ptr %{array}, i64 {place}")
+        return self.put(f"load {kind}, ptr {at}, align 8")
+
+    def store(self, value: str, array: str, place: int, kind: str = "double") -> None:
+        at = self.put(f"getelementptr double, ptr %{array}, i64 {place}")
+        self.lines.append(f"  store {kind} {value}, ptr {at}, align 8")
+
+    def call(self, function: str, *values: str) -> str:
+        return self.put(f"call double @{function}({', '.join(f'double {v}' for v in values)})")
+
+    def op(self, name: str, x: str, y: str, kind: str = "double") -> str:
+        return self.put(f"{name} {kind} {x}, {y}")
+
+    def where(self, x: str, relation: str, bound: str, yes: str, no: str) -> str:
+        test = self.put(f"fcmp {relation} double {x}, {bound}")
+        return self.put(f"select i1 {test}, double {yes}, double {no}")
+
+    def text(self) -> str:
+        return "\n".join([f"define void @{self.name}(ptr %r, ptr %d) {{", *self.lines,
+                          "  ret void", "}"])
+
+
+def _values(tape: Tape, group: str) -> str:
+    w, known = _Writer(f"values_{group}"), dict[int, str]()
+    for op, i, j, o in tape.code[group].tolist():
+        for k in (i, j) if op in _TWO else (i,):
+            if k not in known:
+                known[k] = w.load("r", k)
+        known[o] = _value(w, op, known[i], known.get(j, ""))
+        w.store(known[o], "r", o)
+    return w.text()
+
+
+def _value(w: _Writer, op: int, x: str, y: str) -> str:
+    if op in _BINARY:
+        return w.op(_BINARY[op], x, y)
+    if op == ops.SQUARE:
+        return w.op("fmul", x, x)
+    if op == ops.NEGATE:
+        return w.put(f"fneg double {x}")
+    if op in _CALLED:
+        return w.call(_CALLED[op], x)
+    if op in _INSIDE:
+        function, relation, bound = _INSIDE[op]
+        size = w.call("llvm.fabs.f64", x) if bound == "1.0" else x
+        return w.where(size, relation, bound, w.call(function, x), _NAN)
+    if op == ops.SGN:
+        return w.where(x, "ogt", "0.0", "1.0", w.where(x, "olt", "0.0", "-1.0", "0.0"))
+    if op == ops.LOG_ABS:
+        return w.call("log_abs", x)
+    return w.call({ops.POWER: "pow", ops.POSITIVE_POWER: "positive_power",
+                   ops.ATAN2: "atan2"}[op], x, y)
+
+
+def _tangents(tape: Tape, group: str, name: str, live: set[int], lanes: int) -> str:
+    """Derivatives d (registers, lanes) of the results, by the chain rule."""
+    w, r = _Writer(name), dict[int, str]()
+
+    def value(k: int) -> str:
+        if k not in r:
+            r[k] = w.load("r", k)
+        return r[k]
+
+    code = [line for line in tape.code[group].tolist() if line[3] in live]
+    partial: list[tuple[str, str]] = []
+    for op, i, j, o in code:
+        if op in (ops.ADD, ops.NEGATE):
+            partial.append(("", ""))
+        elif op == ops.MUL:
+            partial.append((value(j) if i in live else "", value(i) if j in live else ""))
+        else:
+            partial.append(_slopes(w, op, value(i), value(j) if op in _TWO else "", value(o)))
+    results = set(tape.outputs[group].tolist())
+    for first, width in _blocks(lanes):
+        kind, d, wide = f"<{width} x double>", dict[int, str](), dict[str, str]()
+        for (op, i, j, o), (by_x, by_y) in zip(code, partial, strict=True):
+            parts = []
+            for k, slope in ((i, by_x), (j, by_y)) if op in _TWO else ((i, by_x),):
+                if k not in live:
+                    continue
+                if k not in d:
+                    d[k] = w.load("d", k * lanes + first, kind)
+                if slope and slope not in wide:
+                    wide[slope] = _splat(w, slope, width)
+                parts.append(w.op("fmul", d[k], wide[slope], kind) if slope else d[k])
+            d[o] = parts[0] if len(parts) == 1 else w.op("fadd", parts[0], parts[1], kind)
+            if op == ops.NEGATE:
+                d[o] = w.put(f"fneg {kind} {d[o]}")
+            if o in results:
+                w.store(d[o], "d", o * lanes + first, kind)
+    return w.text()
+
+
+def _blocks(lanes: int) -> Iterator[tuple[int, int]]:
+    for first in range(0, lanes, WIDEST):
+        yield first, min(WIDEST, lanes - first)
+
+
+def _splat(w: _Writer, value: str, width: int) -> str:
+    kind = f"<{width} x double>"
+    one = w.put(f"insertelement {kind} poison, double {value}, i32 0")
+    return w.put(f"shufflevector {kind} {one}, {kind} poison, <{width} x i32> zeroinitializer")
+
+
+def _slopes(w: _Writer, op: int, x: str, y: str, value: str
+            ) -> tuple[str, str]:
+    """The partial derivatives of an operation by its arguments x and y."""
+    one = "1.0"
+    if op == ops.DIV:
+        return w.op("fdiv", one, y), w.op("fdiv", w.put(f"fneg double {value}"), y)
+    if op == ops.POSITIVE_POWER:
+        return (w.call("power_slope", x, y), w.op("fmul", value, w.call("log_abs", x)))
+    if op == ops.POWER:
+        log = w.where(x, "ogt", "0.0", w.call("log", x), "0.0")
+        less = w.call("pow", x, w.op("fsub", y, one))
+        return w.op("fmul", y, less), w.op("fmul", value, log)
+    square = w.op("fmul", x, x)
+    if op == ops.ATAN2:
+        both = w.op("fadd", square, w.op("fmul", y, y))
+        return w.op("fdiv", y, both), w.op("fdiv", w.put(f"fneg double {x}"), both)
+    return _slope(w, op, x, value, square), ""
+
+
+def _slope(w: _Writer, op: int, x: str, value: str, square: str) -> str:
+    one = "1.0"
+    if op == ops.SQUARE:
+        return w.op("fmul", "2.0", x)
+    if op in (ops.SIN, ops.SINH, ops.COSH):
+        return w.call({ops.SIN: "cos", ops.SINH: "cosh", ops.COSH: "sinh"}[op], x)
+    if op == ops.COS:
+        return w.put(f"fneg double {w.call('sin', x)}")
+    if op in (ops.TAN, ops.TANH):
+        return w.op("fadd" if op == ops.TAN else "fsub", one, w.op("fmul", value, value))
+    if op == ops.EXP:
+        return value
+    if op in (ops.LOG, ops.LOG_ABS):
+        return w.op("fdiv", one, x)
+    if op == ops.SQRT:
+        return w.op("fdiv", "0.5", value)
+    if op == ops.ATAN:
+        return w.op("fdiv", one, w.op("fadd", one, square))
+    root = w.call("llvm.sqrt.f64", w.op("fsub", one, square))
+    return w.op("fdiv", one if op == ops.ASIN else "-1.0", root)
+
+
+_HELPERS = "\n".join(
+    [*(f"declare double @{name}(double)" for name in (
+        *_CALLED.values(), *(name for name, *_ in _INSIDE.values()), "llvm.fabs.f64")),
+     "declare double @pow(double, double)", "declare double @atan2(double, double)",
+     f"""
+define internal double @log_abs(double %x) {{
+  %zero = fcmp oeq double %x, 0.0
+  br i1 %zero, label %nothing, label %rest
+nothing:
+  ret double 0.0
+rest:
+  %size = call double @llvm.fabs.f64(double %x)
+  %log = call double @log(double %size)
+  ret double %log
+}}
+define internal double @positive_power(double %base, double %n) {{
+  %low = fcmp ole double %base, 0.0
+  br i1 %low, label %below, label %above
+below:
+  %flat = fcmp oeq double %n, 0.0
+  %at = select i1 %flat, double 1.0, double 0.0
+  ret double %at
+above:
+  %power = call double @pow(double %base, double %n)
+  ret double %power
+}}
+define internal double @power_slope(double %base, double %n) {{
+  %low = fcmp ole double %base, 0.0
+  %root = fcmp olt double %n, 1.0
+  %near = fcmp olt double %base, {_STEEP}
+  %steep = and i1 %root, %near
+  %no = or i1 %low, %steep
+  br i1 %no, label %below, label %above
+below:
+  %line = fcmp oeq double %n, 1.0
+  %at = select i1 %line, double 1.0, double 0.0
+  ret double %at
+above:
+  %less = fsub double %n, 1.0
+  %power = call double @pow(double %base, double %less)
+  %slope = fmul double %n, %power
+  ret double %slope
+}}
+"""])
