@@ -14,8 +14,7 @@ def test_a_better_fit_of_the_same_effects_is_tested_anew() -> None:
                   for seed in (0, 1))
     case = _opened(model, (rec,), (later,), None, lambda text: None)
     h = case.base
-    better = replace(h, minimum=replace(h.minimum, r=0.5 * h.minimum.r,
-                                        chi2=0.25 * h.minimum.chi2))
+    better = replace(h, minimum=replace(h.minimum, r=0.5 * h.minimum.r))
     first, first_prediction = case.test(h), case.predicted(h)
     assert case.test(h) is first
     assert case.test(better).power < 0.3 * first.power
