@@ -8,6 +8,7 @@ elimination of its leading coefficients; any other approximator is tied to them 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -68,12 +69,12 @@ class Functional:
                 for table in part.physics.tops))) for part in self.parts)
         return replace(self, penalty="roughness", parts=parts)
 
-    @property
+    @functools.cached_property
     def n_data(self) -> int:
         """Number of samples that take part."""
         return sum(sites.t.size for part in self.parts for sites in part.data)
 
-    @property
+    @functools.cached_property
     def data_square(self) -> float:
         """Weighted sum of squares of the samples themselves."""
         return sum(float(np.sum((sites.weight * sites.target) ** 2))
@@ -102,11 +103,15 @@ class Functional:
     def hold_jacobian(self, r: int, theta: Array) -> Array | None:
         """d c[held] / d θ (k, b) in the columns of `problem.columns(r)`; None where constant."""
         part = self.parts[r]
-        if part.held.size == 0:
+        if part.held.size == 0 or not self._start_moves:
             return None
         positions, _ = self.problem.columns(r)
         jacobian = self.problem.experiments[r].initial_jacobian(self.problem.parameters(theta, r))
         return part.hold @ jacobian[:, positions] if jacobian[:, positions].any() else None
+
+    @functools.cached_property
+    def _start_moves(self) -> bool:
+        return any(state.initial.free_symbols for state in self.problem.model.states)
 
     def states(self, sites: Sites, coefficients: Array) -> Array:
         """Approximated states (M, n) at the sites."""
@@ -115,11 +120,11 @@ class Functional:
     def rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> list[Rows]:
         """All residual families of recording r with derivatives: data, physics, start."""
         part = self.parts[r]
-        p = self.problem.parameters(theta, r)
-        positions, _ = self.problem.columns(r)
         families = self.data_rows(r, coefficients, theta)
         families.append(self.physics_rows(r, coefficients, theta, lam))
         if part.start is not None:
+            p = self.problem.parameters(theta, r)
+            positions, _ = self.problem.columns(r)
             families.append(self._start(part.start, r, coefficients, p, positions))
         return families
 
@@ -199,8 +204,8 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
     data by their σ (where it is unknown, by the visible noise if there are several outputs).
 
     Raises:
-        BadSetting: If a delay or a backlash is to be estimated: no functional over fixed sites can
-            see them.
+        BadSetting: If a delay, a backlash or a rate limit is to be estimated: no functional over fixed
+            sites can see them.
     """
     late = _output_delays(problem)
     parts = []
@@ -257,8 +262,9 @@ def _output_delays(problem: Problem) -> Array:
                 raise errors.BadSetting(errors.relaxation_cannot_see(
                     names, f"the delay of {what} '{item.name}'"))
     for item in model.inputs:
-        names = sorted(s.name for s in item.backlash.free_symbols & free)
-        if names:
-            raise errors.BadSetting(errors.relaxation_cannot_see(
-                names, f"the backlash of input '{item.name}'"))
+        for what, formula in (("backlash", item.backlash), ("rate limit", item.rate_limit)):
+            names = sorted(s.name for s in formula.free_symbols & free)
+            if names:
+                raise errors.BadSetting(errors.relaxation_cannot_see(
+                    names, f"the {what} of input '{item.name}'"))
     return delays(model.outputs, model, np.array(list(model.values.values())))

@@ -11,18 +11,26 @@ from scipy.optimize import lsq_linear
 
 import pikanid as pk
 from pikanid.functional import Functional
-from pikanid.optimise.covariance import effective_parameters, invert, theta_covariance
+from pikanid.optimise.covariance import (
+    effective_parameters,
+    error_bound,
+    invert,
+    reduced_matrix,
+    theta_covariance,
+)
 from pikanid.optimise.gauss_newton import BandedSystem, Point, box_minimum, gauss_newton
 from pikanid.optimise.schedules import Continuation, Fixed, Stage
+from pikanid.optimise.small_matrices import inverse_diagonal
 from pikanid.optimise.smoothing import multiply, smooth
 
 LAM = 1.7
 WIDE = np.full(9, 1e9)
 
 
-def dense(functional: Functional, point: Point) -> tuple[np.ndarray, np.ndarray]:
+def dense(functional: Functional, point: Point, lam: float = LAM
+          ) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian by [free coefficients, θ], held ones eliminated, and the residual."""
-    jacobian = functional.jacobian(point.coefficients, point.theta, LAM).toarray()
+    jacobian = functional.jacobian(point.coefficients, point.theta, lam).toarray()
     count = sum(c.size for c in point.coefficients)
     theta, kept, first = jacobian[:, count:].copy(), [], 0
     for r, part in enumerate(functional.parts):
@@ -34,7 +42,7 @@ def dense(functional: Functional, point: Point) -> tuple[np.ndarray, np.ndarray]
         kept.append(np.setdiff1d(inside, held))
         first += part.n_coefficients
     return (np.column_stack([jacobian[:, np.concatenate(kept)], theta]),
-            functional.residual(point.coefficients, point.theta, LAM))
+            functional.residual(point.coefficients, point.theta, lam))
 
 
 MODELS = {
@@ -84,8 +92,29 @@ def test_sandwich_and_effective_parameters(name: str) -> None:
     sandwich, naive = theta_covariance(system, at, step, [noise])
     assert np.allclose(sandwich, wanted, rtol=1e-5, atol=1e-9 * np.abs(wanted).max())
     assert np.allclose(naive, bread[-size:, -size:] * np.mean(noise**2), rtol=1e-5)
+    bound = error_bound(system, at, step, [noise])
+    assert np.all(bound >= np.sqrt(np.diag(sandwich))) and np.all(np.isfinite(bound))
     used = effective_parameters(system, at, step)
     assert used == pytest.approx(np.trace(data @ bread @ data.T), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_reduced_matrix_at_a_large_lambda(name: str) -> None:
+    """What the normal equations leave of it has lost its digits; an orthogonal reduction keeps."""
+    lam = 1e12
+    functional = collocated(MODELS[name], slosh(0.1, stride=4), intervals=40)
+    system = BandedSystem(functional)
+    point = Point((functional.resting(0, functional.problem.guess),), functional.problem.guess)
+    size = point.theta.size
+    found = gauss_newton(system, point, lam, -WIDE[:size], WIDE[:size])
+    jacobian, _ = dense(functional, found.at.point, lam)
+    triangle = np.linalg.qr(jacobian / np.linalg.norm(jacobian, axis=0), mode="r")
+    corner = triangle[-size:, -size:] * np.linalg.norm(jacobian[:, -size:], axis=0)
+    wanted = np.sqrt(np.diag(np.linalg.inv(corner.T @ corner)))
+    reduced = reduced_matrix(system, found.at, found.step)
+    got, naive = (np.sqrt(np.diag(np.linalg.inv(m))) for m in (reduced, found.step.schur))
+    assert np.abs(got / wanted - 1).max() < 1e-7
+    assert np.abs(naive / wanted - 1).max() > 1e-7
 
 
 def test_minimum_and_bounds() -> None:
@@ -150,6 +179,14 @@ def test_multiply_and_invert() -> None:
     assert np.allclose(multiply(band, x), full @ x)
     out = invert(np.diag([2.0, 4.0, 0.0]), np.array([True, False, True]))
     assert np.allclose(out, np.diag([0.5, 0.0, 0.0]))
+    root, diagonal = rng.normal(size=(4, 4)), np.empty(4)
+    square = root.T @ root
+    inverse_diagonal(square, np.array([True, True, False, True]), diagonal)
+    kept = np.ix_([0, 1, 3], [0, 1, 3])
+    assert np.allclose(diagonal[[0, 1, 3]], np.diag(np.linalg.inv(square[kept])))
+    assert diagonal[2] == 0.0
+    inverse_diagonal(-square, np.array([True, True, False, True]), diagonal)
+    assert np.array_equal(diagonal, [np.inf, np.inf, 0.0, np.inf])
 
 
 def stage(lam: float, value: float, data: float, physics: float, converged: bool = True) -> Stage:

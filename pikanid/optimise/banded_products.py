@@ -96,3 +96,43 @@ def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
         pivot = 1.0 / factor[0, j]
         for c in range(count):
             columns[j, c] *= pivot
+
+
+@_compiled
+def reduce_block(right: np.ndarray, solved: np.ndarray, corner: np.ndarray, columns: np.ndarray,
+                 schur: np.ndarray, slope: np.ndarray) -> float:
+    """Add corner - rightᵀ solved, (b + 1, b + 1), to schur and slope at columns (b,).
+
+    Its part by θ goes to schur (symmetric), the last column to slope; the last entry of the product
+    is returned.  Sums of some rows are summed up in turn: the difference may be all that is left of
+    large numbers.
+    """
+    count = right.shape[1]
+    total, part = np.zeros((count, count)), np.empty((count, count))
+    for begin in range(0, right.shape[0], 64):
+        part[:] = 0.0
+        for m in range(begin, min(begin + 64, right.shape[0])):
+            for i in range(count):
+                for j in range(count):
+                    part[i, j] += right[m, i] * solved[m, j]
+        for i in range(count):
+            for j in range(count):
+                total[i, j] += part[i, j]
+    for i in range(count - 1):
+        for j in range(count - 1):
+            schur[columns[i], columns[j]] += 0.5 * (
+                corner[i, j] - total[i, j] + corner[j, i] - total[j, i])
+        slope[columns[i]] += corner[i, count - 1] - total[i, count - 1]
+    return total[count - 1, count - 1]
+
+
+@_compiled
+def follow_theta(solved: np.ndarray, change: np.ndarray, columns: np.ndarray, order: np.ndarray,
+                 move: np.ndarray) -> None:
+    """move[order[k + m]] = -(solved[m] · [change[columns], 1]), the first k entries left alone."""
+    held, b = order.size - solved.shape[0], columns.size
+    for m in range(solved.shape[0]):
+        total = solved[m, b]
+        for k in range(b):
+            total += solved[m, k] * change[columns[k]]
+        move[order[held + m]] = -total

@@ -53,6 +53,20 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
     return sandwich, naive
 
 
+def error_bound(system: BandedSystem, at: Linearisation, step: Step,
+                noise: Sequence[Array | float]) -> Array:
+    """No less than the sandwich's standard errors of θ (b,), without a look at the data rows.
+
+    M holds J_dᵀJ_d and more, so that Zᵀ J_dᵀ Σ J_d Z is at most the largest variance in Σ times the
+    θ block of M⁻¹.
+    """
+    from pikanid.optimise.small_matrices import inverse_diagonal
+
+    bread = np.empty(at.point.theta.size)
+    inverse_diagonal(step.schur, inside_bounds(system, at), bread)
+    return max(float(np.max(deviation, initial=0.0)) for deviation in noise) * np.sqrt(bread)
+
+
 def inside_bounds(system: BandedSystem, at: Linearisation) -> NDArray[np.bool_]:
     """Which parameters (b,) are not at a bound."""
     problem, theta = system.functional.problem, at.point.theta.tolist()
@@ -82,35 +96,70 @@ def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
 
 def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[Array]:
     """Derivative (N, b) of every weighted data family by θ, the coefficients following θ."""
-    from pikanid.approximators.local_basis import add_weighed
-
     functional, responses = system.functional, []
     for r, part in enumerate(functional.parts):
-        columns, block = system.columns[r], at.blocks[r]
-        held = np.zeros((part.held.size, columns.size))
-        if block.held_by_theta is not None:
-            held = block.held_by_theta
-        follow = np.empty((part.n_coefficients, columns.size))
-        follow[system.assemblers[r].order] = np.concatenate([held, -step.inner[r]])
+        follow = following(system, at, step, r)
         rows = functional.data_rows(r, at.point.coefficients[r], at.point.theta)
         for sites, row in zip(part.data, rows, strict=True):
-            assert row.by_theta is not None
-            own = row.by_theta[:, 0].copy()
-            for table, by_state in _met(sites, row):
-                add_weighed(*table.window, by_state, follow, own)
             full = np.zeros((sites.t.size, at.point.theta.size))
-            full[:, columns] = own
+            full[:, system.columns[r]] = family_response(sites, row, follow)[0]
             responses.append(full)
     return responses
 
 
-def _met(sites: Sites, rows: Rows) -> Iterator[tuple[Table, Array]]:
-    """Tables of the states that a data family depends on, and the slopes (M,) by them."""
-    assert rows.by_state is not None
-    for s, table in enumerate(sites.states):
-        by_state = rows.by_state[:, 0, s]
-        if by_state.any():
-            yield table, by_state
+def reduced_matrix(system: BandedSystem, at: Linearisation, step: Step) -> Array:
+    """RᵀR (b, b), R the derivative of all rows by θ, the coefficients following θ.
+
+    It is what `step.schur` is, which is left over from large numbers where λ is large: at 1e8 that
+    may cost the standard errors their fourth digit.  Here the rows cancel before they are squared,
+    and an error in how the coefficients follow counts only by its square (it is a minimum).
+    """
+    functional = system.functional
+    reduced = np.zeros_like(step.schur)
+    for r, columns in enumerate(system.columns):
+        follow = following(system, at, step, r)
+        rows = functional.rows(r, at.point.coefficients[r], at.point.theta, at.lam)
+        for sites, row in zip(system.families[r], rows, strict=True):
+            for response in family_response(sites, row, follow):
+                reduced[columns[:, None], columns] += response.T @ response
+    return reduced
+
+
+def following(system: BandedSystem, at: Linearisation, step: Step, r: int) -> Array:
+    """Derivative (n, b) of recording r's coefficients by its parameters, held ones included."""
+    part, block = system.functional.parts[r], at.blocks[r]
+    held = np.zeros((part.held.size, system.columns[r].size))
+    if block.held_by_theta is not None:
+        held = block.held_by_theta
+    follow = np.empty((part.n_coefficients, held.shape[1]))
+    follow[system.assemblers[r].order] = np.concatenate([held, -step.inner[r]])
+    return follow
+
+
+def family_response(sites: Sites, rows: Rows, follow: Array) -> list[Array]:
+    """Derivative (M, b) of each of a family's E residuals by θ, its coefficients following."""
+    from pikanid.approximators.local_basis import add_weighed
+
+    responses = []
+    for e in range(rows.residual.shape[1]):
+        own = np.zeros((sites.t.size, follow.shape[1]))
+        if rows.by_theta is not None:
+            own += rows.by_theta[:, e]
+        for table, slope in _met(sites, rows, e):
+            add_weighed(*table.window, slope, follow, own)
+        responses.append(own)
+    return responses
+
+
+def _met(sites: Sites, rows: Rows, e: int = 0) -> Iterator[tuple[Table, Array]]:
+    """Tables that residual e of a family depends on, and the slopes (M,) by them."""
+    if rows.by_state is not None:
+        for s, table in enumerate(sites.states):
+            by_state = rows.by_state[:, e, s]
+            if by_state.any():
+                yield table, by_state
+    if rows.by_top is not None:
+        yield sites.tops[e], rows.by_top[:, e]
 
 
 def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) -> float:

@@ -9,6 +9,7 @@ inside the box.
 from __future__ import annotations
 
 import copy
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,17 +54,18 @@ class Linearisation:
     """Eq. (2) and its Gauss-Newton model at a point."""
 
     point: Point
+    lam: float
     blocks: tuple[Eliminated, ...]
     data_costs: tuple[tuple[float, ...], ...]  # per recording, per data family
     physics_cost: float
     other_cost: float
 
-    @property
+    @functools.cached_property
     def data_cost(self) -> float:
         """Weighted sum of squares of the data rows."""
         return sum(map(sum, self.data_costs))
 
-    @property
+    @functools.cached_property
     def cost(self) -> float:
         """‖r‖², all families together."""
         return self.data_cost + self.physics_cost + self.other_cost
@@ -110,7 +112,7 @@ class BandedSystem:
             data.append(normal.costs[:count])
             physics += normal.costs[count]
             other += sum(normal.costs[count + 1:])
-        return Linearisation(point, tuple(blocks), tuple(data), physics, other)
+        return Linearisation(point, lam, tuple(blocks), tuple(data), physics, other)
 
     def moved(self, point: Point, step: Step) -> Point:
         """The point after a step, held coefficients set from the initial state."""
@@ -126,6 +128,9 @@ class BandedSystem:
         Raises:
             LinAlgError: If a band or the reduced matrix is not positive definite.
         """
+        from pikanid.optimise.banded_products import follow_theta, reduce_block
+        from pikanid.optimise.small_matrices import fall
+
         theta, b = at.point.theta, at.point.theta.size
         schur, slope, promised = np.zeros((b, b)), np.zeros(b), 0.0
         inner = []
@@ -135,19 +140,16 @@ class BandedSystem:
                 band, corner = band.copy(order="F"), corner.copy()
                 band[0] *= 1.0 + damping
                 corner[np.diag_indices(columns.size)] *= 1.0 + damping
-            inner.append(solve_band(factor_band(band), block.right))
-            followed = block.right.T @ inner[-1]
-            schur[columns[:, None], columns] += corner[:-1, :-1] - followed[:-1, :-1]
-            slope[columns] += corner[:-1, -1] - followed[:-1, -1]
-            promised += float(followed[-1, -1])
-        schur = 0.5 * (schur + schur.T)
+            solved = solve_band(factor_band(band), block.right)
+            promised += reduce_block(block.right, solved, corner, columns, schur, slope)
+            inner.append(solved)
         change = box_minimum(schur, slope, lower - theta, upper - theta)
-        promised -= float(change @ (2.0 * slope + schur @ change))
+        promised += fall(schur, slope, change)
         moves = []
         for columns, order, solved in zip(self.columns, self.orders, inner, strict=True):
             # Held coefficients, the first, are set from the initial state afterwards, exactly.
             move = np.zeros(order.size)
-            move[order[order.size - len(solved):]] = -solved @ np.append(change[columns], 1.0)
+            follow_theta(solved, change, columns, order, move)
             moves.append(move)
         return Step(tuple(moves), change, promised, schur,
                     tuple(solved[:, :-1] for solved in inner))
@@ -183,6 +185,11 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     """
     if slope.size == 0:
         return np.zeros(0)
+    from pikanid.optimise.small_matrices import free_minimum
+
+    change = np.empty(slope.size)
+    if free_minimum(matrix, slope, lower, upper, change):  # nearly always: no bound is met
+        return change
     diagonal = matrix.diagonal()
     # A parameter without influence here (damping of a body at rest) stays where it is.
     bound = (lower >= upper) | (diagonal == 0.0)
@@ -191,10 +198,6 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     if not (bound | (diagonal > 0.0)).all():
         raise LinAlgError("the reduced matrix is not positive definite")
     root = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    if not bound.any():  # nearly always: no bound meets the free minimum
-        change = _minimum(matrix, slope, root)
-        if ((lower <= change) & (change <= upper)).all():
-            return change
     change = np.clip(0.0, lower, upper)
     for _ in range(4 * slope.size + 4):
         free = np.flatnonzero(~bound)

@@ -20,6 +20,7 @@ NOTHING = 1e-8  # of the noise's cost: a physics cost without any influence
 class Stage:
     """One λ fitted: estimate and standard errors (b,), cost parts, effort.
 
+    `std` may be an upper bound of the standard errors where those themselves decide nothing.
     `free` says that the splines were seen to follow the physics at this λ: whatever rose there is
     the model's misfit, and no lock.
     """

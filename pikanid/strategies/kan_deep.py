@@ -32,8 +32,9 @@ from pikanid.optimise.gauss_newton import Point
 from pikanid.optimise.network_covariance import network_covariance
 from pikanid.optimise.schedules import Continuation, Stage, moved
 from pikanid.problem import Problem
+from pikanid.strategies.data_noise import row_noise
 from pikanid.strategies.kan_grids import KanGrid
-from pikanid.strategies.relaxation import GRID_SETTLED, RELATIVE, RelaxedFit, Setup, row_noise
+from pikanid.strategies.relaxation import GRID_SETTLED, RELATIVE, RelaxedFit, Setup
 
 Width = Sequence[int | Sequence[int]]
 

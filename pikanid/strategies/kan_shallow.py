@@ -14,6 +14,7 @@ from pikanid.approximators.kan import ShallowKAN
 from pikanid.functional import Functional
 from pikanid.optimise.gauss_newton import BandedSystem, Outcome, Point
 from pikanid.optimise.schedules import Continuation, Fixed, Stage, moved
+from pikanid.strategies.data_noise import noise_level, standard_errors
 from pikanid.strategies.grids import fastest_rate
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.relaxation import (
@@ -24,7 +25,6 @@ from pikanid.strategies.relaxation import (
     conclude,
     first_point,
     follow,
-    noise_level,
     physics_scale,
 )
 
@@ -67,7 +67,7 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, cells: float | None, max_grid: i
             return conclude(setup, best[0], best[1], best[2], stages, [broken])
         tell(grid.intervals, found)
         gap = np.inf if not stages else moved(
-            stages[-1].theta, found[-1].theta, found[-1].std, RELATIVE)
+            stages[-1].theta, found[-1].theta, standard_errors(system, outcome), RELATIVE)
         stages += found
         best = grid, system, outcome
         # where a lock ended the path, a finer grid may take λ further, however little it moved

@@ -28,6 +28,7 @@ from pikanid.optimise.smoothing import Smoothed, smooth
 from pikanid.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
+from pikanid.strategies.data_noise import row_noise
 from pikanid.strategies.grids import (
     Knots,
     Quadrature,
@@ -35,7 +36,7 @@ from pikanid.strategies.grids import (
     chosen_grid,
     paper_intervals,
 )
-from pikanid.strategies.relaxation import RelaxedFit, Setup, row_noise, start_is_estimated
+from pikanid.strategies.relaxation import RelaxedFit, Setup, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
 
 PAPER_DEGREE = 3

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,12 +15,16 @@ import numpy as np
 from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.chains import Chains
-from pikanid.functional import Functional, Sites, bind
-from pikanid.optimise.covariance import effective_parameters, theta_covariance
+from pikanid.functional import Functional, bind
+from pikanid.optimise.covariance import (
+    effective_parameters,
+    error_bound,
+    reduced_matrix,
+    theta_covariance,
+)
 from pikanid.optimise.gauss_newton import (
     MAX_ITERATIONS,
     BandedSystem,
-    Linearisation,
     Outcome,
     Point,
     gauss_newton,
@@ -30,6 +34,7 @@ from pikanid.optimise.smoothing import Smoothed, smooth
 from pikanid.problem import Problem
 from pikanid.simulation.lowering import lower_model
 from pikanid.simulation.vectorfield import VectorField
+from pikanid.strategies.data_noise import noise_level, row_noise, standard_errors
 from pikanid.strategies.first_points import from_simulation, transfer
 from pikanid.strategies.grids import Discretisation, Grid
 from pikanid.strategies.locks import follows_physics
@@ -171,7 +176,8 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
         system = BandedSystem(finer)
         outcome = gauss_newton(system, transfer(coarse, finer, before.at.point), lam,
                                setup.problem.lower, setup.problem.upper)
-        stages.append(_stage(system, lam, outcome))
+        stages.append(replace(_stage(system, lam, outcome),
+                              std=standard_errors(system, outcome)))
         gap = moved(before.at.point.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
         if gap > GRID_MISLED or not outcome.converged:
             system, stages, outcome, notes = _from_data(setup, grid, plans)
@@ -237,48 +243,20 @@ def follow(system: BandedSystem, point: Point,
         if plan.locked(stages) and follows_physics(system, point, lam):
             stages[-1] = replace(stages[-1], free=True)
         lam = plan.next(stages)
+        if lam is None and len(stages) > 1:
+            # Against a bound of its errors the estimate had settled: also against themselves?
+            stages[-2] = replace(stages[-2], std=standard_errors(system, outcomes[-2]))
+            lam = plan.next(stages)
     kept = plan.keep(stages)
     notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
         stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
     return stages[:kept + 1], outcomes[kept], notes
 
 
-def noise_level(functional: Functional, smoothed: Smoothed | None) -> float:
-    """Standard deviation of the data rows, for the scale of λ; a floor serves clean data."""
-    pairs = list(_families(functional))
-    if functional.weighted and all(sigma is not None for _, sigma in pairs):
-        return 1.0
-    rows = [(sites.weight * sites.target).ravel() for sites, _ in pairs if sites.target is not None]
-    spread = float(np.std(np.concatenate(rows))) or 1.0
-    return max(0.1 * spread if smoothed is None else smoothed.sigma, 1e-5 * spread)
-
-
-def row_noise(functional: Functional, at: Linearisation, effective: float) -> list[Array | float]:
-    """Standard deviation of every data family's rows; of an output without σ, from its residual."""
-    left = functional.n_data / max(1.0, functional.n_data - effective)
-    costs: dict[int, float] = {}
-    counts: dict[int, int] = {}
-    flat = [cost for costs_of in at.data_costs for cost in costs_of]
-    families = list(_families(functional))
-    for (sites, _), cost in zip(families, flat, strict=True):
-        costs[sites.output] = costs.get(sites.output, 0.0) + cost
-        counts[sites.output] = counts.get(sites.output, 0) + sites.t.size
-    return [
-        float(np.sqrt(left * costs[sites.output] / counts[sites.output])) if sigma is None
-        else sites.weight[:, 0] * sigma
-        for sites, sigma in families]
-
-
-def _families(functional: Functional) -> Iterator[tuple[Sites, Array | None]]:
-    for experiment, part in zip(functional.problem.experiments, functional.parts, strict=True):
-        for samples, sites in zip(experiment.samples, part.data, strict=True):
-            yield sites, samples.sigma
-
-
 def _stage(system: BandedSystem, lam: float, outcome: Outcome) -> Stage:
     noise = row_noise(system.functional, outcome.at, outcome.at.point.theta.size)
-    covariance, _ = theta_covariance(system, outcome.at, outcome.step, noise)
-    return Stage(lam, outcome.at.point.theta, np.sqrt(np.diag(covariance)), outcome.at.data_cost,
+    return Stage(lam, outcome.at.point.theta,
+                 error_bound(system, outcome.at, outcome.step, noise), outcome.at.data_cost,
                  outcome.at.physics_cost, outcome.iterations, outcome.converged)
 
 
@@ -286,6 +264,7 @@ def conclude(setup: Setup, grid: Discretisation, system: BandedSystem, outcome: 
               stages: list[Stage], notes: list[str]) -> RelaxedFit:
     """Covariances and effective parameters at the end of a fit."""
     at, step = outcome.at, outcome.step
+    step = replace(step, schur=reduced_matrix(system, at, step))
     effective = effective_parameters(system, at, step)
     noise = row_noise(system.functional, at, effective)
     sandwich, naive = theta_covariance(system, at, step, noise)

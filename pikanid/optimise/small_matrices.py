@@ -1,0 +1,107 @@
+"""Compiled algebra of the reduced matrix of θ: a few rows, where a call takes longer than its work.
+
+Compiled once and kept on disk by numba, which is why this module is imported only where it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numba import njit
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _compiled(function: _Function) -> _Function:
+    return cast(_Function, njit(cache=True, error_model="numpy", nogil=True)(function))
+
+
+@_compiled
+def scaled_factor(matrix: np.ndarray, which: np.ndarray, root: np.ndarray,
+                  factor: np.ndarray) -> bool:
+    """Cholesky factor of the rows and columns `which` (k,), scaled by the root of the diagonal.
+
+    Fills root (k,) and the lower triangle of factor (k, k); False where that part is not positive
+    definite.
+    """
+    for i in range(which.size):
+        if not matrix[which[i], which[i]] > 0.0:
+            return False
+        root[i] = np.sqrt(matrix[which[i], which[i]])
+    for i in range(which.size):
+        for j in range(i + 1):
+            total = matrix[which[i], which[j]] / (root[i] * root[j])
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if j < i:
+                factor[i, j] = total / factor[j, j]
+            elif total > 0.0:
+                factor[i, i] = np.sqrt(total)
+            else:
+                return False
+    return True
+
+
+@_compiled
+def free_minimum(matrix: np.ndarray, slope: np.ndarray, lower: np.ndarray, upper: np.ndarray,
+                 change: np.ndarray) -> bool:
+    """Fill change (b,) with the minimum of ½dᵀMd + sᵀd; False unless it lies inside the box.
+
+    False too where the matrix is not positive definite or lower < upper does not hold.
+    """
+    size = slope.size
+    root, factor = np.empty(size), np.empty((size, size))
+    if not ((lower < upper).all() and scaled_factor(matrix, np.arange(size), root, factor)):
+        return False
+    for i in range(size):
+        change[i] = -slope[i] / root[i]
+        for k in range(i):
+            change[i] -= factor[i, k] * change[k]
+        change[i] /= factor[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            change[i] -= factor[k, i] * change[k]
+        change[i] /= factor[i, i]
+    inside = True
+    for i in range(size):
+        change[i] /= root[i]
+        inside = inside and lower[i] <= change[i] <= upper[i]
+    return inside
+
+
+@_compiled
+def fall(matrix: np.ndarray, slope: np.ndarray, change: np.ndarray) -> float:
+    """By how much dᵀMd + 2sᵀd lies below zero at a change d (b,)."""
+    total = 0.0
+    for i in range(slope.size):
+        bent = 2.0 * slope[i]
+        for j in range(slope.size):
+            bent += matrix[i, j] * change[j]
+        total -= change[i] * bent
+    return total
+
+
+@_compiled
+def inverse_diagonal(matrix: np.ndarray, inside: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (b,) with the diagonal of the inverse of the rows and columns `inside` (b,).
+
+    Zero outside; infinite inside where that part is not positive definite.
+    """
+    which = np.flatnonzero(inside)
+    size = which.size
+    root, factor, column = np.empty(size), np.empty((size, size)), np.empty(size)
+    out[:] = 0.0
+    if not scaled_factor(matrix, which, root, factor):
+        out[which] = np.inf
+        return
+    for j in range(size):  # column j of the factor's inverse, whose squares sum up
+        total = 0.0
+        for i in range(j, size):
+            rest = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                rest -= factor[i, k] * column[k]
+            column[i] = rest / factor[i, i]
+            total += column[i] ** 2
+        out[which[j]] = total / root[j] ** 2
