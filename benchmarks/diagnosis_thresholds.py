@@ -28,7 +28,7 @@ import pikanid as pk
 from pikanid import noise
 from pikanid.concealed.score import judge
 from pikanid.errors import PikanidError
-from pikanid.mismatch import api, search, symbols
+from pikanid.mismatch import api, case, search, symbols
 from pikanid.strategies.nls import NLS
 from pikanid.writing import atomically
 
@@ -37,10 +37,10 @@ FEW = 3  # cases of each set that thresholds inside fits are tried on: nothing c
 FOLDER = Path(api.__file__).parent
 PACKAGE = api.__package__
 # a threshold that is looked up nowhere else changes no result of what is remembered
-OUTSIDE = {"api", "noise_level", "outliers", "preparation", "screen", "search", "symbols",
+OUTSIDE = {"api", "case", "noise_level", "outliers", "preparation", "screen", "search", "symbols",
            "verdict"}
 REMEMBERED = ((noise, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
-              (symbols, "name_curve"), (api, "residual_tests"), (api, "held_out"),
+              (symbols, "name_curve"), (case, "residual_tests"), (case, "held_out"),
               (api, "force_shape"))
 # takes time and says nothing about the verdict
 SKIPPED: Mapping[str, Any] = {"advice": "", "force_over_time": None, "patch": None, "smallest": {}}
@@ -53,9 +53,10 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
                  "patch": "*", "penalised": "*"},
     BEFOREHAND: {"confusable": "*", "experiments": "*", "profiles": "*", "seen": "*",
                  "sizing": "*"},
-    LONGER: {"api": "SEARCHED", "judge": "MOST_ROWS", "preparation": "LONG FINE"},
+    LONGER: {"case": "SEARCHED", "judge": "MOST_ROWS", "preparation": "LONG FINE"},
     STEPS: {"hypothesis": "LIMIT HURRIED HILLS COARSE", "least_squares": "PATIENCE",
             "tangent": "*", "whitened": "FINEST"},
+    "number of threads": {"in_turn": "*"},
     "number of draws, points or knots": {
         "detect": "DRAWS", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
     "where fits begin": {"beginning": "SHARE", "channels": "LAGS"},
@@ -155,7 +156,7 @@ def diagnosed(train: pk.Recording, other: pk.Recording, memory: Memory) -> dict[
         for name, nothing in SKIPPED.items():
             stack.enter_context(patch.object(api, name, return_value=nothing))
         try:
-            dx = pk.diagnose(pk.systems.sloshing(), train, other)
+            dx = pk.diagnose(pk.systems.sloshing(), train, other, workers=1)
         except PikanidError as failure:
             return {"verdict": f"failed: {failure}", "mismatch": False, "hypotheses": []}
     return {"verdict": dx.verdict, "mismatch": dx.mismatch, "hypotheses": [

@@ -36,7 +36,7 @@ def test_a_change_reaches_every_user_and_ends():
 def test_only_what_acts_outside_fits_keeps_the_memory():
     assert NUMBERS["hypothesis.FAR"].inside_fits  # in a search too, but in fits as well
     assert not NUMBERS["verdict.WORTH"].inside_fits
-    assert NUMBERS["verdict.WORTH"].users == {"api", "verdict"}
+    assert NUMBERS["verdict.WORTH"].users == {"case", "verdict"}
 
 
 def test_whole_numbers_move_by_one_at_least():
@@ -83,7 +83,7 @@ def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
     assert "| `verdict.GUARD` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
     assert "| `verdict.RIVAL` | 4 → 5 | 1 of 1 | 1 of 1 | rich 001 |" in text
     assert "rich 001 (`verdict.GUARD`, `verdict.RIVAL`)" in text
-    assert "No verdict of 1 depends on `api." in text and "`api.BETTER`" in text
+    assert "No verdict of 1 depends on `case." in text and "`case.BETTER`" in text
 
 
 @pytest.mark.slow

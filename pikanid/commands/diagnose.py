@@ -56,6 +56,9 @@ def diagnose(
     column: Columns = [],  # noqa: B006
     unit: Units = [],  # noqa: B006
     decimate: Stride = 1,
+    workers: Annotated[int | None, typer.Option(
+        metavar="N", min=1, show_default=False,
+        help="threads; by default two where there are as many cores")] = None,
     quiet: Quiet = False,
 ) -> int:
     """Find out which physics a model leaves out, and prove it on another recording."""
@@ -80,7 +83,7 @@ def diagnose(
         stretch = (start, start + quantity(quiet_until, "s", "--quiet-until"))
     with working("diagnosing", 8, quiet) as step:
         dx = run(chosen, records, others or None,
-                 alpha=alpha, quiet=stretch, tell=step)
+                 alpha=alpha, quiet=stretch, tell=step, workers=workers)
     _write(dx, train[0], json_, report)
     if not quiet and json_ != "-":
         print(dx)

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from pikanid import errors
-from pikanid.estimate import Estimate
 from pikanid.mismatch.advice import advice
-from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.case import SEARCHED, Case, note_outliers
 from pikanid.mismatch.catalogue import candidates as catalogue_of
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.force_shape import ForceShape, force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
+from pikanid.mismatch.in_turn import threads
 from pikanid.mismatch.latent_force import force_over_time
 from pikanid.mismatch.locate import locate, smallest
-from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.patch import patch
 from pikanid.mismatch.preparation import (
     check_pair,
@@ -33,24 +29,20 @@ from pikanid.mismatch.preparation import (
 )
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
-from pikanid.mismatch.site import Site, sites
+from pikanid.mismatch.site import sites
 from pikanid.mismatch.symbols import symbolic_candidates
-from pikanid.mismatch.verdict import WORTH, Answer, explanations, settle, with_formulas
-from pikanid.mismatch.whitened import Records
+from pikanid.mismatch.verdict import Answer, explanations, settle, with_formulas
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
-SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
-EXPLAINED = 0.05  # p-value above which a search need not go on
-SAME, SAME_RHO = 0.05, 0.06  # changes of a noise level, and its correlation, that make none
-BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
 Recordings = Recording | Sequence[Recording]
 
 
 def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
              alpha: float = 0.01, quiet: tuple[float, float] | None = None,
-             tell: Callable[[str], None] = lambda text: None) -> Diagnosis:
+             tell: Callable[[str], None] = lambda text: None,
+             workers: int | None = None) -> Diagnosis:
     """What is missing in a model, according to recordings?
 
     The model is refitted, its residual whitened by the noise and tested against all that the
@@ -65,6 +57,8 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         alpha: Rate of false alarms.
         quiet: Start and stop [s] of a stretch known to show noise only.
         tell: Called with what is being done.
+        workers: Threads that fit side by side; by default two where there are as many cores.  The
+            diagnosis does not depend on it.
 
     Returns:
         The diagnosis; `model` is the extended model, `to_dict()` the content of diagnosis.json.
@@ -72,7 +66,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     Raises:
         BadModel: No coordinate is found, or nothing is free.
         BadRecording: A channel is missing or unusable; train and held-out are the same.
-        BadSetting: alpha is no probability.
+        BadSetting: alpha is no probability, or workers is not positive.
         SimulationFailed: The model cannot be simulated.
 
     >>> import pikanid as pk
@@ -87,10 +81,13 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     begun = time.perf_counter()
     if not 0 < alpha < 1:
         raise errors.BadSetting(errors.bad_value("alpha", alpha, "between 0 and 1"))
+    if workers is not None and workers < 1:
+        raise errors.BadSetting(errors.bad_value("workers", workers, "at least 1"))
     if not model.free_names:
         raise errors.BadModel(errors.nothing_free(model.name))
     case = _opened(model, _several(train), None if held_out is None else _several(held_out),
                    quiet, tell)
+    case.search.workers = threads(workers)
     tell("detection")
     detection = case.test(case.base)
     if detection.p_value >= alpha:
@@ -130,103 +127,6 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
                    seconds=time.perf_counter() - begun)
 
 
-@dataclass
-class Case:
-    """A model with the recordings to explain and those to prove it on, ready for tests."""
-
-    model: Model
-    records: Records
-    later: Records | None
-    proves: bool
-    sites: tuple[Site, ...]
-    candidates: tuple[Candidate, ...]
-    search: Search
-    base: Hypothesis
-    before: Estimate
-    notes: list[str]
-    tests: dict[tuple[frozenset[str], float], Detection]
-    predictions: dict[tuple[frozenset[str], float], HeldOut | None]
-
-    @property
-    def rate(self) -> float:
-        """Natural frequency of the first coordinate [rad/s]."""
-        return self.sites[0].rate
-
-    def begin_search(self) -> Search:
-        """A search on as much of the recordings as can be searched in a minute."""
-        short = self.records.beginning(SEARCHED)
-        return self.search if short is self.records else self.resumed(self.search, short)
-
-    def resumed(self, search: Search, records: Records | None = None) -> Search:
-        """A search with what it has found, on other records: by default on all."""
-        self.search = search.carried_over(records or self.records)
-        self.base = self.search.base()
-        self.tests.clear()
-        self.predictions.clear()
-        return self.search
-
-    def relevelled(self, best: Hypothesis, quiet: tuple[float, float] | None) -> bool:
-        """Read the noise from what the best explanation leaves; whether that made a difference."""
-        if best.far:
-            return False
-        fit = as_estimate(best, self.before)
-        new, count = with_refined_noise(self.records, fit, self.rate, quiet)
-        _note_outliers(count, "the recording", self.notes)
-        same = all(
-            abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO
-            for a, b in zip(self.records.levels, new.levels, strict=True) for o in a)
-        if same and not count:
-            return False
-        self.records = new
-        self.resumed(self.search)
-        if self.later is not None:
-            self.later = Records(self.later.recordings,
-                                 tuple(new.levels[0] for _ in self.later.recordings))
-        return True
-
-    def clear_later(self, best: Hypothesis) -> None:
-        """Leave the outliers of the held-out recordings out that the best prediction shows."""
-        prediction = None if best.far else self.predicted(best)
-        if self.later is None or prediction is None:
-            return
-        self.later, count = without_lone(self.later, prediction.residuals)
-        if count:
-            _note_outliers(count, "the held-out recording", self.notes)
-            self.predictions.clear()
-
-    def adequate(self, h: Hypothesis) -> bool:
-        """Whether nothing is left in the train recordings."""
-        return not h.far and self.test(h).p_value > EXPLAINED
-
-    def test(self, h: Hypothesis) -> Detection:
-        """What is left in the train recordings."""
-        if h.fit not in self.tests:
-            self.tests[h.fit] = residual_tests(
-                h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, self.candidates, self.rate)
-        return self.tests[h.fit]
-
-    def predicted(self, h: Hypothesis) -> HeldOut | None:
-        """What is left in the held-out recordings."""
-        if self.later is None:
-            return None
-        if h.fit not in self.predictions:
-            self.predictions[h.fit] = held_out(h, self.model, self.later, self.candidates,
-                                               self.rate)
-        return self.predictions[h.fit]
-
-    def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
-        """Whether a hypothesis is worth its effects beyond another one.
-
-        Where a misfit is left anyway, an effect always gains on the recording that it is fitted to:
-        then it has to predict the held-out recording clearly better.
-        """
-        if self.later is None or not more.far:
-            return True
-        old, new, nominal = (self.predicted(h) for h in (fewer, more, self.base))
-        return old is None or nominal is None or (
-            new is not None and new.rmse < min(BETTER * old.rmse, old.rmse - WORTH * nominal.rmse))
-
-
 def _several(recordings: Recordings) -> tuple[Recording, ...]:
     return (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
 
@@ -253,7 +153,7 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     nominal = before.fitted_model
     rate = sites(nominal, records.recordings)[0].rate
     records, count = with_refined_noise(records, before, rate, quiet)
-    _note_outliers(count, "the recording", notes)
+    note_outliers(count, "the recording", notes)
     held = None
     if later is not None:
         held = prepared(model, later, None, notes, together, records.levels[0])
@@ -264,11 +164,6 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
     search.predicts = case.predicts
     return case
-
-
-def _note_outliers(count: int, where: str, notes: list[str]) -> None:
-    if count:
-        notes.append(f"{count} more outliers of {where} show beside a fit and are left out.")
 
 
 def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceShape | None,

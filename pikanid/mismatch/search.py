@@ -10,6 +10,7 @@ import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
+from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.screen import Screen, as_strong
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
@@ -25,6 +26,8 @@ EFFORT = 1.2e7  # states times steps simulated for combinations, before nothing 
 WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
+Starts = Sequence[Start | Mapping[str, float]]
+Job = tuple[Sequence[Candidate], Starts]
 
 
 @dataclass
@@ -38,6 +41,7 @@ class Search:
         tell: Called with what is being done.
         predicts: Whether the second hypothesis is worth its effects beyond the first one, as far as
             other recordings say.
+        workers: Threads that fit side by side; the results do not depend on their number.
     """
 
     nominal: Model
@@ -47,6 +51,7 @@ class Search:
     predicts: Callable[[Hypothesis, Hypothesis], bool] = lambda fewer, more: True
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     spent: float = 0.0
+    workers: int = 1
 
     @property
     def tired(self) -> bool:
@@ -66,15 +71,12 @@ class Search:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
         screen = Screen(self.base(), [c for c in self.candidates if c.fits])
         self.tell("single effects")
-        for candidate, starts in screen.singles(SINGLES):
-            self._fit((candidate,), starts)
+        self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES)], always=True)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
         if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
-            for pair, starts in screen.pairs(PAIRS):
-                if not self.tired:
-                    self._fit(pair, starts)
+            self._fit_all(screen.pairs(PAIRS))
             self._simplify()
         return self.grow(adequate)
 
@@ -135,21 +137,23 @@ class Search:
         """
         if self.ranked()[0].far:
             for closest in self._closest():
-                for effect in closest.effects:
-                    self._fit(tuple(e for e in closest.effects if e is not effect),
-                              [closest.point], again=True)
+                self._fit_all([(tuple(e for e in closest.effects if e is not effect),
+                                [closest.point]) for effect in closest.effects],
+                              again=True, always=True)
         for _ in range(MOST):
             best = self.ranked()[0]
+            jobs: list[Job] = []
             for effect in best.effects:
                 rest = tuple(e for e in best.effects if e is not effect)
                 if rest:
-                    self._fit(rest, [best.point], again=True)
+                    jobs.append((rest, [best.point]))
                 for simple in self.candidates:
                     if simple.key in effect.covers and simple.key not in best.key:
                         size = as_strong(best, effect, simple)
-                        self._fit((*rest, simple), [
+                        jobs.append(((*rest, simple), [
                             {**best.point, simple.parameters[0].name: size * share}
-                            for share in (1.0, 2.0)], again=True)
+                            for share in (1.0, 2.0)]))
+            self._fit_all(jobs, again=True, always=True)
             if self.ranked()[0] is best:
                 break
 
@@ -176,9 +180,7 @@ class Search:
     def offer(self, formulas: Sequence[Candidate]) -> None:
         """Fit laws that no catalogue holds, each alone."""
         self.candidates += tuple(formulas)
-        for candidate in formulas:
-            if not self.tired:
-                self._fit((candidate,), [self.base().point])
+        self._fit_all([((candidate,), [self.base().point]) for candidate in formulas])
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
@@ -186,9 +188,8 @@ class Search:
         new.base()
         ranked = self.ranked()
         near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
-        for h in ranked[: FEW if ranked[0].far else CARRIED]:
-            if h.effects and h.minimum.chi2 < near:
-                new._fit(h.effects, [h.point])
+        new._fit_all([(h.effects, [h.point]) for h in ranked[: FEW if ranked[0].far else CARRIED]
+                      if h.effects and h.minimum.chi2 < near], always=True)
         return new
 
     def _with_wider_laws(self, best: Hypothesis) -> None:
@@ -239,26 +240,38 @@ class Search:
         screen = Screen(hypothesis, others)
         if hypothesis.far:
             least = TELLING * hypothesis.minimum.chi2
-        for candidate, starts in screen.singles(count, least):
-            if not self.tired:
-                self._fit((*hypothesis.effects, candidate), starts)
+        self._fit_all([((*hypothesis.effects, candidate), starts)
+                       for candidate, starts in screen.singles(count, least)])
 
-    def _fit(self, effects: Sequence[Candidate], starts: Sequence[Start | Mapping[str, float]],
-             again: bool = False) -> Hypothesis:
-        key = frozenset(e.key for e in effects)
-        known = self.fits.get(key)
-        if known is not None and not again:
-            return known
+    def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False
+             ) -> Hypothesis:
+        self._fit_all([(effects, starts)], again, always=True)
+        return self.fits.get(frozenset(e.key for e in effects), self.fits[frozenset()])
+
+    def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False) -> None:
+        """Fit these effects from these starts, one after the other, and keep what is better; what
+        is known is fitted `again` only, and nothing once the search is tired, except `always`.
+        """
         order = {c.key: k for k, c in enumerate(self.candidates)}
-        ordered = sorted(effects, key=lambda e: order[e.key])
-        found = fitted(self.nominal, ordered, self.records, starts, self.choices,
-                       min((h.minimum.chi2 for h in self.fits.values()), default=np.inf))
-        if found is not None:
+
+        def work(job: Job, closest: float) -> Hypothesis | None:
+            effects, starts = job
+            return fitted(self.nominal, sorted(effects, key=lambda e: order[e.key]), self.records,
+                          starts, self.choices, closest)
+
+        def take(job: Job, found: Hypothesis | None) -> None:
+            if found is None:
+                return
             self.spent += found.whitened.work
-        if found is not None and (known is None or found.minimum.chi2 < known.minimum.chi2):
-            self.fits[key] = found
-            return found
-        return known or self.fits[frozenset()]
+            key = frozenset(e.key for e in job[0])
+            if key not in self.fits or found.minimum.chi2 < self.fits[key].minimum.chi2:
+                self.fits[key] = found
+
+        in_turn([job for job in jobs if again or frozenset(e.key for e in job[0]) not in self.fits],
+                self._closest_chi2, work, take, lambda: always or not self.tired, self.workers)
+
+    def _closest_chi2(self) -> float:
+        return min((h.minimum.chi2 for h in self.fits.values()), default=np.inf)
 
 
 def repeated(r: np.ndarray) -> float:

@@ -1,0 +1,128 @@
+"""A model with recordings, as it is diagnosed: what is fitted, tested and predicted so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid.estimate import Estimate
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.detect import Detection
+from pikanid.mismatch.estimating import as_estimate
+from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
+from pikanid.mismatch.outliers import without_lone
+from pikanid.mismatch.preparation import with_refined_noise
+from pikanid.mismatch.search import Search
+from pikanid.mismatch.site import Site
+from pikanid.mismatch.verdict import WORTH
+from pikanid.mismatch.whitened import Records
+from pikanid.model import Model
+
+SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
+EXPLAINED = 0.05  # p-value above which a search need not go on
+SAME, SAME_RHO = 0.05, 0.06  # changes of a noise level, and its correlation, that make none
+BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
+
+
+@dataclass
+class Case:
+    """A model with the recordings to explain and those to prove it on, ready for tests."""
+
+    model: Model
+    records: Records
+    later: Records | None
+    proves: bool
+    sites: tuple[Site, ...]
+    candidates: tuple[Candidate, ...]
+    search: Search
+    base: Hypothesis
+    before: Estimate
+    notes: list[str]
+    tests: dict[tuple[frozenset[str], float], Detection]
+    predictions: dict[tuple[frozenset[str], float], HeldOut | None]
+
+    @property
+    def rate(self) -> float:
+        """Natural frequency of the first coordinate [rad/s]."""
+        return self.sites[0].rate
+
+    def begin_search(self) -> Search:
+        """A search on as much of the recordings as can be searched in a minute."""
+        short = self.records.beginning(SEARCHED)
+        return self.search if short is self.records else self.resumed(self.search, short)
+
+    def resumed(self, search: Search, records: Records | None = None) -> Search:
+        """A search with what it has found, on other records: by default on all."""
+        self.search = search.carried_over(records or self.records)
+        self.base = self.search.base()
+        self.tests.clear()
+        self.predictions.clear()
+        return self.search
+
+    def relevelled(self, best: Hypothesis, quiet: tuple[float, float] | None) -> bool:
+        """Read the noise from what the best explanation leaves; whether that made a difference."""
+        if best.far:
+            return False
+        fit = as_estimate(best, self.before)
+        new, count = with_refined_noise(self.records, fit, self.rate, quiet)
+        note_outliers(count, "the recording", self.notes)
+        same = all(
+            abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO
+            for a, b in zip(self.records.levels, new.levels, strict=True) for o in a)
+        if same and not count:
+            return False
+        self.records = new
+        self.resumed(self.search)
+        if self.later is not None:
+            self.later = Records(self.later.recordings,
+                                 tuple(new.levels[0] for _ in self.later.recordings))
+        return True
+
+    def clear_later(self, best: Hypothesis) -> None:
+        """Leave the outliers of the held-out recordings out that the best prediction shows."""
+        prediction = None if best.far else self.predicted(best)
+        if self.later is None or prediction is None:
+            return
+        self.later, count = without_lone(self.later, prediction.residuals)
+        if count:
+            note_outliers(count, "the held-out recording", self.notes)
+            self.predictions.clear()
+
+    def adequate(self, h: Hypothesis) -> bool:
+        """Whether nothing is left in the train recordings."""
+        return not h.far and self.test(h).p_value > EXPLAINED
+
+    def test(self, h: Hypothesis) -> Detection:
+        """What is left in the train recordings."""
+        if h.fit not in self.tests:
+            self.tests[h.fit] = residual_tests(
+                h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, self.candidates, self.rate)
+        return self.tests[h.fit]
+
+    def predicted(self, h: Hypothesis) -> HeldOut | None:
+        """What is left in the held-out recordings."""
+        if self.later is None:
+            return None
+        if h.fit not in self.predictions:
+            self.predictions[h.fit] = held_out(h, self.model, self.later, self.candidates,
+                                               self.rate)
+        return self.predictions[h.fit]
+
+    def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
+        """Whether a hypothesis is worth its effects beyond another one.
+
+        Where a misfit is left anyway, an effect always gains on the recording that it is fitted to:
+        then it has to predict the held-out recording clearly better.
+        """
+        if self.later is None or not more.far:
+            return True
+        old, new, nominal = (self.predicted(h) for h in (fewer, more, self.base))
+        return old is None or nominal is None or (
+            new is not None and new.rmse < min(BETTER * old.rmse, old.rmse - WORTH * nominal.rmse))
+
+
+def note_outliers(count: int, where: str, notes: list[str]) -> None:
+    if count:
+        notes.append(f"{count} more outliers of {where} show beside a fit and are left out.")

@@ -1,0 +1,68 @@
+"""Work side by side that comes out as if it had been done one piece after the other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+USEFUL = 2  # threads: beyond them what is begun ahead is too often begun in vain
+
+Job = TypeVar("Job")
+State = TypeVar("State")
+Result = TypeVar("Result")
+
+
+def threads(workers: int | None) -> int:
+    """How many threads to use: as many as there are cores, at most what is useful, by default."""
+    if workers is not None:
+        return workers
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return min(cores or 1, USEFUL)
+
+
+def in_turn(
+        jobs: Sequence[Job], state: Callable[[], State], work: Callable[[Job, State], Result],
+        take: Callable[[Job, Result], None], go_on: Callable[[], bool], workers: int) -> None:
+    """Work on jobs and take their results in order, while `go_on()`.
+
+    What a job gives may depend on a state that taking earlier results changes.  Later jobs are
+    begun ahead with the state as it is, and once more where it has changed when their turn comes:
+    the outcome is that of one worker, for any number of them.
+
+    Args:
+        jobs: In the order in which they would be done alone.
+        state: What jobs depend on, at the moment; compared by ==.
+        work: Runs in any thread; changes nothing.
+        take: Runs in the caller's thread.
+        go_on: Asked before each job.
+        workers: Threads; with one, everything runs in the caller's.
+
+    >>> best = [9]
+    >>> in_turn([5, 7, 2], lambda: best[0], lambda job, least: min(job, least),
+    ...         lambda job, result: best.__setitem__(0, result), lambda: True, 2)
+    >>> best
+    [2]
+    """
+    if workers == 1 or len(jobs) < 2:
+        for job in jobs:
+            if not go_on():
+                return
+            take(job, work(job, state()))
+        return
+    begun: dict[int, tuple[State, Future[Result]]] = {}
+    pool = ThreadPoolExecutor(workers)
+    try:
+        for k, job in enumerate(jobs):
+            if not go_on():
+                return
+            now = state()
+            for ahead in range(k, min(k + workers, len(jobs))):
+                if ahead not in begun or begun[ahead][0] != now:
+                    if ahead in begun:
+                        begun[ahead][1].cancel()
+                    begun[ahead] = now, pool.submit(work, jobs[ahead], now)
+            take(job, begun.pop(k)[1].result())
+    finally:
+        pool.shutdown(cancel_futures=True)
