@@ -76,11 +76,8 @@ def add_products(stacked: np.ndarray, starts: np.ndarray, columns: np.ndarray, k
 
 
 @_compiled
-def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
-    """Solve LLᵀ x = b in place for columns (n, q), L the lower band factor (kd + 1, n).
-
-    Row by row, all columns at once: LAPACK takes them one after the other.
-    """
+def substitute_forward(factor: np.ndarray, columns: np.ndarray) -> None:
+    """Solve Lx = b in place for columns (n, q), L a lower band factor (kd + 1, n)."""
     size, reach, count = factor.shape[1], factor.shape[0], columns.shape[1]
     for j in range(size):
         pivot = 1.0 / factor[0, j]
@@ -89,6 +86,16 @@ def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
         for k in range(1, min(reach, size - j)):
             for c in range(count):
                 columns[j + k, c] -= factor[k, j] * columns[j, c]
+
+
+@_compiled
+def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
+    """Solve LLᵀ x = b in place for columns (n, q), L the lower band factor (kd + 1, n).
+
+    Row by row, all columns at once: LAPACK takes them one after the other.
+    """
+    substitute_forward(factor, columns)
+    size, reach, count = factor.shape[1], factor.shape[0], columns.shape[1]
     for j in range(size - 1, -1, -1):
         for k in range(1, min(reach, size - j)):
             for c in range(count):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.linalg.lapack import dpbtrf, dposv, dtbtrs
+from scipy.linalg.lapack import dpbtrf, dposv
 
 from pikanid.approximators import Array
 
@@ -41,7 +41,10 @@ def solve_band(factor: Array, columns: Array) -> Array:
 
 def whiten_band(factor: Array, columns: Array) -> Array:
     """L⁻¹ of columns (n, q), for A = LLᵀ: their squares sum to those of xᵀA⁻¹x."""
-    solved, _ = dtbtrs(factor, columns, uplo="L")
+    from pikanid.optimise.banded_products import substitute_forward
+
+    solved = np.array(columns, dtype=float, order="C")
+    substitute_forward(factor, solved)
     return solved
 
 

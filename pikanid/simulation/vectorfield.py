@@ -36,6 +36,11 @@ class VectorField:
         self.model = model
         self._functions = _functions(Structure(model))
 
+    @property
+    def switches(self) -> tuple[sp.Expr, ...]:
+        """Formulas whose sign changes are the kinks and jumps of the model."""
+        return self._functions.lowered.switches
+
     def rhs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """f (M, n)."""
         return self._functions.values["f"](t, x, u, p)
@@ -134,20 +139,20 @@ class _Functions:
     def linearised(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray, name: str,
                    rows: Sequence[int], free: Sequence[int] | np.ndarray
                    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        places, function, edges = self._table(name)
-        count, n, values = len(t), len(self.x), len(self.exprs[name])
-        row_at, column_at, by_state, by_parameter = self._plan(
-            name, tuple(rows), tuple(np.asarray(free).tolist()))
-        jx, jp = np.zeros((count, len(row_at), n)), np.zeros((count, len(row_at), len(column_at)))
+        plan = self._plan(name, tuple(rows), tuple(np.asarray(free).tolist()))
+        function, edges, row_at, column_at, by_state, by_parameter = plan
+        count = len(t)
+        jx = np.zeros((count, len(row_at), len(self.x)))
+        jp = np.zeros((count, len(row_at), len(column_at)))
         with np.errstate(all="ignore"):
             found = function(*self.arguments(t, x, u, p))
         for k, row, column in by_state:
             jx[:, row, column] = found[k]
         for k, row, column in by_parameter:
             jp[:, row, column] = found[k]
-        inner = found[values + len(places):]
-        for (row, index, order), z, weight in zip(
-                edges, inner, inner[len(edges):], strict=False):
+        inner = len(found) - 1 - 2 * len(edges)
+        for k, (row, index, order) in enumerate(edges):
+            z, weight = found[inner + k], found[inner + len(edges) + k]
             if row not in row_at:
                 continue
             spline = self.model.splines[index]
@@ -159,15 +164,19 @@ class _Functions:
         return _columns([found[row] for row in rows], count), jx, jp
 
     def _plan(self, name: str, rows: tuple[int, ...], free: tuple[int, ...]) -> Any:
-        """Where rows and parameters stand, and (entry, row, column) of ∂/∂x and ∂/∂p wanted."""
+        """The functions, where rows and parameters stand, and what is wanted of them.
+
+        That is (entry, row, column) of ∂/∂x and ∂/∂p.
+        """
         if (name, rows, free) not in self._plans:
+            places, function, edges = self._table(name)
             row_at = {row: k for k, row in enumerate(rows)}
             column_at = {column: k for k, column in enumerate(free)}
             n, values = len(self.x), len(self.exprs[name])
             wanted = [(values + k, row_at[row], column)
-                      for k, (row, column) in enumerate(self._table(name)[0]) if row in row_at]
+                      for k, (row, column) in enumerate(places) if row in row_at]
             self._plans[name, rows, free] = (
-                row_at, column_at, [entry for entry in wanted if entry[2] < n],
+                function, edges, row_at, column_at, [entry for entry in wanted if entry[2] < n],
                 [(k, row, column_at[column - n]) for k, row, column in wanted
                  if column - n in column_at])
         return self._plans[name, rows, free]

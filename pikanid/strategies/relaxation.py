@@ -32,7 +32,6 @@ from pikanid.optimise.gauss_newton import (
 from pikanid.optimise.schedules import Schedule, Stage, moved
 from pikanid.optimise.smoothing import Smoothed, smooth
 from pikanid.problem import Problem
-from pikanid.simulation.lowering import lower_model
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.data_noise import noise_level, row_noise, standard_errors
 from pikanid.strategies.first_points import from_simulation, transfer
@@ -165,7 +164,7 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
         BadSetting: If the splines cannot carry the model, or a delay is to be estimated.
     """
     system, stages, outcome, notes = _from_data(setup, grid, plans)
-    if lower_model(setup.problem.model).switches:
+    if setup.field.switches:
         notes.append(errors.relaxation_smears())
         refine = False  # no grid settles while a kink wanders through it
     gap = 0.0
