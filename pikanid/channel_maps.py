@@ -17,26 +17,29 @@ from pikanid.expressions import TIME, symbol
 from pikanid.model import Formula, Model, Parameter, State
 from pikanid.model_parts import Hold
 
-INPUT_MAPS = ("backlash", "gain", "offset", "saturation", "dead_zone", "function", "lag", "delay")
+INPUT_MAPS = ("backlash", "rate_limit", "gain", "offset", "saturation", "dead_zone", "function",
+              "lag", "delay")
 OUTPUT_MAPS = ("lag", "gain", "offset", "drift", "function", "clip", "delay")
 
 
 def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
               hold: Hold | None = None, backlash: Formula | None = None,
+              rate_limit: Formula | None = None,
               gain: Formula | None = None, offset: Formula | None = None,
               saturation: Formula | None = None, dead_zone: Formula | None = None,
               function: Formula | None = None, lag: Formula | None = None,
               delay: Formula | None = None) -> Model:
     """The model whose input `name` passes through the given maps before it acts.
 
-    They apply in the order of the keywords: u -> behind a play of ±backlash -> gain·u -> + offset
-    -> limited to ±saturation -> dead zone of ±dead_zone -> function (a formula of the input's name)
-    -> first-order lag [s]; `delay` [s] shifts the recorded signal, `hold` ("zero", "first") says
-    how it is interpolated.  Play and delay act on the recorded signal, before all other maps.
+    They apply in the order of the keywords: u -> behind a play of ±backlash -> changing no faster
+    than rate_limit [1/s] -> gain·u -> + offset -> limited to ±saturation -> dead zone of ±dead_zone
+    -> function (a formula of the input's name) -> first-order lag [s]; `delay` [s] shifts the
+    recorded signal, `hold` ("zero", "first") says how it is interpolated.  Play, limited rate and
+    delay act on the recorded signal, before all other maps.
 
     Raises
     ------
-    pikanid.errors.BadModel : unknown input or symbol, or a second backlash
+    pikanid.errors.BadModel : unknown input or symbol, or a second backlash or rate limit
 
     >>> from pikanid.model import Input, Model, Output, Parameter, State
     >>> import sympy as sp
@@ -74,13 +77,14 @@ def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
         states = (*states, State(held.name, item.unit, value))
         added = {held.name: (value - held) / read(lag, "lag")}
         swap = {u: held}
-    play = item.backlash
-    if backlash is not None:
-        if play != 0:
-            raise errors.BadModel(errors.backlash_twice(name))
-        play = read(backlash, "backlash")
+    paths = {}
+    for what, formula in (("backlash", backlash), ("rate_limit", rate_limit)):
+        if formula is not None:
+            if getattr(item, what) != 0:
+                raise errors.BadModel(errors.path_twice(name, what.replace("_", " ")))
+            paths[what] = read(formula, what.replace("_", " "))
     changed = dataclasses.replace(
-        item, hold=hold or item.hold, backlash=play,
+        item, hold=hold or item.hold, **paths,
         delay=item.delay if delay is None else item.delay + read(delay, "delay"))
     return model.replace(
         states=states,

@@ -642,9 +642,9 @@ def degree_too_low(degree: int, order: int) -> str:
     )
 
 
-def backlash_twice(name: str) -> str:
+def path_twice(name: str, what: str) -> str:
     return (
-        f"Input '{name}' has a backlash already: change the parameter that it names instead of "
+        f"Input '{name}' has a {what} already: change the parameter that it names instead of "
         "adding a second one."
     )
 

@@ -1,4 +1,4 @@
-"""Formulas of parameters alone, as numbers: delays and play of channels, the initial state."""
+"""Formulas of parameters alone, as numbers: delays and paths of channels, the initial state."""
 
 from __future__ import annotations
 
@@ -34,10 +34,15 @@ def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray)
                      for item in items]).reshape(len(items), len(p))
 
 
-def backlashes(model: Model, p: np.ndarray) -> np.ndarray:
-    """Half the play of every input (m,), in its own unit, at parameters p (P,)."""
+def paths(model: Model, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Half the play and the greatest rate of every input (m,), at parameters p (P,).
+
+    A rate that is not limited is infinite.
+    """
     table = dict(zip(model.parameter_names, p, strict=True))
-    return np.array([_number(item.backlash, table) for item in model.inputs])
+    return (np.array([_number(i.backlash, table) for i in model.inputs]),
+            np.array([_number(i.rate_limit, table) if i.rate_limit != 0 else np.inf
+                      for i in model.inputs]))
 
 
 def _number(expr: sp.Expr, table: dict[str, float]) -> float:

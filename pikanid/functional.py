@@ -204,8 +204,8 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
     data by their σ (where it is unknown, by the visible noise if there are several outputs).
 
     Raises:
-        BadSetting: If a delay, a backlash or a rate limit is to be estimated: no functional over fixed
-            sites can see them.
+        BadSetting: If a delay, a backlash or a rate limit is to be estimated: no functional over
+            fixed sites can see them.
     """
     late = _output_delays(problem)
     parts = []

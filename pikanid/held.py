@@ -90,25 +90,41 @@ class PiecewiseInput:
         return self.knots[1:][(ends != self.values[1:]) | (self.slopes[:-1] != self.slopes[1:])]
 
 
-def with_backlash(held: HeldInput, half: float) -> tuple[PiecewiseInput, PiecewiseInput]:
-    """What follows an input through a play of ±half: carrier c and side s of v = c + s·half.
+def acting(held: HeldInput, half: float | None = None, rate: float = np.inf
+           ) -> tuple[PiecewiseInput, PiecewiseInput, PiecewiseInput]:
+    """What follows an input through a play of ±half, and no faster than `rate` per second.
 
-    v stays until u has crossed the play and then follows u ∓ half (M. A. Krasnosel'skii and
-    A. V. Pokrovskii, Systems with Hysteresis, 1989, sec. 2); it is 0 before the record begins.
-    s is -1 where u pushes upwards or did so last, +1 downwards, 0 before the first contact, so
-    that ∂v/∂half = s exactly.
+    Three signals c, s, q, straight between their knots, with v = c + s·half + q·rate and, exactly,
+    ∂v/∂half = s and ∂v/∂rate = q.
+
+    Behind the play v stays until u has crossed it and then follows u ∓ half (M. A. Krasnosel'skii
+    and A. V. Pokrovskii, Systems with Hysteresis, 1989, sec. 2); it is 0 before the record begins.
+    The limit on the rate comes after the play and starts from its first value; without it s is -1
+    where u pushes upwards or did so last, +1 downwards, 0 before the first contact.
 
     >>> u = HeldInput("u", np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 0.9]), "zero")
-    >>> carrier, side = with_backlash(u, 0.25)
+    >>> carrier, side, _ = acting(u, 0.25)
     >>> (carrier.values + 0.25 * side.values).tolist(), side.values.tolist()
     ([0.0, 0.75, 0.75], [0.0, -1.0, -1.0])
+    >>> carrier, _, ramp = acting(u, rate=2.0)
+    >>> t = np.array([1.0, 1.25, 1.75])
+    >>> (carrier.at(t) + 2.0 * ramp.at(t)).tolist()
+    [0.0, 0.5, 1.0]
     """
-    from pikanid.held_play import play
+    from pikanid.held_play import limited, play
 
-    slopes = np.zeros(len(held.time))
-    if held.hold == "first" and len(held.time) > 1:
-        slopes[:-1] = np.diff(held.values) / np.diff(held.time)
-    knots, carrier, rates, side = play(np.asarray(held.time, float),
-                                       np.asarray(held.values, float), slopes, float(half))
+    u = np.asarray(held.values, float)
+    slopes = np.zeros(len(u))
+    if held.hold == "first" and len(u) > 1:
+        slopes[:-1] = np.diff(u) / np.diff(held.time)
+    knots, carrier, rates, side = np.asarray(held.time, float), u, slopes, np.zeros(len(u))
+    ramp = ramp_rates = moves = np.zeros(len(u))
+    if half is not None:
+        knots, carrier, rates, side, moves = play(knots, carrier, rates, float(half))
+        ramp = ramp_rates = np.zeros(len(knots))
+    if np.isfinite(rate):
+        knots, carrier, rates, side, ramp, ramp_rates = limited(
+            knots, carrier, rates, side, moves, float(half or 0.0), float(rate))
     return (PiecewiseInput(knots, carrier, rates),
-            PiecewiseInput(knots, side, np.zeros(len(knots))))
+            PiecewiseInput(knots, side, np.zeros(len(knots))),
+            PiecewiseInput(knots, ramp, ramp_rates))

@@ -63,8 +63,8 @@ class Model(Lookup):
         put(self, "states", tuple(
             dataclasses.replace(s, initial=_constant(s.initial)) for s in self.states))
         put(self, "inputs", tuple(
-            dataclasses.replace(i, delay=_constant(i.delay), backlash=_constant(i.backlash))
-            for i in self.inputs))
+            dataclasses.replace(i, delay=_constant(i.delay), backlash=_constant(i.backlash),
+                                rate_limit=_constant(i.rate_limit)) for i in self.inputs))
         put(self, "parameters", tuple(self.parameters))
         put(self, "outputs", tuple(
             dataclasses.replace(o, expression=to_real(o.expression), delay=_constant(o.delay))

@@ -49,8 +49,9 @@ def validate(model: Model) -> None:
         if splines := state.initial.atoms(AppliedUndef):
             raise errors.BadModel(errors.spline_at_start(state.name, str(splines.pop())))
     for item in model.inputs:
-        _check_symbols(item.delay, constants, f"The delay of input '{item.name}'", model)
-        _check_symbols(item.backlash, constants, f"The backlash of input '{item.name}'", model)
+        for what, formula in (("delay", item.delay), ("backlash", item.backlash),
+                              ("rate limit", item.rate_limit)):
+            _check_symbols(formula, constants, f"The {what} of input '{item.name}'", model)
         if item.hold not in ("zero", "first"):
             raise errors.BadModel(errors.bad_value(
                 f"The hold of input '{item.name}'", item.hold, "'zero' or 'first'"))

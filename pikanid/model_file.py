@@ -120,7 +120,9 @@ def to_dict(model: Model) -> dict[str, Any]:
         content["inputs"] = {i.name: _drop({
             "unit": i.unit, "hold": i.hold, "default": i.default,
             "delay": None if i.delay == 0 else _plain(i.delay),
-            "backlash": None if i.backlash == 0 else _plain(i.backlash)}) for i in model.inputs}
+            "backlash": None if i.backlash == 0 else _plain(i.backlash),
+            "rate_limit": None if i.rate_limit == 0 else _plain(i.rate_limit)})
+            for i in model.inputs}
     if model.parameters:
         content["parameters"] = {p.name: _drop({
             "unit": p.unit, ("guess" if p.free else "value"): float(p.value),

@@ -28,7 +28,8 @@ class Input:
     """A recorded input.  `hold` says what happens between its samples, `delay` [s] shifts it.
 
     `backlash`, in the input's unit, is half the play that the recorded signal has to cross before
-    anything moves, each time that it turns round.
+    anything moves, each time that it turns round; behind it the signal changes no faster than
+    `rate_limit` per second (0: as fast as it likes).
     """
 
     name: str
@@ -37,6 +38,12 @@ class Input:
     default: float | None = None
     delay: sp.Expr = sp.S.Zero
     backlash: sp.Expr = sp.S.Zero
+    rate_limit: sp.Expr = sp.S.Zero
+
+    @property
+    def shaped(self) -> bool:
+        """Whether the recorded signal passes through play or a limit of its rate."""
+        return bool(self.backlash != 0 or self.rate_limit != 0)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.evaluated import InitialState, backlashes, delays, initial_state
-from pikanid.held import HeldInput, PiecewiseInput, with_backlash
+from pikanid.evaluated import InitialState, delays, initial_state, paths
+from pikanid.held import HeldInput, PiecewiseInput, acting
 from pikanid.model import Input, Model, Output
 from pikanid.recording import Recording
 
@@ -71,10 +71,12 @@ class Experiment:
         """What each input (m,) is the sum of at the model's own parameter values, with factors."""
         values = np.array(list(self.model.values.values()))
         found: list[list[tuple[HeldInput | PiecewiseInput, float]]] = []
-        for held, item, half in zip(self.held, self.model.inputs,
-                                    backlashes(self.model, values), strict=True):
-            carrier, side = with_backlash(held, half) if item.backlash != 0 else (held, None)
-            found.append([(carrier, 1.0)] if side is None else [(carrier, 1.0), (side, half)])
+        for held, item, half, rate in zip(self.held, self.model.inputs,
+                                          *paths(self.model, values), strict=True):
+            factors = (1.0, half, rate if np.isfinite(rate) else 0.0)
+            found.append(list(zip(acting(held, None if item.backlash == 0 else half, rate), factors,
+                                  strict=True))
+                         if item.shaped else [(held, 1.0)])
         return found
 
     def initial(self, p: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pikanid.expressions import symbol
-from pikanid.held import HeldInput, with_backlash
+from pikanid.held import HeldInput, acting
 from pikanid.mismatch.candidate import Candidate, Channel, Sign, View
 from pikanid.mismatch.site import Site
 from pikanid.model import Model
@@ -190,7 +190,7 @@ def input_backlash(site: Site) -> list[Candidate]:
             top = float(np.abs(d.values).max(initial=0.0))
             found = []
             for size in top * np.array([0.003, 0.01, 0.03, 0.08, 0.2, 0.4]) if top else ():
-                carrier, side = with_backlash(d, size)
+                carrier, side, _ = acting(d, size)
                 acts = carrier.at(view.t) + size * side.at(view.t)
                 found.append(Sign({half.name: float(size)}, push={u: acts - d.values},
                                   one_sided=True, scales=False))

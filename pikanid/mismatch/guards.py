@@ -10,12 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pikanid.held import HeldInput, acting
 from pikanid.mismatch.candidate import Candidate, Sign, View
 from pikanid.mismatch.forces import INF, sense, term
 from pikanid.mismatch.site import Site
 from pikanid.model import Model
 from pikanid.model_parts import Parameter
 
+PARTS = 8  # of a step, at which a ramp within it is looked at
 Shape = Callable[[View], np.ndarray]
 
 
@@ -149,13 +151,30 @@ def rate_limit(site: Site) -> list[Candidate]:
     """An input that cannot change at once: jumps become ramps."""
     found = []
     for u in site.inputs:
-        def signs(view: View, u: str = u) -> list[Sign]:
-            d = view.u[u]
-            jumps = np.concatenate([np.diff(d), [0.0]])
-            step = np.concatenate([[0.0], jumps[:-1]])
-            return [Sign({}, push={u: -step * np.abs(step)}, one_sided=True)]
+        most = Parameter(site.name("rate"), 1e9, f"({site.model.input(u).unit or '1'})/s",
+                         (1e-9, INF))
 
-        found.append(Candidate(("rate_limited_input",), "an input of limited rate", f"{u} of "
-                               "limited rate", "input", site, (), lambda m: m, signs, known=False,
-                               fits=False))
+        def signs(view: View, u: str = u, most: Parameter = most) -> list[Sign]:
+            steps = np.diff(view.t)
+            top = float(np.max(np.abs(np.diff(view.u[u])) / steps, initial=0.0))
+            recorded = HeldInput(u, view.t, view.u[u], "zero")
+            # ramps may be shorter than a step: what counts is their mean over it
+            inside = view.t[:-1, None] + steps[:, None] * (np.arange(PARTS) + 0.5) / PARTS
+            found = []
+            for size in top * np.array([2.0, 0.5, 0.15, 0.05, 0.015]) if top else ():
+                carrier, _, ramp = acting(recorded, rate=size)
+                at = inside.ravel()
+                mean = (carrier.at(at) + size * ramp.at(at)).reshape(inside.shape).mean(axis=1)
+                found.append(Sign({most.name: float(size)}, one_sided=True, scales=False,
+                                  push={u: np.append(mean, view.u[u][-1]) - view.u[u]}))
+            return found
+
+        found.append(Candidate(
+            ("rate_limited_input",), "an input of limited rate",
+            f"{u} changing by at most {most.name}", "input", site, (most,),
+            _limited(u, most.name), signs, known=False))
     return found
+
+
+def _limited(u: str, name: str) -> Callable[[Model], Model]:
+    return lambda m: m.map_input(u, rate_limit=name)

@@ -12,12 +12,12 @@ from typing import Any, Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.evaluated import backlashes, delay_jacobian, delays
+from pikanid.evaluated import delay_jacobian, delays, paths
 from pikanid.model import Input, Model, Output
 from pikanid.problem import Experiment
-from pikanid.simulation.backlash import split, with_sides
 from pikanid.simulation.compiled import Method, compiled
 from pikanid.simulation.grid import Grid, build_grid
+from pikanid.simulation.input_paths import split, with_parts
 
 MethodChoice = Literal["auto", "explicit", "implicit"]
 _NOTHING = np.empty(0, np.int64)
@@ -79,8 +79,8 @@ class Simulator:
 
     @functools.cached_property
     def acting(self) -> Model:
-        """The model with the inputs of `grid`: where one has backlash, its side is another."""
-        return with_sides(self.model)
+        """The model with the inputs of `grid`: the parts of shaped ones are inputs of their own."""
+        return with_parts(self.model)
 
     @functools.cached_property
     def _delayed_by(self) -> np.ndarray:
@@ -96,15 +96,15 @@ class Simulator:
         return not any(delayed)
 
     def grid(self, p: np.ndarray) -> Grid:
-        """The stops at parameters p; kept, since only delays and backlash change them."""
+        """The stops at parameters p; kept, since only delays and paths change them."""
         if self._undelayed and self.acting is self.model:
             return self._fixed_grid
         delay_in = delays(self.acting.inputs, self.model, p)
         delay_out = delays(self.model.outputs, self.model, p)
-        halves = backlashes(self.model, p)
-        key = delay_in.tobytes() + delay_out.tobytes() + halves.tobytes()
+        shapes = paths(self.model, p)
+        key = b"".join(a.tobytes() for a in (delay_in, delay_out, *shapes))
         if self._kept.get("delays") != key:
-            held = split(self.model, self.experiment.held, halves)
+            held = split(self.model, self.experiment.held, *shapes)
             self._kept.update(
                 delays=key, grid=build_grid(self.experiment, held, delay_in, delay_out))
         return self._kept["grid"]

@@ -1,4 +1,4 @@
-"""Backlash of an input against an independent oracle, and its sensitivities."""
+"""Play and limited rates of inputs against an independent oracle, and their sensitivities."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pikanid as pk
 from pikanid import errors
 from pikanid.concealed import signals
-from pikanid.held import HeldInput, with_backlash
+from pikanid.held import HeldInput, acting
 from pikanid.mismatch.catalogue import candidates
 from pikanid.mismatch.site import sites
 from pikanid.model_parts import Hold, Parameter
@@ -21,7 +21,13 @@ from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.simulator import Simulator
 
 HOLDS: tuple[Hold, ...] = ("zero", "first")
-HALF = 0.3
+HALF, RATE = 0.3, 4.0
+
+
+def slow(hold: Hold = "zero") -> pk.Model:
+    """Behind a play, and no faster than RATE."""
+    most = Parameter("R", RATE, "m/s^3", (1e-3, 1e3))
+    return loose(hold).map_input("u_x", [most], rate_limit="R")
 
 
 def loose(hold: Hold = "zero") -> pk.Model:
@@ -35,32 +41,39 @@ def wandering(hold: Hold = "zero", count: int = 600) -> pk.Recording:
                                     units={"u_x": "m/s^2"}, hold={"u_x": hold})
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=40), st.floats(0.0, 3.0),
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=40),
+       st.one_of(st.none(), st.floats(0.0, 3.0)), st.one_of(st.just(np.inf), st.floats(0.01, 9.0)),
        st.sampled_from(HOLDS), st.randoms(use_true_random=False))
-def test_what_follows_equals_the_oracle(values: list[float], half: float, hold: Hold,
-                                        chance: Random) -> None:
+def test_what_follows_equals_the_oracle(values: list[float], half: float | None, rate: float,
+                                        hold: Hold, chance: Random) -> None:
     t, u = np.arange(len(values), dtype=float), np.array(values)
     made = signals.zero_order if hold == "zero" else signals.first_order
-    expected = signals.played(made(t, u), half)
-    carrier, side = with_backlash(HeldInput("u", t, u, hold), half)
+    expected = made(t, u)
+    if half is not None:
+        expected = signals.played(expected, half)
+    if np.isfinite(rate):
+        expected = signals.slewed(expected, rate)
+    carrier, side, ramp = acting(HeldInput("u", t, u, hold), half, rate)
     probe = np.sort([chance.uniform(0.0, t[-1] - 1e-6) for _ in range(200)])
     probe = probe[np.abs(probe - np.round(probe)) > 1e-6]
-    found = carrier.at(probe) + half * side.at(probe)
-    assert found == pytest.approx(expected.at(probe), abs=1e-9)
-    assert set(side.values) <= {-1.0, 0.0, 1.0}
+    found = carrier.at(probe) + (half or 0.0) * side.at(probe)
+    if np.isfinite(rate):
+        found += rate * ramp.at(probe)
+    assert found == pytest.approx(expected.at(probe), abs=1e-7)
+    assert np.isfinite(rate) or set(side.values) <= {-1.0, 0.0, 1.0}
 
 
 @pytest.mark.parametrize("hold", HOLDS)
 @pytest.mark.parametrize("kind", [Simulator, Interpreted])
 def test_sensitivities_are_those_of_differences(kind: type[Simulator], hold: Hold) -> None:
-    model = loose(hold)
+    model = slow(hold)
     simulator = kind(model, bind(model, pk.simulate(model, wandering(hold), sigma=0.0)))
-    p, active = np.array([0.045, 0.15, 0.3, 9.81, HALF]), np.array([0, 1, 4])
+    p, active = np.array([0.045, 0.15, 0.3, 9.81, HALF, RATE]), np.array([0, 1, 4, 5])
     steps = simulator.choose_steps(p, 1e-10)
     found = simulator.run(p, active, steps)
     for column, k in enumerate(active):
-        aside = np.zeros(5)
+        aside = np.zeros(6)
         aside[k] = 1e-6
         up, down = (simulator.run(p + s * aside, active, steps).y for s in (1, -1))
         expected = (up - down) / 2e-6
@@ -87,9 +100,9 @@ def test_fit_finds_the_play() -> None:
 
 
 def test_files_and_dicts_keep_it() -> None:
-    text = loose().to_dict()["inputs"]["u_x"]
-    assert text["backlash"] == "b"
-    assert pk.Model.from_dict(loose().to_dict()) == loose()
+    text = slow().to_dict()["inputs"]["u_x"]
+    assert (text["backlash"], text["rate_limit"]) == ("b", "R")
+    assert pk.Model.from_dict(slow().to_dict()) == slow()
 
 
 def test_a_relaxation_sees_a_known_play_and_refuses_an_unknown_one() -> None:
@@ -110,3 +123,13 @@ def test_the_catalogue_offers_it_for_every_input() -> None:
     found = [c for c in candidates(sites(model, (rec,))) if c.variant.startswith("backlash")]
     assert [c.ids for c in found] == [("hysteresis",)]
     assert found[0].applied(model).inputs[0].backlash.free_symbols
+
+
+def test_recorded_rates_below_the_limit_change_nothing() -> None:
+    rec = wandering("first")
+    fast = np.abs(np.diff(rec["u_x"].values)).max() / 0.01
+    limit = Parameter("R", 1.01 * fast, "m/s^3")
+    model = pk.systems.sloshing().map_input("u_x", [limit], hold="first", rate_limit="R")
+    plain = pk.systems.sloshing().map_input("u_x", hold="first")
+    found, expected = (pk.simulate(m, rec, sigma=0.0)["theta"].values for m in (model, plain))
+    assert found == pytest.approx(expected, abs=1e-9)
