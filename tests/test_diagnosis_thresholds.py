@@ -23,7 +23,7 @@ def test_what_is_left_out_exists():
 
 def test_the_constants_of_a_verdict_are_thresholds():
     found = {t.name for t in varied.thresholds() if t.module == "verdict"}
-    assert found >= {"WITHIN", "GUARD", "RIVAL", "PART", "ADEQUATE", "WORTH"}
+    assert found >= {"WITHIN", "GUARD", "BEHIND", "PART", "ADEQUATE", "WORTH"}
 
 
 def test_a_change_reaches_every_user_and_ends():
@@ -76,13 +76,13 @@ def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
             for f in varied.FACTORS}
     case = varied.Tried("rich 001", truth, {
         varied.BASE: answer("input_delay"), **keys,
-        "verdict.GUARD x 0.75": answer("sensor_delay"), "verdict.RIVAL x 1.25": answer("wall")})
+        "verdict.GUARD x 0.75": answer("sensor_delay"), "verdict.BEHIND x 1.25": answer("wall")})
     monkeypatch.setattr(varied, "tried", lambda *given: [case])
     text = varied.section(1, tmp_path, 1)
     assert "Verdicts that survive every change: 0 of 1. Outcomes that do: 0 of 1." in text
     assert "| `verdict.GUARD` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
-    assert "| `verdict.RIVAL` | 4 → 5 | 1 of 1 | 1 of 1 | rich 001 |" in text
-    assert "rich 001 (`verdict.GUARD`, `verdict.RIVAL`)" in text
+    assert "| `verdict.BEHIND` | 3 → 3.75 | 1 of 1 | 1 of 1 | rich 001 |" in text
+    assert "rich 001 (`verdict.BEHIND`, `verdict.GUARD`)" in text
     assert "No verdict of 1 depends on `case." in text and "`case.BETTER`" in text
 
 

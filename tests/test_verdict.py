@@ -57,7 +57,7 @@ def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
     ranked = sorted(fits, key=lambda h: h.score())
     answer = settle([h for h in ranked if not h.symbolic], 1.0, adequate, predicted, True, True)
     return with_formulas(answer, ranked, 1.0, adequate, predicted, True, True) if (
-        answer.verdict == "unnamed" and not answer.contested) else answer
+        answer.verdict == "unnamed") else answer
 
 
 BASE = hypothesis(2000.0)
@@ -83,10 +83,17 @@ def test_a_law_outside_the_catalogue_that_predicts_far_better_keeps_names_away()
     assert answered(fits, {"a": 50.0}).verdict == "unnamed"
 
 
+def test_a_law_outside_the_catalogue_that_would_do_as_well_stands_beside_the_name() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1001.0, GUARD)]
+    given = answered(fits)
+    assert given.verdict == "set" and [sorted(h.key) for h in given.given] == [["a"], ["outside"]]
+    assert answered([BASE, hypothesis(1000.0, A), hypothesis(1007.0, GUARD)]).verdict == "named"
+    # where only the law outside the catalogue is left, nothing has a name
+    assert answered(fits, refused=("a",)).verdict == "unnamed"
+
+
 def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1001.0, GUARD), hypothesis(1000.0, LAW)]
-    contested = answered(fits[:3])
-    assert contested.verdict == "unnamed" and contested.contested
     refuted = answered(fits, refused=("a",))
     assert refuted.verdict == "named" and refuted.given[0].symbolic
     # a formula that explains far less than the law outside the catalogue is none

@@ -10,6 +10,7 @@ named the *visible* part, and is neither right nor wrong.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, permutations
@@ -24,6 +25,16 @@ VERDICTS = ("none", "named", "set", "unconfirmed", "unnamed")
 ANSWERS = ("named", "set")
 MOST_HYPOTHESES = 2
 SYMBOLIC = "symbolic:"
+# What the formula of a law that is in no catalogue must hold; who writes another one is wrong.
+FORMULAS = {
+    "stribeck_friction": r"exp\(.*sign\(\w+_dot\)",
+    "one_way_friction": r"sign\([^)]*_dot\) [+-] (1|force_0)|force_0 [+-] .*sign\([^)]*_dot\)",
+    "rate_limited_input": r"changing by at most",
+    "soft_saturation": r"u_\w\*\*3|Abs\(u_\w\)|tanh\(",
+    "quintic_stiffness": r"theta\*\*5|signed_power\(theta,",
+    "even_stiffness": r"theta\*\*2|Abs\(theta\)",
+    "velocity_coupled_drive": r"u_\w\*theta_dot",
+}
 
 
 @dataclass(frozen=True)
@@ -39,14 +50,14 @@ class Score:
         mismatch: Whether it says that something is missing.
         outcome: `right`; `long` (the truth among more than two hypotheses); `visible` (the part of
             the truth that could be told among at most two hypotheses); `wrong`; `formula` (a
-            symbolic law where the truth is in no catalogue: ids cannot judge it); `alarm`
+            symbolic law of the kind that is hidden, where that is in no catalogue); `alarm`
             (something is missing, nothing named, where nothing hides); `silent`.
         reason: Of a wrong answer: `indistinguishable` (the truth's best rival, closer than 4σ: no
             method could know), `part` of the truth, `extra` effects besides it, `near` (the entry
             that the hidden law resembles), `nothing` is hidden, or `other`.
         hypotheses: How many were given.
         probability: Of the most probable one; None where nothing is answered.
-        first_is_truth: Whether that one is the truth, or its visible part.
+        first_is_truth: Whether that one is the truth, or its visible part, or a formula of its kind.
         within: Whether each base parameter lies within 3 standard errors of the truth; None where
             none is compared.
         held_out: RMSE after the diagnosis over the noise; None where it is not given.
@@ -143,7 +154,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
         str(case["id"]), case["class"], bool(case["nameable"]),
         float(case["visibility"]["nominal"]), verdict, mismatch, outcome, reason, len(given),
         given[0][1] if answered else None,
-        answered and any(_same(explanations[0], t) for t in (truth, _visible(case, truth)) if t),
+        answered and any(_same([_read(e) for e in explanations[0]], t) for t in (truth, _visible(case, truth)) if t),
         _within(case["base"], diagnosis), _held_out(diagnosis))
 
 
@@ -184,10 +195,9 @@ def reliability(scores: Iterable[Score],
                 ) -> list[tuple[float, Share]]:
     """For each interval of stated probability that occurs: its mean, and how often it was true.
 
-    Only the most probable hypothesis of each answer counts, and no formula: ids cannot judge it.
+    Only the most probable hypothesis of each answer counts.
     """
-    stated = [(s.probability, s.first_is_truth) for s in scores
-              if s.probability is not None and s.outcome != "formula"]
+    stated = [(s.probability, s.first_is_truth) for s in scores if s.probability is not None]
     rows = []
     for low, high in pairwise(edges):
         inside = [(p, hit) for p, hit in stated
@@ -212,13 +222,16 @@ def _outcome(case: Entry, truth: list[set[str]], verdict: str, mismatch: bool,
     if visible and len(explanations) <= MOST_HYPOTHESES and any(
             _same(explanation, visible) for explanation in explanations):
         return "visible", ""
-    known = all(effect.get("kind", "catalogue") == "catalogue" or effect["id"] == "power_drag"
-                for effect in case["effects"])
-    symbolic = any(identifier.startswith(SYMBOLIC) for explanation in explanations
-                   for effect in explanation for identifier in effect)
-    if symbolic and not known:
+    read = [[_read(effect) for effect in explanation] for explanation in explanations]
+    if any(_same(explanation, truth) for explanation in read):
         return "formula", ""
-    return "wrong", _reason(case, truth, explanations)
+    return "wrong", _reason(case, truth, read)
+
+
+def _read(effect: set[str]) -> set[str]:
+    """Ids of an effect, with those of the hidden laws that its formula is one of."""
+    return effect | {law for law, pattern in FORMULAS.items() for identifier in effect
+                     if identifier.startswith(SYMBOLIC) and re.search(pattern, identifier)}
 
 
 def _visible(case: Entry, truth: list[set[str]]) -> list[set[str]]:

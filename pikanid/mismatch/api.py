@@ -113,7 +113,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     shape = None
     if answer.verdict != "none":
         shape = force_shape(case.base, case.sites[0], case.candidates)
-    if shape is not None and answer.verdict == "unnamed" and not answer.contested:
+    if shape is not None and answer.verdict == "unnamed":
         tell("laws outside the catalogue")
         search = case.search
         search.offer(symbolic_candidates(shape, case.sites[0]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut
@@ -18,7 +18,6 @@ from pikanid.mismatch.whitened import GROSS
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 BEHIND = 3.0  # times that, and a law outside the catalogue can still be what predicts best
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
-RIVAL = 4.0  # a law outside the catalogue that scores no worse than this keeps names away
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
 WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
 OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
@@ -37,7 +36,6 @@ class Answer:
     """Verdict, hypotheses given (most probable first) and the closest ones not given.
 
     `twins` lists, for a hypothesis given, the effects that stand for each other in it.
-    `contested`: entries of the catalogue would do, but so would laws outside it.
     """
 
     verdict: Verdict
@@ -45,7 +43,6 @@ class Answer:
     others: tuple[Hypothesis, ...]
     twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = field(default_factory=dict)
     reasons: dict[frozenset[str], str] = field(default_factory=dict)
-    contested: bool = False
 
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
@@ -65,8 +62,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if not tried or tried[0].score(scale) >= base.score(scale):
         return Answer("unnamed", (), tuple(tried[:3]))
     lowest = min(_handicapped(h, scale) for h in tried)
-    near = [h for h in tried if _handicapped(h, scale) < lowest + WITHIN
-            or (not h.known and h.score(scale) < lowest + RIVAL)]
+    near = [h for h in tried if h.score(scale) < lowest + WITHIN]
     near = _integer_laws(near)
 
     def total(h: Hypothesis) -> float:
@@ -91,16 +87,18 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         given = _by_evidence(given, total, reasons)
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
-    if not known or (outside and min(map(total, outside)) - GUARD
-                     < min(map(total, known)) + RIVAL):
+    if not known:
         rest = tuple(h for h in near if h not in given) + tuple(given)
         most = _largest_part(base, tried, scale, predict) if not given else ()
         if most:
             merged, twins = _merged(list(most), tried)
             return Answer("unconfirmed", tuple(merged),
                           tuple(h for h in rest if h not in most)[:5], twins, reasons)
-        return Answer("unnamed", (), rest[:5], {}, reasons, bool(known))
+        return Answer("unnamed", (), rest[:5], {}, reasons)
     merged, twins = _merged(known, tried)
+    # laws outside the catalogue that would do as well are for the reader to know
+    least = min(map(total, known))
+    merged += [h for h in outside if total(h) - _handicap(h) < least + WITHIN]
     verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
     return Answer(verdict, tuple(merged), tuple(others), twins, reasons)
@@ -131,8 +129,12 @@ def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
                         key=lambda h: found[h.key])[:3])
 
 
+def _handicap(h: Hypothesis) -> float:
+    return GUARD * sum(not e.known for e in h.effects)
+
+
 def _handicapped(h: Hypothesis, scale: float) -> float:
-    return h.score(scale) + GUARD * sum(not e.known for e in h.effects)
+    return h.score(scale) + _handicap(h)
 
 
 def _total(h: Hypothesis, predicted: HeldOut | None, scale: float) -> float:
@@ -215,7 +217,7 @@ def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
     """Without those that predict the held-out recording clearly worse than another does."""
     found = {h.key: total(h) for h in given}
     best = min(found.values())
-    kept = [h for h in given if found[h.key] < best + WITHIN]
+    kept = [h for h in given if found[h.key] - _handicap(h) < best + WITHIN]
     for h in given:
         if h not in kept:
             reasons[h.key] = "predicts the held-out recording worse"
@@ -268,8 +270,8 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict
     def one(h: Hypothesis, probability: float, why: str) -> Explanation:
         table = answer.twins.get(h.key, {})
         effects = tuple(NamedEffect(
-            table.get(e.key, e.ids), e.name, e.expression,
-            values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
+            table.get(e.key, e.ids if e.known else (SYMBOLIC + e.expression,)), e.name,
+            e.expression, values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
         p = predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(
             {n: v for n, v in h.values.items()}), h.score(scale),
