@@ -154,7 +154,8 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
         str(case["id"]), case["class"], bool(case["nameable"]),
         float(case["visibility"]["nominal"]), verdict, mismatch, outcome, reason, len(given),
         given[0][1] if answered else None,
-        answered and any(_same([_read(e) for e in explanations[0]], t) for t in (truth, _visible(case, truth)) if t),
+        answered and any(_same([_read(effect) for effect in explanations[0]], t)
+                         for t in (truth, _visible(case, truth)) if t),
         _within(case["base"], diagnosis), _held_out(diagnosis))
 
 
