@@ -57,7 +57,7 @@ class Score:
             that the hidden law resembles), `nothing` is hidden, or `other`.
         hypotheses: How many were given.
         probability: Of the most probable one; None where nothing is answered.
-        first_is_truth: Whether that one is the truth, or its visible part, or a formula of its kind.
+        first_is_truth: Whether that one is the truth, its visible part, or a formula of its kind.
         within: Whether each base parameter lies within 3 standard errors of the truth; None where
             none is compared.
         held_out: RMSE after the diagnosis over the noise; None where it is not given.
