@@ -23,7 +23,7 @@ EXPLORE = ("No law in the catalogue holds. Record (1) a free decay over a three-
 
 
 def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rate: float,
-           proves: bool) -> str:
+           proves: bool, workers: int = 1) -> str:
     """The next experiment for a verdict; empty where none is needed.
 
     Args:
@@ -32,17 +32,18 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         records: That it was made from.
         rate: Natural frequency [rad/s].
         proves: Whether a held-out recording was there.
+        workers: Threads.
     """
     if verdict in ("none", "named"):
         return ""
     if verdict == "set":
-        return _separating(given[:COMPARED], records, rate)
+        return _separating(given[:COMPARED], records, rate, workers)
     if not given:
         return EXPLORE
     return EXPLORE if proves else PROVE
 
 
-def _separating(given: Sequence[Explanation], records: Records, rate: float) -> str:
+def _separating(given: Sequence[Explanation], records: Records, rate: float, workers: int) -> str:
     """The profile that best tells the most probable hypotheses apart."""
     model = given[0].model
     driven = [i for i in model.inputs if i.default is None]
@@ -56,7 +57,7 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float) -> 
             min(rate / (2 * np.pi), 5.0), duration=LONGEST, channel=driven[0].name,
             unit=driven[0].unit, draws=1)
         found = next_experiment({e.title: e.model for e in given}, records.recordings, sigma,
-                                offered)
+                                offered, workers=workers)
     except errors.PikanidError:
         return text + "no profile within the bounds of the drive could be planned."
     outcome = (f"expected to set them {found.value:.2g} standard deviations apart (now "

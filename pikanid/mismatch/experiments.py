@@ -27,8 +27,8 @@ from pikanid import errors
 from pikanid.channel import Array, Channel
 from pikanid.information import covariance
 from pikanid.mismatch.profiles import Bounds, profiles, scaled
-from pikanid.mismatch.seen import Seen, Sigma, joined, natural_frequency, seen
-from pikanid.mismatch.separation import distance, mean_precision, refitted
+from pikanid.mismatch.seen import Seen, Sigma, Watch, joined, natural_frequency
+from pikanid.mismatch.separation import distance, mean_precision, refitted_within
 from pikanid.model import Model
 from pikanid.recording import Recording
 
@@ -108,7 +108,7 @@ def next_experiment(
     hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
     sigma: Sigma = None, candidates: Sequence[Recording] | None = None,
     bounds: Bounds | None = None, duration: float = 20.0, dt: float = 0.01,
-    limits: Mapping[str, float] | None = None, seed: int = 0,
+    limits: Mapping[str, float] | None = None, seed: int = 0, workers: int = 1,
 ) -> NextExperiment:
     """The feasible profile that best separates hypotheses.
 
@@ -124,6 +124,7 @@ def next_experiment(
         limits: Output -> largest |value| that the experiment may reach; profiles are made smaller
             until every hypothesis keeps to it.
         seed: Of the default candidates.
+        workers: Threads that simulate hypotheses side by side; the choice does not depend on them.
 
     Raises:
         BadSetting: With fewer than two hypotheses, no σ, or bounds that leave no room.
@@ -143,19 +144,23 @@ def next_experiment(
         raise errors.BadSetting(errors.too_few_hypotheses(len(hypotheses)))
     past = [recorded] if isinstance(recorded, Recording) else list(recorded)
     models = dict(hypotheses)
-    known = {name: [seen(model, r, sigma) for r in past] for name, model in models.items()}
+    watch = Watch(models, sigma, workers)
+    known = watch.seen(past)
 
     def worst(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
         return min(distance([*known[a], *new[a]], [*known[b], *new[b]])
                    for a, b in permutations(models, 2))
 
     def refit(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
-        return min(refitted([*known[a], *new[a]], models[b], [*past, *profiles], sigma)
-                   for a, b in permutations(models, 2))
+        def nearest(b: str) -> float:
+            watched = [watch.of(b, e) for e in (*past, *profiles)]
+            return min(refitted_within([*known[a], *new[a]], watched) for a in models if a != b)
+
+        return min(watch.of_each(nearest).values())
 
     offered = (_default_candidates(models, bounds, duration, dt, seed) if candidates is None
                else candidates)
-    return _chosen(models, "separate", worst, refit, known, past, offered, sigma, limits or {})
+    return _chosen(watch, "separate", worst, refit, known, past, offered, limits or {})
 
 
 def d_optimal(
@@ -177,29 +182,29 @@ def d_optimal(
     if not model.free_names:
         raise errors.BadSetting(errors.nothing_to_learn(model.name))
     past = [recorded] if isinstance(recorded, Recording) else list(recorded)
-    known = {model.name: [seen(model, r, sigma) for r in past]}
+    models = {model.name: model}
+    watch = Watch(models, sigma)
+    known = watch.seen(past)
 
     def precision(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
         every = [*known[model.name], *new[model.name]]
         return mean_precision(joined(every).jacobian) if every else 0.0
 
-    models = {model.name: model}
     offered = (_default_candidates(models, bounds, duration, dt, seed) if candidates is None
                else candidates)
-    return _chosen(models, "parameters", precision, precision, known, past, offered, sigma,
-                   limits or {})
+    return _chosen(watch, "parameters", precision, precision, known, past, offered, limits or {})
 
 
 def _chosen(
-    models: Mapping[str, Model], purpose: Literal["separate", "parameters"], quick: Score,
+    watch: Watch, purpose: Literal["separate", "parameters"], quick: Score,
     full: Score, known: Mapping[str, list[Seen]], past: Sequence[Recording],
-    candidates: Sequence[Recording], sigma: Sigma, limits: Mapping[str, float],
+    candidates: Sequence[Recording], limits: Mapping[str, float],
 ) -> NextExperiment:
     """The best candidate, ready to run: all are ranked by `quick`, the first of them by `full`."""
     tried = []
     for candidate in candidates:
         try:
-            profile, responses = _within(models, candidate, sigma, limits)
+            profile, responses = _within(watch, candidate, limits)
         except errors.SimulationFailed:
             continue  # a profile too rough for one of the hypotheses is no candidate
         new = {name: [r] for name, r in responses.items()}
@@ -216,9 +221,10 @@ def _chosen(
     else:
         _, usual, responses_to_it = tried[len(tried) // 2]
         repeated = full(responses_to_it, [usual])
-    nothing: dict[str, list[Seen]] = {name: [] for name in models}
+    nothing: dict[str, list[Seen]] = {name: [] for name in watch.models}
     before = full(nothing, []) if past else 0.0
-    std = _foretold(next(iter(models.values())), known, new) if purpose == "parameters" else {}
+    model = next(iter(watch.models.values()))
+    std = _foretold(model, known, new) if purpose == "parameters" else {}
     return NextExperiment(
         profile, purpose, value, before, repeated,
         tuple((entry[1].name, entry[0]) for entry in finalists),
@@ -234,12 +240,12 @@ def _foretold(model: Model, known: Mapping[str, list[Seen]],
     return {name: float(x) for name, x in zip(shared, spread, strict=False)}
 
 
-def _within(models: Mapping[str, Model], profile: Recording, sigma: Sigma,
-            limits: Mapping[str, float]) -> tuple[Recording, dict[str, Seen]]:
+def _within(watch: Watch, profile: Recording, limits: Mapping[str, float]
+            ) -> tuple[Recording, dict[str, Seen]]:
     """The profile, made smaller until every model keeps to the limits, and the responses to it."""
     for _ in range(8):
         try:
-            responses = {name: seen(model, profile, sigma) for name, model in models.items()}
+            responses = {name: found[0] for name, found in watch.seen([profile]).items()}
         except errors.SimulationFailed:
             if not limits:
                 raise

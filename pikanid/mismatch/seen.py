@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from pikanid import errors
 from pikanid.channel import Array
+from pikanid.mismatch.in_turn import side_by_side
 from pikanid.model import Model
 from pikanid.problem import Problem, Samples
 from pikanid.recording import Recording
@@ -17,6 +19,7 @@ from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.synthetic import with_outputs
 
 Sigma = float | Mapping[str, float] | None
+Result = TypeVar("Result")
 SHARE = 0.01  # of σ that an integration error may reach
 COARSE = 16.0  # sub-steps of a sample beyond which a motion is too wild to plan with
 
@@ -71,6 +74,7 @@ class Watched:
         self.simulator = Interpreted(model, self.problem.experiments[0])
         self.spread = np.concatenate([np.asarray(s.sigma, float) for s in self.samples])
         self.steps: Steps | None = None
+        self.kept: dict[bytes, Seen] = {}  # at the model's own values, and the last one
 
     @property
     def samples(self) -> tuple[Samples, ...]:
@@ -83,6 +87,13 @@ class Watched:
         Raises:
             SimulationFailed: If the motion does not stay finite, or is too wild to follow.
         """
+        key, own = theta.tobytes(), self.problem.guess.tobytes()
+        if key not in self.kept:
+            found = self._simulated(theta)
+            self.kept = {k: s for k, s in self.kept.items() if k == own} | {key: found}
+        return self.kept[key]
+
+    def _simulated(self, theta: Array) -> Seen:
         p = self.problem.parameters(theta, 0)
         inside, order = self.problem.columns(0)
         self.steps = self.steps or self._chosen_steps(p)
@@ -117,6 +128,37 @@ def seen(model: Model, excitation: Recording, sigma: Sigma = None) -> Seen:
     """
     watched = Watched(model, excitation, sigma)
     return watched.at(watched.problem.guess)
+
+
+class Watch:
+    """Several models in any experiments: what is seen once is seen again at no cost.
+
+    Args:
+        models: Name -> model at its parameter values.
+        sigma: As for `Watched`.
+        workers: Threads; each model is simulated in one of them at a time.
+    """
+
+    def __init__(self, models: Mapping[str, Model], sigma: Sigma = None, workers: int = 1):
+        self.models, self.sigma, self.workers = dict(models), sigma, workers
+        self.kept: dict[tuple[str, int], tuple[Recording, Watched]] = {}
+
+    def of(self, name: str, excitation: Recording) -> Watched:
+        """One model in one experiment; errors as for `Watched`."""
+        key = name, id(excitation)  # an id that stays taken: the recording is kept as well
+        if key not in self.kept:
+            self.kept[key] = excitation, Watched(self.models[name], excitation, self.sigma)
+        return self.kept[key][1]
+
+    def seen(self, excitations: Sequence[Recording]) -> dict[str, list[Seen]]:
+        """Name of a model -> its responses at its own values."""
+        return self.of_each(lambda name: [w.at(w.problem.guess) for w in (
+            self.of(name, e) for e in excitations)])
+
+    def of_each(self, work: Callable[[str], Result]) -> dict[str, Result]:
+        """Name of a model -> what `work` makes of it."""
+        names = list(self.models)
+        return dict(zip(names, side_by_side(names, work, self.workers), strict=True))
 
 
 def joined(responses: Sequence[Seen]) -> Seen:

@@ -39,7 +39,12 @@ def refitted(true: Sequence[Seen], model: Model, excitations: Sequence[Recording
     Raises:
         SimulationFailed: If the rival cannot be simulated at its own values.
     """
-    watched = [Watched(model, e, sigma) for e in excitations]
+    return refitted_within(true, [Watched(model, e, sigma) for e in excitations], evaluations)
+
+
+def refitted_within(true: Sequence[Seen], watched: Sequence[Watched], evaluations: int = 12
+                    ) -> float:
+    """As `refitted`, with the rival in every experiment; these may be used again."""
     target = np.concatenate([a.y for a in true])
     start = watched[0].problem.guess
     shared = ~watched[0].at(start).own

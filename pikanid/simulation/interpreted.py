@@ -75,7 +75,7 @@ class Interpreted(Simulator):
         if method != "explicit" or not can_run(self.acting):
             return super().module(method)
         if method not in self._kept:
-            self._kept[method] = Machine(tape(Structure(self.acting), self.located))
+            self._kept[method] = machine(tape(Structure(self.acting), self.located))
         return self._kept[method]
 
 
@@ -112,6 +112,12 @@ class Machine:
             code = native(self.program, active, delayed) if often else None
             kept[key] = bound(self.program, len(active), code.addresses if code else NOTHING), code
         return kept[key][0]
+
+
+@functools.lru_cache(maxsize=512)
+def machine(program: Tape) -> Machine:
+    """The one machine of a tape: simulators of the same equations count their steps together."""
+    return Machine(program)
 
 
 @functools.cache
