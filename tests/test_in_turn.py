@@ -67,3 +67,20 @@ def test_no_workers_is_a_mistake() -> None:
     recording = pk.simulate(pk.systems.sloshing(), pk.excitation.planar_moves(2, 6.0, seed=1))
     with pytest.raises(pk.errors.BadSetting, match="workers"):
         pk.diagnose(pk.systems.sloshing(), recording, workers=0)
+
+
+def test_what_another_state_would_not_change_is_not_done_again() -> None:
+    """Only whether the least number so far is below the job's enters into a result."""
+    runs: list[int] = []
+    taken: list[tuple[int, bool]] = []
+
+    def work(job: int, least: int) -> tuple[int, bool]:
+        runs.append(job)
+        return job, least < job
+
+    jobs = [50, 40, 90, 30, 80, 20]
+    in_turn(jobs, lambda: min((job for job, _ in taken), default=100), work,
+            lambda job, result: taken.append(result), lambda: True, 2,
+            lambda result, least: result[1] == (least < result[0]))
+    assert taken == [(50, False), (40, False), (90, True), (30, False), (80, True), (20, False)]
+    assert len(runs) <= len(jobs) + 1  # at most 90, if it was begun before 50 was taken

@@ -178,7 +178,8 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
         locate(case.base, best, answer, case.sites, shape, force, alpha),
         given, rejected, case.before, after, _proof(case, answer, best), tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates),
-        advice(answer.verdict, given, case.records, case.rate, case.proves), shape=shape,
+        advice(answer.verdict, given, case.records, case.rate, case.proves,
+               case.search.workers), shape=shape,
         force_over_time=force)
 
 

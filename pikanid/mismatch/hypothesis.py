@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from operator import lt
 
 import numpy as np
 
 from pikanid.mismatch.candidate import SYMBOLIC, Candidate, Sign
+from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.least_squares import Minimum, minimise
 from pikanid.mismatch.whitened import CERTAIN, GROSS, Records, Whitened
 from pikanid.model import Model
@@ -118,8 +121,8 @@ class Start:
 
 
 def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
-           starts: Sequence[Start | Mapping[str, float]], choices: int, closest: float = np.inf
-           ) -> Hypothesis | None:
+           starts: Sequence[Start | Mapping[str, float]], choices: int,
+           closest: Closest | None = None) -> Hypothesis | None:
     """Refit the nominal model with effects added.
 
     Args:
@@ -138,29 +141,37 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     whitened = Whitened(model, records)
     problem = whitened.problem
     rows = max(whitened.rows, 1)
-    reach = FAR * (closest + rows)
-    misfit = closest / rows if np.isfinite(closest) else 1.0
-    limit = LIMIT if misfit < GROSS else HURRIED
+    closest = closest or Closest()
+
+    def misfit(chi2: float) -> float:
+        return chi2 / rows if np.isfinite(chi2) else 1.0
+
+    def beyond(size: float) -> bool:
+        return closest.ask(lambda chi2: size > FAR * (chi2 + rows))
+
+    limit = closest.ask(lambda chi2: LIMIT if misfit(chi2) < GROSS else HURRIED)
     best: Minimum | None = None
     for start in starts:
-        guess = _begun(whitened, start, misfit, WILD * (closest + rows))
+        guess = _begun(whitened, start, misfit, closest)
         if guess is None:
             continue
         found = minimise(whitened.residual, guess, problem.lower, problem.upper,
-                         COARSE if len(starts) > 1 else limit, reach=reach)
+                         COARSE if len(starts) > 1 else limit, beyond=beyond)
         if found is not None and (best is None or found.chi2 < best.chi2):
             best = found
     if best is None:
         return None
-    finer = misfit > GROSS and best.chi2 < 0.25 * closest
-    if finer or (not best.converged and best.chi2 < reach):
-        if not whitened.choose_steps(best.theta, misfit=min(best.chi2 / rows, misfit)):
+    coarse = best.chi2
+    finer = closest.ask(lambda chi2: misfit(chi2) > GROSS and coarse < 0.25 * chi2)
+    if finer or (not best.converged and not beyond(coarse)):
+        if not closest.choose_steps(whitened, best.theta,
+                                    lambda chi2: min(coarse / rows, misfit(chi2))):
             return None
         best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        reach=reach)
+                        beyond=beyond)
         if best is None:
             return None
-    if best.chi2 < reach:
+    if any(e.hills for e in effects) and not beyond(best.chi2):
         for effect in effects:
             if effect.hills:
                 best = _over_hills(whitened, best, effect, limit)
@@ -178,7 +189,7 @@ def _over_hills(whitened: Whitened, best: Minimum, effect: Candidate, limit: int
             theta = best.theta.copy()
             theta[at] *= share
             found.append(minimise(whitened.residual, theta, problem.lower, problem.upper, COARSE,
-                                  reach=best.chi2))
+                                  beyond=partial(lt, best.chi2)))
         lower = min((m for m in found if m is not None), key=lambda m: m.chi2, default=best)
         if lower.chi2 > best.chi2 - 1.0:
             break
@@ -189,12 +200,12 @@ def _over_hills(whitened: Whitened, best: Minimum, effect: Candidate, limit: int
     return best
 
 
-def _begun(whitened: Whitened, start: Start | Mapping[str, float], misfit: float, wild: float
-           ) -> np.ndarray | None:
+def _begun(whitened: Whitened, start: Start | Mapping[str, float],
+           misfit: Callable[[float], float], closest: Closest) -> np.ndarray | None:
     """θ (n,) to begin at: the start, or nearer to its origin if χ² is smaller there.
 
     A linear step out of a large misfit goes too far: the phase of an oscillation bends.  A start
-    that has no origin and a χ² beyond `wild`, seen at a glance, is not worth finer steps.
+    that has no origin and a χ² far beyond the closest, seen at a glance, is not worth finer steps.
     """
     problem = whitened.problem
     values, origin = (start.values, start.origin) if isinstance(start, Start) else (start, start)
@@ -205,18 +216,20 @@ def _begun(whitened: Whitened, start: Start | Mapping[str, float], misfit: float
 
     goal, home = at(values), at(origin)
     if not np.any(goal != home):
-        if isinstance(start, Start) and not (
-                whitened.choose_steps(goal, misfit=max(misfit, GLANCE))
-                and whitened.chi2(goal) <= wild):
-            return None
-        return goal if whitened.choose_steps(goal, misfit=misfit) else None
+        if isinstance(start, Start):
+            if not closest.choose_steps(whitened, goal, lambda chi2: max(misfit(chi2), GLANCE)):
+                return None
+            seen = whitened.chi2(goal)
+            if not closest.ask(lambda chi2: seen <= WILD * (chi2 + max(whitened.rows, 1))):
+                return None
+        return goal if closest.choose_steps(whitened, goal, misfit) else None
     best, least = None, np.inf
     for share in (1.0, 0.25, 0.06, 0.01):
         theta = home + share * (goal - home)
-        if not whitened.choose_steps(theta, misfit=misfit):
+        if not closest.choose_steps(whitened, theta, misfit):
             continue
         size = whitened.chi2(theta)
-        if misfit < GROSS or (share < 1 and size > least):
+        if closest.ask(lambda chi2: misfit(chi2) < GROSS) or (share < 1 and size > least):
             return theta if best is None or size < least else best
         if size < least:
             best, least = theta, size

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
+AHEAD = 2  # jobs a thread that are begun: none waits for one that takes longer
 USEFUL = 2  # threads: beyond them what is begun ahead is too often begun in vain
 
 Job = TypeVar("Job")
@@ -36,12 +37,13 @@ def side_by_side(jobs: Sequence[Job], work: Callable[[Job], Result], workers: in
 
 def in_turn(
         jobs: Sequence[Job], state: Callable[[], State], work: Callable[[Job, State], Result],
-        take: Callable[[Job, Result], None], go_on: Callable[[], bool], workers: int) -> None:
+        take: Callable[[Job, Result], None], go_on: Callable[[], bool], workers: int,
+        stands: Callable[[Result, State], bool] = lambda result, state: False) -> None:
     """Work on jobs and take their results in order, while `go_on()`.
 
     What a job gives may depend on a state that taking earlier results changes.  Later jobs are
-    begun ahead with the state as it is, and once more where it has changed when their turn comes:
-    the outcome is that of one worker, for any number of them.
+    begun ahead with the state as it is, and once more where it has changed when their turn comes
+    and what they gave no longer stands: the outcome is that of one worker, for any number of them.
 
     Args:
         jobs: In the order in which they would be done alone.
@@ -50,6 +52,7 @@ def in_turn(
         take: Runs in the caller's thread.
         go_on: Asked before each job.
         workers: Threads; with one, everything runs in the caller's.
+        stands: Whether a result is what the job would give in another state, too.
 
     >>> best = [9]
     >>> in_turn([5, 7, 2], lambda: best[0], lambda job, least: min(job, least),
@@ -70,11 +73,11 @@ def in_turn(
             if not go_on():
                 return
             now = state()
-            for ahead in range(k, min(k + workers, len(jobs))):
-                if ahead not in begun or begun[ahead][0] != now:
-                    if ahead in begun:
-                        begun[ahead][1].cancel()
+            for ahead in range(k, min(k + AHEAD * workers, len(jobs))):
+                if ahead not in begun or (begun[ahead][0] != now and begun[ahead][1].cancel()):
                     begun[ahead] = now, pool.submit(work, jobs[ahead], now)
-            take(job, begun.pop(k)[1].result())
+            before, future = begun.pop(k)
+            good = before == now or (future.exception() is None and stands(future.result(), now))
+            take(job, future.result() if good else work(job, now))
     finally:
         pool.shutdown(cancel_futures=True)

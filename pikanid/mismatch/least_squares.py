@@ -28,11 +28,12 @@ class Minimum:
 
 
 def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np.ndarray,
-             limit: int = 30, tolerance: float = 0.02, reach: float = np.inf) -> Minimum | None:
+             limit: int = 30, tolerance: float = 0.02,
+             beyond: Callable[[float], bool] = lambda chi2: False) -> Minimum | None:
     """Minimise |r(θ)|² within bounds; None where the start cannot be evaluated.
 
     A parameter at a bound that the gradient pushes outwards stays there for the step.  What is
-    still above `reach` after `PATIENCE` iterations and falls slowly is given up.
+    still `beyond` reach after `PATIENCE` iterations and falls slowly is given up.
 
     >>> line = lambda q: (np.array([q[0] - 3.0]), np.ones((1, 1)))
     >>> found = minimise(line, np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -73,8 +74,8 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
                 damping = max(damping * (0.1 if gain > 0.5 * expected else 1.0), 1e-9)
                 break
             damping = max(damping * 8, 1e-4)
-        hopeless = count + 1 >= PATIENCE and best > reach and best > SLOW * last
-        if not accepted or hopeless:
+        hopeless = count + 1 >= PATIENCE and best > SLOW * last
+        if not accepted or (hopeless and beyond(best)):
             return Minimum(theta, r, J, False)
     return Minimum(theta, r, J, len(theta) == 0)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
 from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.screen import Screen, as_strong
@@ -254,12 +255,13 @@ class Search:
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
 
-        def work(job: Job, closest: float) -> Hypothesis | None:
-            effects, starts = job
+        def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
+            (effects, starts), closest = job, Closest(chi2)
             return fitted(self.nominal, sorted(effects, key=lambda e: order[e.key]), self.records,
-                          starts, self.choices, closest)
+                          starts, self.choices, closest), closest
 
-        def take(job: Job, found: Hypothesis | None) -> None:
+        def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
+            found, _ = result
             if found is None:
                 return
             self.spent += found.whitened.work
@@ -268,7 +270,8 @@ class Search:
                 self.fits[key] = found
 
         in_turn([job for job in jobs if again or frozenset(e.key for e in job[0]) not in self.fits],
-                self._closest_chi2, work, take, lambda: always or not self.tired, self.workers)
+                self._closest_chi2, work, take, lambda: always or not self.tired, self.workers,
+                lambda result, chi2: result[1].stands(chi2))
 
     def _closest_chi2(self) -> float:
         return min((h.minimum.chi2 for h in self.fits.values()), default=np.inf)

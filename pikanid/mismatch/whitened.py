@@ -47,6 +47,11 @@ def _cut(recording: Recording, stop: float) -> Recording:
     return recording.with_channels(*short)
 
 
+def allowance(misfit: float) -> float:
+    """How many times more than usual an integration may err where χ² per row is `misfit`."""
+    return max(1.0, 0.2 * misfit**0.5)
+
+
 class Whitened:
     """(ŷ - y) of a model, whitened to unit variance, as a function of θ (n_free,).
 
@@ -63,6 +68,8 @@ class Whitened:
         self.simulators = [Interpreted(model, e) for e in self.problem.experiments]
         self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
         self.steps: list[Steps] = []
+        # errors of the last choice of steps, and what is allowed of each where nothing is left
+        self.weighed: list[tuple[float, float]] = []
         self.rows = self.problem.n_samples
         self.work = 0.0
 
@@ -73,11 +80,14 @@ class Whitened:
         that share of the misfit is allowed instead.
         """
         found = []
+        self.weighed = []
         finest = 64 if misfit < GROSS else 16
         for r, simulator in enumerate(self.simulators):
             sigma = min(level.sigma for level in self.records.levels[r].values())
-            allowed = share * sigma * max(1.0, 0.2 * misfit**0.5)
+            usual = share * sigma
+            allowed = usual * allowance(misfit)
             steps = self._steps(r, theta, allowed, SHARP if simulator.corners else finest)
+            self._weigh(steps, usual)
             if simulator.corners and (steps is None or steps.error > allowed):
                 self.simulators[r] = Interpreted(
                     simulator.model, simulator.experiment, located=True)
@@ -85,11 +95,16 @@ class Whitened:
                 if steps is None:  # a motion at rest on a corner meets it without end
                     self.simulators[r] = simulator
                     steps = self._steps(r, theta, allowed, finest)
+                self._weigh(steps, usual)
             if steps is None or steps.error > 20 * allowed:
                 return False
             found.append(steps)
         self.steps = found
         return True
+
+    def _weigh(self, steps: Steps | None, usual: float) -> None:
+        if steps is not None:
+            self.weighed.append((steps.error, usual))
 
     def _steps(self, r: int, theta: np.ndarray, allowed: float, finest: int) -> Steps | None:
         try:
