@@ -79,6 +79,20 @@ def test_step_choice_keeps_its_promise() -> None:
         assert steps.error <= tolerance
 
 
+def test_a_gap_in_the_samples_does_not_hide_the_error_in_all_other_intervals() -> None:
+    t = np.concatenate([[0.0], np.linspace(0.4, 3, 27)])  # 10 Hz, at rest in the gap
+    push = Channel("u_x", [0.0, 0.5, 0.8, 3.0], [0.0, 2.0, 0.0, 0.0], hold="zero")
+    recording = Recording({"u_x": push, "theta": Channel("theta", t, np.sin(t))})
+    model = systems.sloshing().with_values(d_theta=0.9)
+    simulator = Simulator(model, bind(model, recording))
+    p = np.array(list(model.values.values()))
+    expected = oracle.simulate(lambda t, x, u, s: swing(x, u[0], damping=3.0), [0, 0], t,
+                               [oracle.Signal(push.time, push.values, "zero")]).x[:, 0]
+    for tolerance in (1e-3, 1e-6):
+        steps = simulator.choose_steps(p, tolerance)
+        assert np.abs(simulator.run(p, None, steps).y - expected).max() < 1.5 * tolerance
+
+
 def test_pulse_shorter_than_a_sample_is_not_stepped_over() -> None:
     """An input of its own, finer time base: 3 ms of push between samples 0.1 s apart."""
     push = Channel("u_x", [0.0, 0.3141, 0.3171, 2.0], [0.0, 40.0, 0.0, 0.0], hold="zero")

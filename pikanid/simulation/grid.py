@@ -34,9 +34,14 @@ class Grid:
 
     @functools.cached_property
     def spacings(self) -> tuple[float, float]:
-        """Median and longest interval between stops [s]."""
-        gaps = np.diff(self.T)
-        return float(np.median(gaps)), float(gaps.max())
+        """Median interval between stops [s], and the length of intervals at half of the time.
+
+        Steps as long as a lone gap cannot be judged by halving them: all other intervals would
+        be crossed in one step either way.
+        """
+        gaps = np.sort(np.diff(self.T))
+        half = np.searchsorted(np.cumsum(gaps), 0.5 * gaps.sum())
+        return float(np.median(gaps)), float(gaps[min(half, len(gaps) - 1)])
 
     def pieces(self, longest: float) -> np.ndarray:
         """Sub-steps of each interval (L-1,) so that none is longer than `longest` [s]."""

@@ -192,12 +192,12 @@ class Simulator:
             foretold = _foretold(trial, tolerance, known)
             if foretold is not None:
                 return foretold
-        spacing, gap = grid.spacings
+        spacing, usual = grid.spacings
         candidates: list[Method] = ["explicit", "implicit"] if method == "auto" else [method]
         best: Steps | None = None
         failure = Response(*(np.empty(0),) * 4)
         for candidate in candidates:
-            longest = gap
+            longest = usual
             rough = trial(Steps(candidate, longest), True)
             while longest > max(spacing / FINEST, finest):
                 fine = trial(Steps(candidate, longest / 2), False)
