@@ -109,7 +109,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         tell("confirmation")
         case.clear_later(ranked[0])
         answer = settle(ranked, search.scale(), case.test, case.predicted,
-                        case.later is not None, case.proves)
+                        case.later is not None, case.proves, case.ahead)
     shape = None
     if answer.verdict != "none":
         shape = force_shape(case.base, case.sites[0], case.candidates)

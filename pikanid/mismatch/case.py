@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.in_turn import side_by_side
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.preparation import with_refined_noise
@@ -109,6 +111,11 @@ class Case:
             self.predictions[h.fit] = held_out(h, self.model, self.later, self.candidates,
                                                self.rate)
         return self.predictions[h.fit]
+
+    def ahead(self, hypotheses: Sequence[Hypothesis]) -> None:
+        """Test hypotheses and let them predict, side by side."""
+        jobs = [(ask, h) for h in hypotheses for ask in (self.predicted, self.test)]
+        side_by_side(jobs, lambda job: job[0](job[1]), self.search.workers)
 
     def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
         """Whether a hypothesis is worth its effects beyond another one.

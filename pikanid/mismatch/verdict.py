@@ -46,7 +46,8 @@ class Answer:
 
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
-           checked: bool, proves: bool) -> Answer:
+           checked: bool, proves: bool,
+           ahead: Callable[[Sequence[Hypothesis]], None] = lambda near: None) -> Answer:
     """Choose what is given.
 
     Args:
@@ -55,6 +56,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         test, predict: Adequacy on the train and on the held-out recordings.
         checked: Whether there is anything held out.
         proves: Whether that is a recording of its own.
+        ahead: Told of the hypotheses that will all be tested and predict, before they are.
     """
     reasons: dict[frozenset[str], str] = {}
     tried = [h for h in ranked if h.effects]
@@ -64,6 +66,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     lowest = min(_handicapped(h, scale) for h in tried)
     near = [h for h in tried if h.score(scale) < lowest + WITHIN]
     near = _integer_laws(near)
+    ahead(near)
 
     def total(h: Hypothesis) -> float:
         return _total(h, predict(h), scale) if predict(h) or not checked else np.inf
