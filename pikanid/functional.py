@@ -11,10 +11,10 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate, pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from pikanid import errors
@@ -25,6 +25,7 @@ from pikanid.chains import Chains
 from pikanid.evaluated import delays
 from pikanid.expressions import symbol
 from pikanid.functional_rows import AnyApproximator, Part, Rows, Sites, by_coefficients
+from pikanid.model import Model
 from pikanid.problem import Problem, Samples
 from pikanid.simulation.vectorfield import VectorField
 
@@ -64,9 +65,9 @@ class Functional:
         """
         parts = self.parts
         if extra:
-            parts = tuple(replace(part, physics=replace(part.physics, tops=tuple(
+            parts = tuple(replace(part, physics=part.physics.with_tops([
                 Table.of(table.approximator, table.t, table.derivative + extra, table.part)
-                for table in part.physics.tops))) for part in self.parts)
+                for table in part.physics.tops])) for part in self.parts)
         return replace(self, penalty="roughness", parts=parts)
 
     @functools.cached_property
@@ -103,14 +104,15 @@ class Functional:
     def hold_jacobian(self, r: int, theta: Array) -> Array | None:
         """d c[held] / d θ (k, b) in the columns of `problem.columns(r)`; None where constant."""
         part = self.parts[r]
-        if part.held.size == 0 or not self._start_moves:
+        if part.held.size == 0:
             return None
         positions, _ = self.problem.columns(r)
         jacobian = self.problem.experiments[r].initial_jacobian(self.problem.parameters(theta, r))
         return part.hold @ jacobian[:, positions] if jacobian[:, positions].any() else None
 
     @functools.cached_property
-    def _start_moves(self) -> bool:
+    def start_moves(self) -> bool:
+        """Whether an initial state is a formula of parameters or inputs."""
         return any(state.initial.free_symbols for state in self.problem.model.states)
 
     def states(self, sites: Sites, coefficients: Array) -> Array:
@@ -119,46 +121,41 @@ class Functional:
 
     def rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> list[Rows]:
         """All residual families of recording r with derivatives: data, physics, start."""
-        part = self.parts[r]
-        families = self.data_rows(r, coefficients, theta)
-        families.append(self.physics_rows(r, coefficients, theta, lam))
+        part, p = self.parts[r], self.problem.parameters(theta, r)
+        with np.errstate(all="ignore"):  # a wild iterate is told from its cost
+            families = [_data(sites, coefficients, p) for sites in part.data]
+            families.append(self._physics(part.physics, coefficients, p, lam))
         if part.start is not None:
-            p = self.problem.parameters(theta, r)
-            positions, _ = self.problem.columns(r)
-            families.append(self._start(part.start, r, coefficients, p, positions))
+            families.append(self._start(part.start, r, coefficients, p))
         return families
 
     def data_rows(self, r: int, coefficients: Array, theta: Array) -> list[Rows]:
         """The data families of recording r alone."""
         p = self.problem.parameters(theta, r)
-        positions, _ = self.problem.columns(r)
-        return [self._data(sites, coefficients, p, positions) for sites in self.parts[r].data]
-
-    def _data(self, sites: Sites, c: Array, p: Array, positions: NDArray[np.int64]) -> Rows:
-        y, hx, hp = self.vector_field.outputs_linearised(
-            sites.t, self.states(sites, c), sites.u, p, [sites.output], positions)
-        weight = sites.weight[:, :, None]
-        return Rows(sites.weight * (y - sites.target), weight * hx, None, weight * hp)
+        with np.errstate(all="ignore"):
+            return [_data(sites, coefficients, p) for sites in self.parts[r].data]
 
     def physics_rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> Rows:
         """The physics family of recording r alone."""
-        sites, c = self.parts[r].physics, coefficients
         p = self.problem.parameters(theta, r)
-        positions, _ = self.problem.columns(r)
+        with np.errstate(all="ignore"):
+            return self._physics(self.parts[r].physics, coefficients, p, lam)
+
+    def _physics(self, sites: Sites, c: Array, p: Array, lam: float) -> Rows:
+        values, n = sites.values(c), len(self.chains.root)
+        states, tops = values[:n].T, values[n:].T
         weight = np.sqrt(lam) / self.scale * sites.weight
-        tops = side_by_side(sites.tops, c)
         if self.penalty == "roughness":
             return Rows(weight * tops, None, weight, None)
-        f, fx, fp = self.vector_field.rhs_linearised(
-            sites.t, self.states(sites, c), sites.u, p, self.chains.top, positions)
+        assert sites.lines is not None
+        f, fx, fp = sites.lines(sites.t, states, sites.u, p)
         minus = -weight[:, :, None]
         return Rows(weight * (tops - f), minus * fx, weight, minus * fp)
 
-    def _start(self, sites: Sites, r: int, c: Array, p: Array,
-               positions: NDArray[np.int64]) -> Rows:
+    def _start(self, sites: Sites, r: int, c: Array, p: Array) -> Rows:
         experiment = self.problem.experiments[r]
         gap = self.states(sites, c) - experiment.initial(p)
-        jacobian = experiment.initial_jacobian(p)[:, positions]
+        jacobian = experiment.initial_jacobian(p)[:, self.problem.columns(r)[0]]
         weight = sites.weight[:, :, None]
         return Rows(sites.weight * gap, weight * np.eye(gap.shape[1]), None, -weight * jacobian)
 
@@ -207,13 +204,13 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
         BadSetting: If a delay, a backlash or a rate limit is to be estimated: no functional over
             fixed sites can see them.
     """
-    late = _output_delays(problem)
+    late = _output_delays(problem.model)
     parts = []
-    for experiment, own, (times, weights) in zip(
-            problem.experiments, approximators, nodes, strict=True):
+    for r, (experiment, own, (times, weights)) in enumerate(zip(
+            problem.experiments, approximators, nodes, strict=True)):
+        free = problem.columns(r)[0].tolist()
         sizes = [a.n_coefficients for a in own]
-        ends = np.cumsum(sizes)
-        pieces = [slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)]
+        pieces = [slice(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
 
         def states(t: Array, own: tuple[AnyApproximator, ...] = own,
                    pieces: list[slice] = pieces) -> tuple[Table, ...]:
@@ -224,25 +221,36 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
         for samples in experiment.samples:
             seen = np.maximum(samples.t - late[samples.output], experiment.t0)
             sigma = _spread(samples, len(problem.model.outputs) > 1) if weighted else 1.0
-            weight = np.broadcast_to(1.0 / np.asarray(sigma), seen.shape)[:, None]
-            data.append(Sites(seen, experiment.inputs(seen), weight, states(seen), (),
-                              samples.y[:, None], samples.output))
+            weight = np.empty((seen.size, 1))
+            weight[:, 0] = 1.0 / sigma
+            data.append(Sites.of(seen, experiment.inputs(seen), weight, states(seen), (),
+                                 samples.y[:, None], samples.output,
+                                 None if samples.sigma is None else weight[:, 0] * samples.sigma,
+                                 vector_field.linearised_outputs([samples.output], free)))
         tops = tuple(Table.of(own[i], times, m, pieces[i]) for i, m in enumerate(chains.lengths))
-        weight = np.repeat(np.sqrt(weights)[:, None], len(own), axis=1)
-        physics = Sites(times, experiment.inputs(times), weight, states(times), tops)
+        weight = np.sqrt(weights)[:, None] * np.ones(len(own))
+        physics = Sites.of(times, experiment.inputs(times), weight, states(times), tops,
+                           lines=vector_field.linearised_rhs(chains.top, free))
         held, hold, start = np.zeros(0, np.int64), np.zeros((0, len(chains.root))), None
         if given_start:
             grip = anchor(own, chains.lengths, experiment.t0)
             if grip is None:
                 at = np.array([experiment.t0])
                 heavy = np.full((1, len(chains.root)), START_WEIGHT)
-                start = Sites(at, experiment.inputs(at), heavy, states(at))
+                start = Sites.of(at, experiment.inputs(at), heavy, states(at))
             else:
                 held = grip[0]
                 hold = grip[1] @ np.eye(len(chains.root))[np.lexsort((chains.order, chains.root))]
         parts.append(Part(own, tuple(data), physics, start, held, hold))
     return Functional(problem, vector_field, chains, tuple(parts), np.ones(len(chains.top)),
                       weighted)
+
+
+def _data(sites: Sites, c: Array, p: Array) -> Rows:
+    assert sites.lines is not None and sites.target is not None
+    y, hx, hp = sites.lines(sites.t, sites.values(c).T, sites.u, p)
+    weight = sites.weight[:, :, None]
+    return Rows(sites.weight * (y - sites.target), weight * hx, None, weight * hp)
 
 
 def _spread(samples: Samples, several: bool) -> Array | float:
@@ -252,8 +260,8 @@ def _spread(samples: Samples, several: bool) -> Array | float:
     return max(difference_noise(samples.y), 1e-6 * float(np.ptp(samples.y)), 1e-300)
 
 
-def _output_delays(problem: Problem) -> Array:
-    model = problem.model
+@functools.lru_cache(maxsize=64)
+def _output_delays(model: Model) -> Array:
     free = {symbol(name) for name in model.free_names}
     for what, items in (("input", model.inputs), ("output", model.outputs)):
         for item in items:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from pikanid.approximators import Approximator, Array, LinearApproximator
-from pikanid.approximators.tables import Table
+from pikanid.approximators.tables import Bases, Table, side_by_side
+from pikanid.simulation.vectorfield import Linearised
 
 AnyApproximator = Approximator | LinearApproximator
 
@@ -25,6 +27,29 @@ class Sites:
     tops: tuple[Table, ...] = ()  # highest derivative of each approximator: E of them
     target: Array | None = None  # (M, 1): the samples
     output: int = 0  # which output they are samples of
+    deviation: Array | None = None  # (M,): of the weighted samples, where σ is known
+    lines: Linearised | None = None  # the model's formulas at the sites
+    bases: Bases | None = None  # of states and tops together, where they are linear
+
+    @staticmethod
+    def of(t: Array, u: Array, weight: Array, states: Sequence[Table], tops: Sequence[Table] = (),
+           target: Array | None = None, output: int = 0, deviation: Array | None = None,
+           lines: Linearised | None = None) -> Sites:
+        """Sites whose tables share their memory."""
+        tables, bases = Bases.shared((*states, *tops))
+        n = len(states)
+        return Sites(t, u, weight, tables[:n], tables[n:], target, output, deviation, lines, bases)
+
+    def with_tops(self, tops: Sequence[Table]) -> Sites:
+        """The same sites with other tables on top."""
+        return Sites.of(self.t, self.u, self.weight, self.states, tops, self.target, self.output,
+                        self.deviation, self.lines)
+
+    def values(self, c: Array) -> Array:
+        """States, then tops (n + E, M) for a recording's coefficients."""
+        if self.bases is None:
+            return side_by_side((*self.states, *self.tops), c).T
+        return self.bases.values(c)
 
 
 @dataclass(frozen=True, eq=False)

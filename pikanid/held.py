@@ -31,7 +31,7 @@ class HeldInput:
         slack = 1e-9 * self._spacing
         probe = shifted + (slack if side == "right" else -slack)
         index = np.searchsorted(self.time, probe, side="right") - 1
-        return self.values[np.clip(index, 0, len(self.time) - 1)]
+        return self.values[np.maximum(index, 0)]  # never beyond the last one
 
     def slope(self, t: np.ndarray, delay: float = 0.0) -> np.ndarray:
         """du/dt inside the intervals that hold the times t."""

@@ -61,6 +61,10 @@ class Experiment:
 
     def breakpoints(self) -> np.ndarray:
         """Interior times at which an input jumps or kinks, sorted, after its delay."""
+        return self._breakpoints
+
+    @functools.cached_property
+    def _breakpoints(self) -> np.ndarray:
         pairs = zip(self._parts, self.fixed_delays, strict=True)
         times = np.concatenate([np.empty(0), *(
             part.switches + late for parts, late in pairs for part, _ in parts)])
@@ -195,7 +199,7 @@ class Problem:
     def parameters(self, theta: np.ndarray, r: int) -> np.ndarray:
         """All parameters p (P,) of recording r."""
         p = self._values.copy()
-        inside, outside = self.columns(r)
+        inside, outside = self._columns[r]
         p[inside] = theta[outside]
         return p
 

@@ -19,7 +19,7 @@ from pikanid.approximators.bspline import (
     split_breakpoints,
     uniform_knots,
 )
-from pikanid.approximators.tables import Table, anchor, gauss_nodes
+from pikanid.approximators.tables import Bases, Table, anchor, gauss_nodes
 
 
 def repeated(degree: int, multiplicity: int) -> BSpline:
@@ -140,6 +140,22 @@ def test_table_is_the_basis_at_fixed_times() -> None:
     assert np.allclose(table.values(c), spline.values(t, c[5:], 2))
     first, local = table.window
     assert first.min() >= 5 and local.shape == (11, 5)
+
+
+def test_bases_in_one_piece_of_memory_are_the_tables() -> None:
+    """Splines of different degrees behind each other, each with its own derivative."""
+    splines, t = (repeated(4, 2), repeated(3, 1)), np.linspace(0.0, 3.0, 13)
+    ends = np.cumsum([0, *(spline.n_basis for spline in splines)]).tolist()
+    parts = [slice(ends[0], ends[1]), slice(ends[1], ends[2])]
+    tables = [Table.of(splines[i], t, q, parts[i]) for i, q in ((0, 0), (1, 1), (0, 2))]
+    shared, bases = Bases.shared(tables)
+    c = np.random.default_rng(4).normal(size=ends[-1])
+    assert bases is not None
+    values = bases.values(c)
+    for k, (own, table) in enumerate(zip(shared, tables, strict=True)):
+        np.testing.assert_array_equal(values[k], table.values(c))
+        np.testing.assert_array_equal(own.values(c), table.values(c))
+        assert np.shares_memory(own.window[1], bases.local)
 
 
 @pytest.mark.parametrize("knots", [np.zeros(3), np.array([0.0, 0, 1, 0.5, 2, 2]),

@@ -39,7 +39,7 @@ class BSpline:
         knots = np.array(self.knots, dtype=float)
         if self.degree < 1 or knots.size < 2 * (self.degree + 1):
             raise errors.BadSetting(errors.spline_knots(self.degree, knots.size))
-        if np.any(np.diff(knots) < 0) or not np.all(np.isfinite(knots)):
+        if (knots[1:] < knots[:-1]).any() or not np.isfinite(knots).all():
             raise errors.BadSetting(errors.spline_knots_unsorted())
         knots.flags.writeable = False
         object.__setattr__(self, "knots", knots)
@@ -72,9 +72,9 @@ class BSpline:
     @property
     def greville(self) -> Array:
         """Means of `degree` neighbouring knots (n_basis,): good points to interpolate at."""
-        total = np.concatenate([[0.0], np.cumsum(self.knots)])
-        sums = total[self.degree + 1 : -1] - total[1 : self.n_basis + 1]
-        return np.clip(sums / self.degree, self.start, self.stop)
+        total = self.knots.cumsum()
+        means = (total[self.degree : -1] - total[: self.n_basis]) / self.degree
+        return np.minimum(np.maximum(means, self.start), self.stop)
 
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis matrix or its time derivative at ``t`` (M,): csr (M, n_basis), degree + 1 a row."""

@@ -78,6 +78,21 @@ def weigh(first: np.ndarray, local: np.ndarray, c: np.ndarray, out: np.ndarray,
 
 
 @_compiled
+def weigh_all(first: np.ndarray, local: np.ndarray, offset: np.ndarray, width: np.ndarray,
+              c: np.ndarray, out: np.ndarray) -> None:
+    """out[k, m] = Σ_a local_k[m, a] c[first[k, m] + a] of several bases at the same times.
+
+    local holds them one behind the other, basis k (M, width[k]) from offset[k] on.
+    """
+    for k in range(out.shape[0]):
+        for m in range(out.shape[1]):
+            total, at, place = 0.0, first[k, m], offset[k] + m * width[k]
+            for a in range(width[k]):
+                total += local[place + a] * c[at + a]
+            out[k, m] = total
+
+
+@_compiled
 def add_weighed(first: np.ndarray, local: np.ndarray, weight: np.ndarray, c: np.ndarray,
                 out: np.ndarray) -> None:
     """out[m] += weight[m] Σ_a local[m, a] c[first[m] + a], for rows out (M, q) and c (n, q)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -70,6 +71,40 @@ class Table:
         return self.approximator.jacobian(self.t, coefficients[self.part], self.derivative)
 
 
+@dataclass(frozen=True, eq=False)
+class Bases:
+    """Local bases of T linear tables at the same M times, which one call evaluates together."""
+
+    first: NDArray[np.int64]  # (T, M)
+    local: Array = field(repr=False)  # one behind the other: (M, width[k]) from offset[k] on
+    offset: NDArray[np.int64]  # (T,)
+    width: NDArray[np.int64]  # (T,)
+
+    @staticmethod
+    def shared(tables: Sequence[Table]) -> tuple[tuple[Table, ...], Bases | None]:
+        """The tables with their bases in one piece of memory; None where one is not linear."""
+        windows = [(table.first, table.local) for table in tables]
+        local = [own for _, own in windows if own is not None]
+        if len(local) < len(tables):
+            return tuple(tables), None
+        ends = list(itertools.accumulate((own.size for own in local), initial=0))
+        bases = Bases(np.array([first for first, _ in windows]),
+                      np.concatenate([own.ravel() for own in local]), np.array(ends[:-1]),
+                      np.array([own.shape[1] for own in local]))
+        return tuple(
+            Table(table.approximator, table.t, table.derivative, table.part, bases.first[k],
+                  bases.local[ends[k]:ends[k + 1]].reshape(own.shape))
+            for k, (table, own) in enumerate(zip(tables, local, strict=True))), bases
+
+    def values(self, coefficients: Array) -> Array:
+        """Values (T, M) for a recording's coefficients (n,)."""
+        from pikanid.approximators.local_basis import weigh_all
+
+        out = np.empty(self.first.shape)
+        weigh_all(self.first, self.local, self.offset, self.width, coefficients, out)
+        return out
+
+
 def side_by_side(tables: Sequence[Table], coefficients: Array) -> Array:
     """Values (M, len(tables)) of tables at the same times."""
     from pikanid.approximators.local_basis import weigh
@@ -133,9 +168,10 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
         if not is_linear(approximator):
             return None
         windows = [_window(approximator, at, q) for q in range(length)]
-        rows = np.vstack([values for _, values in windows])
-        decisive = np.abs(np.triu(rows, 1)) <= 1e-9 * np.abs(rows).max(axis=1, keepdims=True)
-        if not decisive.all() or any(first[0] for first, _ in windows):
+        rows = np.array([values[0] for _, values in windows])
+        size, beyond = np.abs(rows), np.arange(rows.shape[1]) > np.arange(length)[:, None]
+        if ((size * beyond).max(axis=1) > 1e-9 * size.max(axis=1)).any() or any(
+                [first[0] for first, _ in windows]):
             return None
         held.append(offset + np.arange(length))
         blocks.append(np.linalg.inv(rows[:, :length]))

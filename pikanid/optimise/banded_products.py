@@ -19,47 +19,41 @@ def _compiled(function: _Function) -> _Function:
 
 
 @_compiled
-def spread(local: np.ndarray, slopes: np.ndarray, state: int, begin: int, at: int,
-           stacked: np.ndarray) -> None:
-    """Add ∂r/∂x of one state, by its local basis (M, width), to columns at, at + 1, ...
+def add_products(residual: np.ndarray, by_state: np.ndarray, by_top: np.ndarray,
+                 by_theta: np.ndarray, local: np.ndarray, offset: np.ndarray, width: np.ndarray,
+                 at: np.ndarray, starts: np.ndarray, columns: np.ndarray, kd: int,
+                 whole: np.ndarray, corner: np.ndarray, cost: np.ndarray) -> None:
+    """Add VᵀV of a family's rows V = [∂r/∂local coefficients | ∂r/∂θ | r]; fill cost (1,), ‖r‖².
 
-    slopes (M, E, n) and the basis count from `begin`, stacked (m, E, W) from zero.
+    residual (M, E), by_state (M, E, n), by_top (M, E), of chain e in residual e alone, and by_theta
+    (M, E, b); empty ones count as zero.  Table k, states before tops, has its basis (M, width[k])
+    in local from offset[k] on, and its place among the w coefficients columns[g] (G, w) of stretch
+    g, rows starts[g] to starts[g + 1], from at[k] on.  Products of the coefficients with each other
+    go to the band, with the others behind it: whole (n, kd + 1 + b + 1); those of the others to
+    corner (b + 1, b + 1).
     """
-    for m in range(stacked.shape[0]):
-        for e in range(stacked.shape[1]):
-            slope = slopes[begin + m, e, state]
-            if slope != 0.0:  # an output mostly shows one state only
-                for a in range(local.shape[1]):
-                    stacked[m, e, at + a] += slope * local[begin + m, a]
-
-
-@_compiled
-def spread_top(local: np.ndarray, slopes: np.ndarray, e: int, begin: int, at: int,
-               stacked: np.ndarray) -> None:
-    """The same for the highest derivative of chain e, slopes (M, E), in residual e alone."""
-    for m in range(stacked.shape[0]):
-        slope = slopes[begin + m, e]
-        for a in range(local.shape[1]):
-            stacked[m, e, at + a] += slope * local[begin + m, a]
-
-
-@_compiled
-def add_products(stacked: np.ndarray, starts: np.ndarray, columns: np.ndarray, kd: int,
-                 whole: np.ndarray, corner: np.ndarray) -> None:
-    """Add VᵀV of rows V = stacked (M, E, W), stretch g being rows starts[g] to starts[g + 1].
-
-    Of its W columns the first w are the coefficients columns[g] (G, w).  Their products with each
-    other go to the band, with the others behind it: whole (n, kd + 1 + W - w); those of the others
-    to corner (W - w, W - w).
-    """
-    begin, w, width = starts[0], columns.shape[1], stacked.shape[2]
-    gram = np.empty((width, width))
+    w, states = columns.shape[1], by_state.shape[2]
+    size = w + corner.shape[0]
+    row, gram = np.zeros(size), np.empty((size, size))
     for g in range(columns.shape[0]):
         gram[:] = 0.0
-        for m in range(starts[g] - begin, starts[g + 1] - begin):
-            for e in range(stacked.shape[1]):
-                row = stacked[m, e]
-                for i in range(width):
+        for m in range(starts[g], starts[g + 1]):
+            for e in range(residual.shape[1]):
+                row[:w] = 0.0
+                for s in range(states):
+                    slope = by_state[m, e, s]
+                    if slope != 0.0:  # an output mostly shows one state only
+                        for a in range(width[s]):
+                            row[at[s] + a] += slope * local[offset[s] + m * width[s] + a]
+                if by_top.size > 0:
+                    k = at.size - by_top.shape[1] + e
+                    for a in range(width[k]):
+                        row[at[k] + a] += by_top[m, e] * local[offset[k] + m * width[k] + a]
+                for j in range(by_theta.shape[2]):
+                    row[w + j] = by_theta[m, e, j]
+                row[size - 1] = residual[m, e]
+                cost[0] += residual[m, e] ** 2
+                for i in range(size):
                     left = row[i]
                     for j in range(i + 1):
                         gram[i, j] += left * row[j]
@@ -68,10 +62,10 @@ def add_products(stacked: np.ndarray, starts: np.ndarray, columns: np.ndarray, k
             for j in range(i + 1):
                 other = columns[g, j]
                 whole[min(one, other), abs(one - other)] += gram[i, j]
-            for k in range(w, width):
+            for k in range(w, size):
                 whole[one, kd + 1 + k - w] += gram[k, i]
-        for k in range(w, width):
-            for j in range(w, width):
+        for k in range(w, size):
+            for j in range(w, size):
                 corner[k - w, j - w] += gram[max(k, j), min(k, j)]
 
 

@@ -1,4 +1,4 @@
-"""Cholesky factors of symmetric positive definite matrices, banded or small.
+"""Factors of symmetric matrices, banded or small: Cholesky's where they are positive definite.
 
 Straight from LAPACK or compiled here: SciPy's and NumPy's own functions check, convert and
 dispatch, which takes longer than the algebra on a short recording.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.linalg.lapack import dpbtrf, dposv
+from scipy.linalg.lapack import dpbtrf, dposv, dsyev
 
 from pikanid.approximators import Array
 
@@ -58,3 +58,15 @@ def solve_positive(matrix: Array, columns: Array) -> Array:
     if info:
         raise LinAlgError(f"the leading minor of order {info} is not positive definite")
     return solved
+
+
+def eigen(matrix: Array) -> tuple[Array, Array]:
+    """Eigenvalues (n,), ascending, and eigenvectors (n, n), as columns, of a small matrix.
+
+    Raises:
+        LinAlgError: If the iteration does not converge.
+    """
+    values, vectors, info = dsyev(matrix, lower=1)
+    if info:
+        raise LinAlgError(f"the eigenvalues did not converge ({info})")
+    return values, vectors

@@ -6,7 +6,6 @@ covariance Σ, Cov = Zᵀ J_dᵀ Σ J_d Z, Z the θ columns of M⁻¹ (White, Ec
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -16,7 +15,7 @@ from scipy.linalg import LinAlgError
 from pikanid.approximators import Array
 from pikanid.approximators.tables import Table
 from pikanid.functional import Rows, Sites
-from pikanid.optimise.cholesky import factor_band, whiten_band
+from pikanid.optimise.cholesky import eigen, factor_band, whiten_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
 
 EXACT_UP_TO = 300  # data rows; beyond, the trace is estimated
@@ -48,7 +47,7 @@ def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
             variance += float(deviation @ deviation)
         count += rows
     sandwich, naive = bread @ meat @ bread, bread * (variance / count)
-    unseen = np.flatnonzero(inside & (step.schur.diagonal() <= 0.0))
+    unseen, = (inside & (step.schur.diagonal() <= 0.0)).nonzero()
     sandwich[unseen, unseen] = naive[unseen, unseen] = np.inf
     return sandwich, naive
 
@@ -64,19 +63,17 @@ def error_bound(system: BandedSystem, at: Linearisation, step: Step,
 
     bread = np.empty(at.point.theta.size)
     inverse_diagonal(step.schur, inside_bounds(system, at), bread)
-    return max(float(np.max(deviation, initial=0.0)) for deviation in noise) * np.sqrt(bread)
+    return max(own if isinstance(own, float) else float(own.max(initial=0.0))
+               for own in noise) * np.sqrt(bread)
 
 
 def inside_bounds(system: BandedSystem, at: Linearisation) -> NDArray[np.bool_]:
     """Which parameters (b,) are not at a bound."""
-    problem, theta = system.functional.problem, at.point.theta.tolist()
-    # plain numbers: for a few parameters NumPy takes longer
-    return np.array([not (_meets(q, low) or _meets(q, high)) for q, low, high in zip(
-        theta, problem.lower.tolist(), problem.upper.tolist(), strict=True)], dtype=bool)
+    from pikanid.optimise.small_matrices import strictly_inside
 
-
-def _meets(value: float, bound: float) -> bool:
-    return math.isfinite(bound) and abs(value - bound) <= 1e-6 * abs(bound)
+    inside = np.empty(at.point.theta.size, dtype=bool)
+    strictly_inside(at.point.theta, system.lower, system.upper, inside)
+    return inside
 
 
 def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
@@ -85,9 +82,11 @@ def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
     Directions without any are left out.
     """
     out, diagonal = np.zeros_like(matrix), matrix.diagonal()
-    which = np.flatnonzero(inside & (diagonal > 0.0))
+    which, = (inside & (diagonal > 0.0)).nonzero()
+    if which.size == 0:
+        return out
     square, scale = (which[:, None], which), np.sqrt(diagonal[which])
-    values, vectors = np.linalg.eigh(matrix[square] / (scale[:, None] * scale))
+    values, vectors = eigen(matrix[square] / (scale[:, None] * scale))
     seen = np.abs(values) > 1e-13 * np.abs(values).max(initial=0.0)
     vectors = vectors[:, seen] / scale[:, None]
     out[square] = (vectors / values[seen]) @ vectors.T

@@ -9,7 +9,6 @@ inside the box.
 from __future__ import annotations
 
 import copy
-import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,18 +56,9 @@ class Linearisation:
     lam: float
     blocks: tuple[Eliminated, ...]
     data_costs: tuple[tuple[float, ...], ...]  # per recording, per data family
+    data_cost: float  # their sum
     physics_cost: float
-    other_cost: float
-
-    @functools.cached_property
-    def data_cost(self) -> float:
-        """Weighted sum of squares of the data rows."""
-        return sum(map(sum, self.data_costs))
-
-    @functools.cached_property
-    def cost(self) -> float:
-        """‖r‖², all families together."""
-        return self.data_cost + self.physics_cost + self.other_cost
+    cost: float  # ‖r‖², all families together
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +82,9 @@ class BandedSystem:
         self.assemblers = [
             BandedAssembler(part, families, columns.size) for part, families, columns
             in zip(functional.parts, self.families, self.columns, strict=True)]
+        self.start_moves = functional.start_moves
+        self.counts = [len(part.data) for part in functional.parts]
+        self.lower, self.upper = functional.problem.lower, functional.problem.upper
         self.orders = [assembler.order for assembler in self.assemblers]
 
     def over(self, functional: Functional) -> BandedSystem:
@@ -102,25 +95,29 @@ class BandedSystem:
 
     def linearise(self, point: Point, lam: float) -> Linearisation:
         """Residuals and normal equations at a point."""
-        blocks, data, physics, other = [], [], 0.0, 0.0
+        blocks, data, seen, physics, cost = [], [], 0.0, 0.0, 0.0
         for r, (part, c) in enumerate(zip(self.functional.parts, point.coefficients, strict=True)):
             rows = self.functional.rows(r, c, point.theta, lam)
-            normal = self.assemblers[r].normal(self.families[r], rows)
-            held = self.functional.hold_jacobian(r, point.theta)
+            normal = self.assemblers[r].normal(rows)
+            held = self.functional.hold_jacobian(r, point.theta) if self.start_moves else None
             blocks.append(_eliminate(normal, part.held.size, held))
-            count = len(part.data)
+            count = self.counts[r]
             data.append(normal.costs[:count])
+            seen += sum(normal.costs[:count])
             physics += normal.costs[count]
-            other += sum(normal.costs[count + 1:])
-        return Linearisation(point, lam, tuple(blocks), tuple(data), physics, other)
+            cost += sum(normal.costs)
+        return Linearisation(point, lam, tuple(blocks), tuple(data), seen, physics, cost)
 
     def moved(self, point: Point, step: Step) -> Point:
         """The point after a step, held coefficients set from the initial state."""
         theta = point.theta + step.theta
-        coefficients = tuple(
-            self.functional.complete(r, c + change, theta) for r, (c, change)
-            in enumerate(zip(point.coefficients, step.coefficients, strict=True)))
-        return Point(coefficients, theta)
+        coefficients = []
+        for r, (c, change) in enumerate(zip(point.coefficients, step.coefficients, strict=True)):
+            moved = c + change
+            if self.start_moves:
+                moved = self.functional.complete(r, moved, theta)
+            coefficients.append(moved)
+        return Point(tuple(coefficients), theta)
 
     def step(self, at: Linearisation, lower: Array, upper: Array, damping: float = 0.0) -> Step:
         """Minimise the (damped) Gauss-Newton model with θ inside [lower, upper].
@@ -133,7 +130,7 @@ class BandedSystem:
 
         theta, b = at.point.theta, at.point.theta.size
         schur, slope, promised = np.zeros((b, b)), np.zeros(b), 0.0
-        inner = []
+        solutions, inner = [], []
         for columns, block in zip(self.columns, at.blocks, strict=True):
             band, corner = block.band, block.corner
             if damping > 0.0:
@@ -142,17 +139,17 @@ class BandedSystem:
                 corner[np.diag_indices(columns.size)] *= 1.0 + damping
             solved = solve_band(factor_band(band), block.right)
             promised += reduce_block(block.right, solved, corner, columns, schur, slope)
-            inner.append(solved)
+            solutions.append(solved)
+            inner.append(solved[:, :-1])
         change = box_minimum(schur, slope, lower - theta, upper - theta)
         promised += fall(schur, slope, change)
         moves = []
-        for columns, order, solved in zip(self.columns, self.orders, inner, strict=True):
+        for columns, order, solved in zip(self.columns, self.orders, solutions, strict=True):
             # Held coefficients, the first, are set from the initial state afterwards, exactly.
             move = np.zeros(order.size)
             follow_theta(solved, change, columns, order, move)
             moves.append(move)
-        return Step(tuple(moves), change, promised, schur,
-                    tuple(solved[:, :-1] for solved in inner))
+        return Step(tuple(moves), change, promised, schur, tuple(inner))
 
 
 def _eliminate(normal: BandedNormal, k: int, held_by_theta: Array | None) -> Eliminated:

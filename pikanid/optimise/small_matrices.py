@@ -84,6 +84,17 @@ def fall(matrix: np.ndarray, slope: np.ndarray, change: np.ndarray) -> float:
 
 
 @_compiled
+def strictly_inside(theta: np.ndarray, lower: np.ndarray, upper: np.ndarray,
+                    inside: np.ndarray) -> None:
+    """Fill inside (b,): which entries of θ are farther than 1e-6 of it from either bound."""
+    for k in range(theta.size):
+        inside[k] = True
+        for bound in (lower[k], upper[k]):
+            if np.isfinite(bound) and abs(theta[k] - bound) <= 1e-6 * abs(bound):
+                inside[k] = False
+
+
+@_compiled
 def inverse_diagonal(matrix: np.ndarray, inside: np.ndarray, out: np.ndarray) -> None:
     """Fill out (b,) with the diagonal of the inverse of the rows and columns `inside` (b,).
 

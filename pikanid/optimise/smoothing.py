@@ -74,12 +74,13 @@ class Pencil:
         self.cost, self.count = data.data_cost, count
         self.blocks = []
         sizes = [block.slope.size for block in data.blocks]
-        number = int(np.clip(4000 // max(1, sum(sizes)), 1, 16))
+        number = min(max(4000 // max(1, sum(sizes)), 1), 16)
         generator = np.random.default_rng(0)
         for size, only, all_ in zip(sizes, data.blocks, both.blocks, strict=True):
             probe = generator.choice([-1.0, 1.0], size=(size, number))
-            right = np.column_stack([multiply(only.band, probe), -only.slope])
-            rough = np.column_stack([np.zeros_like(probe), only.slope - all_.slope])
+            right, rough = np.empty((size, number + 1)), np.zeros((size, number + 1))
+            right[:, :-1], right[:, -1] = multiply(only.band, probe), -only.slope
+            rough[:, -1] = only.slope - all_.slope
             self.blocks.append((only, all_.band - only.band, right, rough, probe / number))
 
     def search(self, ridge: float) -> Score | None:
@@ -113,7 +114,7 @@ class Pencil:
             except LinAlgError:
                 return None
             solved = solve_band(factor, right + rho * rough)
-            effective += float(np.sum(probe * solved[:, :-1]))
+            effective += float(np.vdot(probe, solved[:, :-1]))
             step = solved[:, -1]
             residual += float(step @ (2.0 * only.slope + _product(only.band, step)))
         if effective >= most * self.count and most < 1.0:
@@ -129,7 +130,7 @@ def multiply(band: Array, columns: Array) -> Array:
     array([[2., 1.],
            [1., 2.]])
     """
-    return np.column_stack([_product(band, column) for column in columns.T])
+    return np.array([_product(band, column) for column in columns.T]).T
 
 
 def _product(band: Array, column: Array) -> Array:

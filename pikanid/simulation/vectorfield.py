@@ -50,11 +50,9 @@ class VectorField:
         """∂f/∂x (M, n, n) and ∂f/∂p (M, n, P)."""
         return self._functions.jacobians(t, x, u, p, "f")
 
-    def rhs_linearised(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray,
-                       rows: Sequence[int], free: Sequence[int] | np.ndarray
-                       ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """E `rows` of f (M, E), of ∂f/∂x (M, E, n), and of ∂f/∂p (M, E, b) by the `free` ones."""
-        return self._functions.linearised(t, x, u, p, "f", rows, free)
+    def linearised_rhs(self, rows: Sequence[int], free: Sequence[int]) -> Linearised:
+        """E `rows` of f with ∂f/∂x and with ∂f/∂p by the `free` ones."""
+        return self._functions.linearised("f", tuple(rows), tuple(free))
 
     def outputs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """y = h (M, q)."""
@@ -65,11 +63,9 @@ class VectorField:
         """∂h/∂x (M, q, n) and ∂h/∂p (M, q, P)."""
         return self._functions.jacobians(t, x, u, p, "h")
 
-    def outputs_linearised(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray,
-                           rows: Sequence[int], free: Sequence[int] | np.ndarray
-                           ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """E `rows` of h (M, E), of ∂h/∂x (M, E, n), and of ∂h/∂p (M, E, b) by the `free` ones."""
-        return self._functions.linearised(t, x, u, p, "h", rows, free)
+    def linearised_outputs(self, rows: Sequence[int], free: Sequence[int]) -> Linearised:
+        """E `rows` of h with ∂h/∂x and with ∂h/∂p by the `free` ones."""
+        return self._functions.linearised("h", tuple(rows), tuple(free))
 
 
 class _Functions:
@@ -84,12 +80,12 @@ class _Functions:
         self.exprs = exprs
         self.values = {name: self._vector(e) for name, e in exprs.items()}
         self._tables: dict[str, Any] = {}
-        self._plans: dict[tuple[str, tuple[int, ...], tuple[int, ...]], Any] = {}
+        self._plans: dict[tuple[str, tuple[int, ...], tuple[int, ...]], Linearised] = {}
 
     def arguments(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
                   ) -> list[np.ndarray]:
         """t, states, inputs, parameters and the present signs, each broadcast over M."""
-        base: list[np.ndarray] = [np.asarray(t, float), *x.T, *u.T, *p]
+        base: list[np.ndarray] = [t, *x.T, *u.T, *p]
         for g in self._sign_functions:
             base.append(np.sign(g(*base)))
         return base
@@ -134,54 +130,15 @@ class _Functions:
     def jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray, name: str
                   ) -> tuple[np.ndarray, np.ndarray]:
         rows, free = range(len(self.exprs[name])), range(len(self.p))
-        return self.linearised(t, x, u, p, name, rows, free)[1:]
-
-    def linearised(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray, name: str,
-                   rows: Sequence[int], free: Sequence[int] | np.ndarray
-                   ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        plan = self._plan(name, tuple(rows), tuple(np.asarray(free).tolist()))
-        function, edges, row_at, column_at, by_state, by_parameter = plan
-        count = len(t)
-        jx = np.zeros((count, len(row_at), len(self.x)))
-        jp = np.zeros((count, len(row_at), len(column_at)))
         with np.errstate(all="ignore"):
-            found = function(*self.arguments(t, x, u, p))
-        for k, row, column in by_state:
-            jx[:, row, column] = found[k]
-        for k, row, column in by_parameter:
-            jp[:, row, column] = found[k]
-        inner = len(found) - 1 - 2 * len(edges)
-        for k, (row, index, order) in enumerate(edges):
-            z, weight = found[inner + k], found[inner + len(edges) + k]
-            if row not in row_at:
-                continue
-            spline = self.model.splines[index]
-            first = self.model.parameter_names.index(spline.coefficient_names[0])
-            basis = _basis(spline.knots, spline.degree, np.broadcast_to(z, (count,)), order)
-            own = [k for k in range(spline.size) if first + k in column_at]
-            jp[:, row_at[row], [column_at[first + k] for k in own]] += np.reshape(
-                np.broadcast_to(weight, (count,)), (-1, 1)) * basis[:, own]
-        return _columns([found[row] for row in rows], count), jx, jp
+            return self.linearised(name, tuple(rows), tuple(free))(t, x, u, p)[1:]
 
-    def _plan(self, name: str, rows: tuple[int, ...], free: tuple[int, ...]) -> Any:
-        """The functions, where rows and parameters stand, and what is wanted of them.
-
-        That is (entry, row, column) of ∂/∂x and ∂/∂p.
-        """
+    def linearised(self, name: str, rows: tuple[int, ...], free: tuple[int, ...]) -> Linearised:
         if (name, rows, free) not in self._plans:
-            places, function, edges = self._table(name)
-            row_at = {row: k for k, row in enumerate(rows)}
-            column_at = {column: k for k, column in enumerate(free)}
-            n, values = len(self.x), len(self.exprs[name])
-            wanted = [(values + k, row_at[row], column)
-                      for k, (row, column) in enumerate(places) if row in row_at]
-            self._plans[name, rows, free] = (
-                function, edges, row_at, column_at, [entry for entry in wanted if entry[2] < n],
-                [(k, row, column_at[column - n]) for k, row, column in wanted
-                 if column - n in column_at])
+            self._plans[name, rows, free] = Linearised(self, name, rows, free)
         return self._plans[name, rows, free]
 
-    def _table(self, name: str) -> Any:
+    def table(self, name: str) -> Any:
         if name not in self._tables:
             places, entries, edges, inner, weights = [], [], [], [], []
             for row, e in enumerate(self.exprs[name]):
@@ -201,6 +158,60 @@ class _Functions:
             self._tables[name] = (
                 places, self._lambdify(self.all_symbols, everything), edges)
         return self._tables[name]
+
+
+class Linearised:
+    """Some rows of f or h and their derivatives by the states and by some parameters.
+
+    NumPy's warnings are for the caller to silence: once for all that is evaluated.
+    """
+
+    def __init__(self, functions: _Functions, name: str, rows: tuple[int, ...],
+                 free: tuple[int, ...]):
+        places, self._function, self._edges = functions.table(name)
+        self._functions, self._rows = functions, rows
+        self._row_at = {row: k for k, row in enumerate(rows)}
+        self._column_at = {column: k for k, column in enumerate(free)}
+        self._size, self._n, self._b = len(rows), len(functions.x), len(free)
+        values = len(functions.exprs[name])
+        # (entry, row, column) of ∂/∂x and ∂/∂p
+        wanted = [(values + k, self._row_at[row], column)
+                  for k, (row, column) in enumerate(places) if row in self._row_at]
+        self._by_state = [entry for entry in wanted if entry[2] < self._n]
+        self._by_parameter = [(k, row, self._column_at[column - self._n])
+                              for k, row, column in wanted if column - self._n in self._column_at]
+
+    def __call__(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
+                 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values (M, E), ∂/∂x (M, E, n) and ∂/∂p (M, E, b)."""
+        found = self._function(*self._functions.arguments(t, x, u, p))
+        shape = (*t.shape, self._size)
+        values = np.empty(shape)
+        jx, jp = np.zeros((*shape, self._n)), np.zeros((*shape, self._b))
+        for k, row in enumerate(self._rows):
+            values[:, k] = found[row]
+        for k, row, column in self._by_state:
+            jx[:, row, column] = found[k]
+        for k, row, column in self._by_parameter:
+            jp[:, row, column] = found[k]
+        if self._edges:
+            self._add_edges(found, jp)
+        return values, jx, jp
+
+    def _add_edges(self, found: Sequence[Any], jp: np.ndarray) -> None:
+        """∂/∂p by the coefficients of spline functions."""
+        model, count = self._functions.model, len(jp)
+        inner = len(found) - 1 - 2 * len(self._edges)
+        for k, (row, index, order) in enumerate(self._edges):
+            z, weight = found[inner + k], found[inner + len(self._edges) + k]
+            if row not in self._row_at:
+                continue
+            spline = model.splines[index]
+            first = model.parameter_names.index(spline.coefficient_names[0])
+            basis = _basis(spline.knots, spline.degree, np.broadcast_to(z, (count,)), order)
+            own = [k for k in range(spline.size) if first + k in self._column_at]
+            jp[:, self._row_at[row], [self._column_at[first + k] for k in own]] += np.reshape(
+                np.broadcast_to(weight, (count,)), (-1, 1)) * basis[:, own]
 
 
 class _Splines:

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
+from scipy.linalg.lapack import dgbsv
 
 from pikanid.approximators import Array
 from pikanid.approximators.bspline import BSpline
@@ -49,10 +50,22 @@ def transfer(old: Functional, new: Functional, point: Point) -> Point:
             coarse = before.approximators[i]
             assert isinstance(coarse, BSpline) and isinstance(fine, BSpline)
             own = point.coefficients[r][before.physics.tops[i].part]
-            values = coarse.values(fine.greville, own)
-            pieces.append(make_interp_spline(fine.greville, values, fine.degree, t=fine.knots).c)
+            sites = fine.greville
+            pieces.append(_interpolated(fine, sites, coarse.values(sites, own)))
         coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
     return Point(tuple(coefficients), point.theta)
+
+
+def _interpolated(spline: BSpline, t: Array, values: Array) -> Array:
+    """Coefficients (n,) of the spline through values (n,) at as many times t, a banded system."""
+    first, local = spline.local(t)
+    k = spline.degree
+    matrix, columns = np.zeros((3 * k + 1, t.size)), first[:, None] + np.arange(k + 1)
+    matrix[2 * k + np.arange(t.size)[:, None] - columns, columns] = local
+    _, _, coefficients, info = dgbsv(k, k, matrix, values)
+    if info:
+        raise np.linalg.LinAlgError("the sites do not determine the spline")
+    return coefficients
 
 
 def _first_state(functional: Functional, chain: int) -> int:

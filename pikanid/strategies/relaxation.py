@@ -174,7 +174,7 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
         finer = setup.functional(grid).with_scale(coarse.scale)
         system = BandedSystem(finer)
         outcome = gauss_newton(system, transfer(coarse, finer, before.at.point), lam,
-                               setup.problem.lower, setup.problem.upper)
+                               system.lower, system.upper)
         stages.append(replace(_stage(system, lam, outcome),
                               std=standard_errors(system, outcome)))
         gap = moved(before.at.point.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
@@ -226,7 +226,6 @@ def _best_path(system: BandedSystem, point: Point, plans: Sequence[Schedule],
 def follow(system: BandedSystem, point: Point,
            plan: Schedule) -> tuple[list[Stage], Outcome, list[str]]:
     """Warm up at the first λ, then minimise at every λ that the schedule names."""
-    problem = system.functional.problem
     stages: list[Stage] = []
     outcomes: list[Outcome] = []
     lam = plan.next(stages)
@@ -235,7 +234,7 @@ def follow(system: BandedSystem, point: Point,
         point = gauss_newton(system, point, lam, point.theta, point.theta,
                              iterations=plan.warmup).at.point
     while lam is not None:
-        outcomes.append(gauss_newton(system, point, lam, problem.lower, problem.upper,
+        outcomes.append(gauss_newton(system, point, lam, system.lower, system.upper,
                                      iterations=MAX_ITERATIONS))
         point = outcomes[-1].at.point
         stages.append(_stage(system, lam, outcomes[-1]))
