@@ -131,5 +131,6 @@ class Case:
 
 
 def note_outliers(count: int, where: str, notes: list[str]) -> None:
+    """Add a sentence about outliers that were left out to the notes, if there were any."""
     if count:
         notes.append(f"{count} more outliers of {where} show beside a fit and are left out.")

@@ -26,7 +26,9 @@ NARROW = 0.03  # of the swing: a loop no wider is dry friction that gives a litt
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
 WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
 PREDICTED = 8  # hypotheses of which that is found out
-ADEQUATE = 0.01  # p-value below which a hypothesis leaves something unexplained
+# p-value below which a hypothesis leaves something unexplained: asked on both recordings, it
+# refuses one right hypothesis in a hundred
+ADEQUATE = 0.005
 Test = Callable[[Hypothesis], Detection]
 Predict = Callable[[Hypothesis], HeldOut | None]
 
