@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.mismatch.experiments import next_experiment
+from pikanid.mismatch.experiments import TELLS_APART, NextExperiment, next_experiment
 from pikanid.mismatch.profiles import profiles
 from pikanid.mismatch.result import Explanation, Verdict
 from pikanid.mismatch.whitened import Records
+from pikanid.model import Model
+from pikanid.model_parts import Input
 
 LONGEST = 20.0  # [s] of a profile that is proposed
 COMPARED = 2  # of the hypotheses in a set, the most probable
@@ -47,19 +49,33 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     """The profile that best tells the most probable hypotheses apart."""
     model = given[0].model
     driven = [i for i in model.inputs if i.default is None]
-    sigma = {o: level.sigma for o, level in records.levels[0].items()}
     names = [e.title for e in given]
     text = f"To tell {' from '.join(names)}: "
     if len(driven) != 1 or not rate > 0:
         return text + "let it swing freely from amplitudes at least three times apart, and long."
-    try:
-        offered = profiles(
-            min(rate / (2 * np.pi), 5.0), duration=LONGEST, channel=driven[0].name,
-            unit=driven[0].unit, draws=1)
-        found = next_experiment({e.title: e.model for e in given}, records.recordings, sigma,
-                                offered, workers=workers)
-    except errors.PikanidError:
-        return text + "no profile within the bounds of the drive could be planned."
-    outcome = (f"expected to set them {found.value:.2g} standard deviations apart (now "
-               f"{found.before:.2g}; repeating the last experiment, {found.repeated:.2g})")
+    found = _best({e.title: e.model for e in given}, records, driven[0], rate, workers)
+    if found is None:
+        return text + "choose another excitation; of the usual ones none can be simulated with all."
+    apart = f"{found.value:.2g} standard deviations apart"
+    if found.value < TELLS_APART:
+        return (f"No usual profile tells {' from '.join(names)} (at best {apart}): only a larger "
+                "stroke, less noise or a second sensor would.")
+    outcome = (f"expected to set them {apart} (now {found.before:.2g}; repeating the last "
+               f"experiment, {found.repeated:.2g})")
     return text + f"run {found.profile.name}, {outcome}. `pikanid design` writes the profile."
+
+
+def _best(models: Mapping[str, Model], records: Records, driven: Input, rate: float, workers: int
+          ) -> NextExperiment | None:
+    """The best of the usual profiles, beside what was recorded if that can be simulated with all
+    models; None where nothing can.
+    """
+    sigma = {o: level.sigma for o, level in records.levels[0].items()}
+    for recorded in (records.recordings, ()):
+        try:
+            offered = profiles(min(rate / (2 * np.pi), 5.0), duration=LONGEST,
+                               channel=driven.name, unit=driven.unit, draws=1)
+            return next_experiment(models, recorded, sigma, offered, workers=workers)
+        except errors.PikanidError:
+            continue
+    return None

@@ -1,0 +1,52 @@
+"""The sentence about what to record next."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.advice import EXPLORE, PROVE, advice
+from pikanid.mismatch.noise_level import Level
+from pikanid.mismatch.result import Explanation
+from pikanid.mismatch.whitened import Records
+
+RATE = float(np.sqrt(9.81 / 0.045))
+
+
+def explanation(title: str, term: str) -> Explanation:
+    model = pk.systems.sloshing().with_term("theta_dot", term, [pk.Parameter("a", 0.5)])
+    return cast(Explanation, SimpleNamespace(title=title, model=model))
+
+
+@pytest.fixture(scope="module")
+def records() -> Records:
+    rec = pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=0.002, seed=0)
+    level = cast(Level, SimpleNamespace(sigma=0.002))
+    return Records((rec,), ({"theta": level},))
+
+
+FRICTION = explanation("dry friction", "-a*sign(theta_dot)")
+DRAG = explanation("drag", "-a*abs(theta_dot)*theta_dot")
+
+
+@pytest.mark.slow
+def test_a_profile_that_tells_them_apart_is_proposed(records: Records) -> None:
+    text = advice("set", (FRICTION, DRAG), records, RATE, True)
+    assert text.startswith("To tell dry friction from drag: run ")
+    assert "`pikanid design`" in text
+
+
+def test_what_no_profile_tells_apart_is_said_to_be_so(records: Records) -> None:
+    twin = explanation("the same again", "-a*sign(theta_dot)")
+    text = advice("set", (FRICTION, twin), records, RATE, True)
+    assert text.startswith("No usual profile tells dry friction from the same again")
+
+
+def test_other_verdicts_have_sentences_of_their_own(records: Records) -> None:
+    assert advice("named", (FRICTION,), records, RATE, True) == ""
+    assert advice("unnamed", (), records, RATE, True) == EXPLORE
+    assert advice("unconfirmed", (FRICTION,), records, RATE, False) == PROVE
