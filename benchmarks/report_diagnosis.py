@@ -141,9 +141,9 @@ hypotheses, of the cases that the recordings could tell ("nameable": the nominal
 5 sigma away, the best rival 4 sigma). *Wrong*: an answer without the truth, of all cases. Of two
 hidden effects one may be too weak for anybody (the recording without it fits to less than 4 sigma);
 to name the other one alone is neither right nor wrong, but *wrong strictly*. A *formula* is an
-answer `symbolic:...` where the truth is in no catalogue. Noise of a case: white, coloured, with
-outliers, dropouts or quantised. Held-out RMSEs are of plain predictions: they carry the parameters'
-error. Intervals are Wilson's at 95 %.
+answer `symbolic:...` of the kind of law that is hidden, where that is in no catalogue; any other
+formula is wrong. Noise of a case: white, coloured, with outliers, dropouts or quantised. Held-out
+RMSEs are of plain predictions: they carry the parameters' error. Intervals are Wilson's at 95 %.
 """
 
 
