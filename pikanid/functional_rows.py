@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,8 +70,7 @@ class Part:
         return int(self.physics.tops[-1].part.stop)
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
+class Rows(NamedTuple):
     """Weighted residuals of a family (M, E) and their partial derivatives; None means zero."""
 
     residual: Array  # (M, E)

@@ -8,6 +8,7 @@ two knots share their columns: a stretch of them is summed up before it goes to 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +38,7 @@ class Windows:
     sizes: tuple[int, ...]  # so many of each chain: w altogether
 
 
-@dataclass(frozen=True, eq=False)
-class BandedNormal:
+class BandedNormal(NamedTuple):
     """JᵀJ and Jᵀr of one recording, the residual r as one more column beside ∂r/∂θ.
 
     Lower band (kd + 1, n), right-hand columns [border | Jᵀr] (n, b + 1), and the corner

@@ -100,15 +100,17 @@ def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
 
 
 @_compiled
-def reduce_block(right: np.ndarray, solved: np.ndarray, corner: np.ndarray, columns: np.ndarray,
-                 schur: np.ndarray, slope: np.ndarray) -> float:
-    """Add corner - rightᵀ solved, (b + 1, b + 1), to schur and slope at columns (b,).
+def reduce_block(factor: np.ndarray, right: np.ndarray, corner: np.ndarray, columns: np.ndarray,
+                 solved: np.ndarray, schur: np.ndarray, slope: np.ndarray) -> float:
+    """Fill solved (n, b + 1) with A⁻¹ right and add corner - rightᵀ solved at columns (b,).
 
-    Its part by θ goes to schur (symmetric), the last column to slope; the last entry of the product
-    is returned.  Sums of some rows are summed up in turn: the difference may be all that is left of
-    large numbers.
+    factor (kd + 1, n) is that of A.  The part by θ goes to schur (symmetric), the last column to
+    slope; the last entry of the product is returned.  Sums of some rows are summed up in turn: the
+    difference may be all that is left of large numbers.
     """
     count = right.shape[1]
+    solved[:] = right
+    substitute(factor, solved)
     total, part = np.zeros((count, count)), np.empty((count, count))
     for begin in range(0, right.shape[0], 64):
         part[:] = 0.0

@@ -174,7 +174,9 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
         probes = np.eye(rows)
     else:
         number = int(np.clip(PROBE_ROWS // rows, 2, PROBES))
-        probes = np.random.default_rng(0).choice([-1.0, 1.0], size=(rows, number))
+        probes = np.random.default_rng(0).integers(0, 2, size=(rows, number)).astype(float)
+        probes *= 2.0
+        probes -= 1.0
     theta = np.zeros((at.point.theta.size, probes.shape[1]))
     total, first = 0.0, 0
     for r, part in enumerate(functional.parts):

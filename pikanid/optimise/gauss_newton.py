@@ -9,7 +9,9 @@ inside the box.
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -17,7 +19,7 @@ from scipy.linalg import LinAlgError
 from pikanid.approximators import Array
 from pikanid.functional import Functional
 from pikanid.optimise.banded import BandedAssembler, BandedNormal
-from pikanid.optimise.cholesky import factor_band, solve_band, solve_positive
+from pikanid.optimise.cholesky import factor_band, solve_positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +30,7 @@ class Point:
     theta: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Eliminated:
+class Eliminated(NamedTuple):
     """One recording's normal equations without the held coefficients: they move with θ alone."""
 
     band: Array  # (kd + 1, n - k)
@@ -126,7 +127,7 @@ class BandedSystem:
             LinAlgError: If a band or the reduced matrix is not positive definite.
         """
         from pikanid.optimise.banded_products import follow_theta, reduce_block
-        from pikanid.optimise.small_matrices import fall
+        from pikanid.optimise.small_matrices import fall, free_minimum
 
         theta, b = at.point.theta, at.point.theta.size
         schur, slope, promised = np.zeros((b, b)), np.zeros(b), 0.0
@@ -137,12 +138,17 @@ class BandedSystem:
                 band, corner = band.copy(order="F"), corner.copy()
                 band[0] *= 1.0 + damping
                 corner[np.diag_indices(columns.size)] *= 1.0 + damping
-            solved = solve_band(factor_band(band), block.right)
-            promised += reduce_block(block.right, solved, corner, columns, schur, slope)
+            solved = np.empty(block.right.shape)
+            promised += reduce_block(factor_band(band), block.right, corner, columns, solved,
+                                     schur, slope)
             solutions.append(solved)
             inner.append(solved[:, :-1])
-        change = box_minimum(schur, slope, lower - theta, upper - theta)
-        promised += fall(schur, slope, change)
+        change = np.empty(b)
+        gain = free_minimum(schur, slope, theta, lower, upper, change)
+        if math.isnan(gain):  # seldom: a bound is met
+            change = box_minimum(schur, slope, lower - theta, upper - theta)
+            gain = fall(schur, slope, change)
+        promised += gain
         moves = []
         for columns, order, solved in zip(self.columns, self.orders, solutions, strict=True):
             # Held coefficients, the first, are set from the initial state afterwards, exactly.
@@ -185,8 +191,8 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
     from pikanid.optimise.small_matrices import free_minimum
 
     change = np.empty(slope.size)
-    if free_minimum(matrix, slope, lower, upper, change):  # nearly always: no bound is met
-        return change
+    if not math.isnan(free_minimum(matrix, slope, np.zeros(slope.size), lower, upper, change)):
+        return change  # nearly always: no bound is met
     diagonal = matrix.diagonal()
     # A parameter without influence here (damping of a body at rest) stays where it is.
     bound = (lower >= upper) | (diagonal == 0.0)
@@ -259,7 +265,7 @@ def gauss_newton(system: BandedSystem, point: Point, lam: float, lower: Array, u
             return Outcome(at, damped_step(system, at, lower, upper, 0.0), done, False)
         for _ in range(20):
             trial = system.linearise(system.moved(at.point, step), lam)
-            if np.isfinite(trial.cost) and trial.cost <= at.cost - 1e-4 * step.promised:
+            if math.isfinite(trial.cost) and trial.cost <= at.cost - 1e-4 * step.promised:
                 break
             damping = max(1e-4, 8.0 * damping)
             step = damped_step(system, at, lower, upper, damping)

@@ -45,33 +45,6 @@ def scaled_factor(matrix: np.ndarray, which: np.ndarray, root: np.ndarray,
 
 
 @_compiled
-def free_minimum(matrix: np.ndarray, slope: np.ndarray, lower: np.ndarray, upper: np.ndarray,
-                 change: np.ndarray) -> bool:
-    """Fill change (b,) with the minimum of ½dᵀMd + sᵀd; False unless it lies inside the box.
-
-    False too where the matrix is not positive definite or lower < upper does not hold.
-    """
-    size = slope.size
-    root, factor = np.empty(size), np.empty((size, size))
-    if not ((lower < upper).all() and scaled_factor(matrix, np.arange(size), root, factor)):
-        return False
-    for i in range(size):
-        change[i] = -slope[i] / root[i]
-        for k in range(i):
-            change[i] -= factor[i, k] * change[k]
-        change[i] /= factor[i, i]
-    for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
-            change[i] -= factor[k, i] * change[k]
-        change[i] /= factor[i, i]
-    inside = True
-    for i in range(size):
-        change[i] /= root[i]
-        inside = inside and lower[i] <= change[i] <= upper[i]
-    return inside
-
-
-@_compiled
 def fall(matrix: np.ndarray, slope: np.ndarray, change: np.ndarray) -> float:
     """By how much dᵀMd + 2sᵀd lies below zero at a change d (b,)."""
     total = 0.0
@@ -81,6 +54,33 @@ def fall(matrix: np.ndarray, slope: np.ndarray, change: np.ndarray) -> float:
             bent += matrix[i, j] * change[j]
         total -= change[i] * bent
     return total
+
+
+@_compiled
+def free_minimum(matrix: np.ndarray, slope: np.ndarray, theta: np.ndarray, lower: np.ndarray,
+                 upper: np.ndarray, change: np.ndarray) -> float:
+    """Fill change (b,) with the minimum of ½dᵀMd + sᵀd; by how much dᵀMd + 2sᵀd falls there.
+
+    NaN unless θ + d lies inside the box, lower < upper holds and the matrix is positive definite.
+    """
+    size = slope.size
+    root, factor = np.empty(size), np.empty((size, size))
+    if not ((lower < upper).all() and scaled_factor(matrix, np.arange(size), root, factor)):
+        return np.nan
+    for i in range(size):
+        change[i] = -slope[i] / root[i]
+        for k in range(i):
+            change[i] -= factor[i, k] * change[k]
+        change[i] /= factor[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            change[i] -= factor[k, i] * change[k]
+        change[i] /= factor[i, i]
+    for i in range(size):
+        change[i] /= root[i]
+        if not lower[i] - theta[i] <= change[i] <= upper[i] - theta[i]:
+            return np.nan
+    return fall(matrix, slope, change)
 
 
 @_compiled
