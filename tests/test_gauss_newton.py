@@ -15,7 +15,7 @@ from pikanid.optimise.covariance import (
     effective_parameters,
     error_bound,
     invert,
-    reduced_matrix,
+    respond,
     theta_covariance,
 )
 from pikanid.optimise.gauss_newton import BandedSystem, Point, box_minimum, gauss_newton
@@ -89,12 +89,17 @@ def test_sandwich_and_effective_parameters(name: str) -> None:
     bread = np.linalg.inv(jacobian.T @ jacobian)
     noise = 0.5 + np.arange(functional.n_data) / functional.n_data
     wanted = (bread @ (data.T * noise**2) @ data @ bread)[-size:, -size:]
+    response = respond(system, at, step)
     sandwich, naive = theta_covariance(system, at, step, [noise])
+    for again, once in zip(theta_covariance(system, at, step, [noise], response),
+                           (sandwich, naive), strict=True):
+        assert np.array_equal(again, once)
     assert np.allclose(sandwich, wanted, rtol=1e-5, atol=1e-9 * np.abs(wanted).max())
     assert np.allclose(naive, bread[-size:, -size:] * np.mean(noise**2), rtol=1e-5)
     bound = error_bound(system, at, step, [noise])
     assert np.all(bound >= np.sqrt(np.diag(sandwich))) and np.all(np.isfinite(bound))
     used = effective_parameters(system, at, step)
+    assert used == effective_parameters(system, at, step, response)
     assert used == pytest.approx(np.trace(data @ bread @ data.T), rel=1e-6)
 
 
@@ -111,7 +116,7 @@ def test_reduced_matrix_at_a_large_lambda(name: str) -> None:
     triangle = np.linalg.qr(jacobian / np.linalg.norm(jacobian, axis=0), mode="r")
     corner = triangle[-size:, -size:] * np.linalg.norm(jacobian[:, -size:], axis=0)
     wanted = np.sqrt(np.diag(np.linalg.inv(corner.T @ corner)))
-    reduced = reduced_matrix(system, found.at, found.step)
+    reduced = respond(system, found.at, found.step).reduced
     got, naive = (np.sqrt(np.diag(np.linalg.inv(m))) for m in (reduced, found.step.schur))
     assert np.abs(got / wanted - 1).max() < 1e-7
     assert np.abs(naive / wanted - 1).max() > 1e-7

@@ -7,6 +7,7 @@ covariance Σ, Cov = Zᵀ J_dᵀ Σ J_d Z, Z the θ columns of M⁻¹ (White, Ec
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,19 +25,21 @@ PROBE_ROWS = 100_000  # fewer probes for longer records, where the trace hardly 
 
 
 def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
-                     noise: Sequence[Array | float]) -> tuple[Array, Array]:
+                     noise: Sequence[Array | float],
+                     response: Response | None = None) -> tuple[Array, Array]:
     """Sandwich and naive covariance of θ, (b, b) each.
 
     `noise` is the standard deviation of the rows of each data family, recording after recording.
     Parameters at a bound count as known: their rows and columns are zero.  One without influence
     has an infinite variance.  The naive covariance, the θ block of M⁻¹ times the mean noise
-    variance, counts physics as data.
+    variance, counts physics as data.  A `response` at the point is not worked out again.
     """
     inside = inside_bounds(system, at)
     bread = invert(step.schur, inside)
     meat = np.zeros_like(bread)
     variance, count = 0.0, 0
-    for jacobian, deviation in zip(data_response(system, at, step), noise, strict=True):
+    jacobians = data_response(system, at, step) if response is None else response.data
+    for jacobian, deviation in zip(jacobians, noise, strict=True):
         rows = jacobian.shape[0]
         if isinstance(deviation, float):
             meat += deviation**2 * (jacobian.T @ jacobian)
@@ -99,29 +102,51 @@ def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[A
     for r, part in enumerate(functional.parts):
         follow = following(system, at, step, r)
         rows = functional.data_rows(r, at.point.coefficients[r], at.point.theta)
-        for sites, row in zip(part.data, rows, strict=True):
-            full = np.zeros((sites.t.size, at.point.theta.size))
-            full[:, system.columns[r]] = family_response(sites, row, follow)[0]
-            responses.append(full)
+        responses += [
+            _spread(family_response(sites, row, follow)[0], system.columns[r], at.point.theta.size)
+            for sites, row in zip(part.data, rows, strict=True)]
     return responses
 
 
-def reduced_matrix(system: BandedSystem, at: Linearisation, step: Step) -> Array:
-    """RᵀR (b, b), R the derivative of all rows by θ, the coefficients following θ.
+class Response(NamedTuple):
+    """How the rows of Eq. (2) change with θ at a point, the coefficients following θ."""
 
-    It is what `step.schur` is, which is left over from large numbers where λ is large: at 1e8 that
-    may cost the standard errors their fourth digit.  Here the rows cancel before they are squared,
-    and an error in how the coefficients follow counts only by its square (it is a minimum).
+    reduced: Array  # RᵀR (b, b), R the derivative of all rows
+    data: list[Array]  # derivative (N, b) of every weighted data family
+    rows: list[list[Rows]]  # the data families themselves, a recording each
+
+
+def respond(system: BandedSystem, at: Linearisation, step: Step) -> Response:
+    """All rows and their derivatives by θ, each worked out once.
+
+    `reduced` is what `step.schur` is, which is left over from large numbers where λ is large: at
+    1e8 that may cost the standard errors their fourth digit.  Here the rows cancel before they are
+    squared, and an error in how the coefficients follow counts only by its square (it is a
+    minimum).
     """
     functional = system.functional
-    reduced = np.zeros_like(step.schur)
-    for r, columns in enumerate(system.columns):
-        follow = following(system, at, step, r)
+    found = Response(np.zeros_like(step.schur), [], [])
+    for r, (part, columns) in enumerate(zip(functional.parts, system.columns, strict=True)):
+        follow, square = following(system, at, step, r), (columns[:, None], columns)
         rows = functional.rows(r, at.point.coefficients[r], at.point.theta, at.lam)
-        for sites, row in zip(system.families[r], rows, strict=True):
-            for response in family_response(sites, row, follow):
-                reduced[columns[:, None], columns] += response.T @ response
-    return reduced
+        count = len(part.data)
+        for k, (sites, row) in enumerate(zip(system.families[r], rows, strict=True)):
+            responses = family_response(sites, row, follow)
+            for response in responses:
+                found.reduced[square] += response.T @ response
+            if k < count:
+                found.data.append(_spread(responses[0], columns, at.point.theta.size))
+        found.rows.append(rows[:count])
+    return found
+
+
+def _spread(response: Array, columns: NDArray[np.int64], size: int) -> Array:
+    """A recording's derivatives (N, b_r) in the columns of θ that it knows, the others zero."""
+    if columns.size == size:  # in order, all of them
+        return response
+    full = np.zeros((response.shape[0], size))
+    full[:, columns] = response
+    return full
 
 
 def following(system: BandedSystem, at: Linearisation, step: Step, r: int) -> Array:
@@ -161,7 +186,8 @@ def _met(sites: Sites, rows: Rows, e: int = 0) -> Iterator[tuple[Table, Array]]:
         yield sites.tops[e], rows.by_top[:, e]
 
 
-def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) -> float:
+def effective_parameters(system: BandedSystem, at: Linearisation, step: Step,
+                         response: Response | None = None) -> float:
     """tr(J_d M⁻¹ J_dᵀ): how many parameters' worth of the data the fit has used up.
 
     Exact for up to 300 samples, else from at most 32 fixed random probes (Hutchinson, 1990).
@@ -173,7 +199,7 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
     if rows <= EXACT_UP_TO:
         probes = np.eye(rows)
     else:
-        number = int(np.clip(PROBE_ROWS // rows, 2, PROBES))
+        number = min(max(PROBE_ROWS // rows, 2), PROBES)
         probes = np.random.default_rng(0).integers(0, 2, size=(rows, number)).astype(float)
         probes *= 2.0
         probes -= 1.0
@@ -181,11 +207,11 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) ->
     total, first = 0.0, 0
     for r, part in enumerate(functional.parts):
         columns, block = system.columns[r], at.blocks[r]
-        coefficients = at.point.coefficients[r]
         pulled = np.zeros((part.n_coefficients, probes.shape[1]))
         pulled_theta = np.zeros((columns.size, probes.shape[1]))
-        for sites, row in zip(part.data, functional.data_rows(
-                r, coefficients, at.point.theta), strict=True):
+        own = response.rows[r] if response is not None else functional.data_rows(
+            r, at.point.coefficients[r], at.point.theta)
+        for sites, row in zip(part.data, own, strict=True):
             assert row.by_theta is not None
             probe = probes[first:first + sites.t.size]
             first += sites.t.size

@@ -19,7 +19,7 @@ from pikanid.functional import Functional, bind
 from pikanid.optimise.covariance import (
     effective_parameters,
     error_bound,
-    reduced_matrix,
+    respond,
     theta_covariance,
 )
 from pikanid.optimise.gauss_newton import (
@@ -262,10 +262,11 @@ def conclude(setup: Setup, grid: Discretisation, system: BandedSystem, outcome: 
               stages: list[Stage], notes: list[str]) -> RelaxedFit:
     """Covariances and effective parameters at the end of a fit."""
     at, step = outcome.at, outcome.step
-    step = replace(step, schur=reduced_matrix(system, at, step))
-    effective = effective_parameters(system, at, step)
+    response = respond(system, at, step)
+    step = replace(step, schur=response.reduced)
+    effective = effective_parameters(system, at, step, response)
     noise = row_noise(system.functional, at, effective)
-    sandwich, naive = theta_covariance(system, at, step, noise)
+    sandwich, naive = theta_covariance(system, at, step, noise, response)
     return RelaxedFit(setup.problem, at.point.theta, sandwich, naive, at.point.coefficients,
                       system.functional, grid, stages[-1].lam, tuple(stages), at.data_cost,
                       at.physics_cost, effective, outcome.converged, tuple(notes))
