@@ -239,8 +239,8 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
                 heavy = np.full((1, len(chains.root)), START_WEIGHT)
                 start = Sites.of(at, experiment.inputs(at), heavy, states(at))
             else:
-                held = grip[0]
-                hold = grip[1] @ np.eye(len(chains.root))[np.lexsort((chains.order, chains.root))]
+                held, hold = grip[0], np.empty_like(grip[1])
+                hold[:, np.lexsort((chains.order, chains.root))] = grip[1]
         parts.append(Part(own, tuple(data), physics, start, held, hold))
     return Functional(problem, vector_field, chains, tuple(parts), np.ones(len(chains.top)),
                       weighted)

@@ -167,14 +167,16 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
     for approximator, length in zip(approximators, lengths, strict=True):
         if not is_linear(approximator):
             return None
-        windows = [_window(approximator, at, q) for q in range(length)]
-        rows = np.array([values[0] for _, values in windows])
-        size, beyond = np.abs(rows), np.arange(rows.shape[1]) > np.arange(length)[:, None]
-        if ((size * beyond).max(axis=1) > 1e-9 * size.max(axis=1)).any() or any(
-                [first[0] for first, _ in windows]):
-            return None
+        rows = []
+        for q in range(length):
+            first, values = _window(approximator, at, q)
+            row = values[0].tolist()
+            sizes = [abs(value) for value in row]
+            if first[0] or max(sizes[q + 1:], default=0.0) > 1e-9 * max(sizes):
+                return None
+            rows.append(row[:length])
         held.append(offset + np.arange(length))
-        blocks.append(np.linalg.inv(rows[:, :length]))
+        blocks.append(np.linalg.inv(np.array(rows)))
         offset += approximator.n_basis
     size = sum(lengths)
     matrix, at_row = np.zeros((size, size)), 0

@@ -14,7 +14,7 @@ from scipy.linalg import LinAlgError
 from scipy.linalg.blas import dsbmv
 
 from pikanid.approximators import Array
-from pikanid.optimise.cholesky import factor_band, solve_band
+from pikanid.optimise.cholesky import factor_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, gauss_newton
 
 # The splines use all that they can of the data once a decade adds less than this share to it.
@@ -78,10 +78,10 @@ class Pencil:
         generator = np.random.default_rng(0)
         for size, only, all_ in zip(sizes, data.blocks, both.blocks, strict=True):
             probe = generator.choice([-1.0, 1.0], size=(size, number))
-            right, rough = np.empty((size, number + 1)), np.zeros((size, number + 1))
+            right = np.empty((size, number + 1))
             right[:, :-1], right[:, -1] = multiply(only.band, probe), -only.slope
-            rough[:, -1] = only.slope - all_.slope
-            self.blocks.append((only, all_.band - only.band, right, rough, probe / number))
+            self.blocks.append((only, all_.band - only.band, right, only.slope - all_.slope,
+                                probe / number))
 
     def search(self, ridge: float) -> Score | None:
         """The least score, by decades and then half a decade beside it.
@@ -107,13 +107,19 @@ class Pencil:
 
     def at(self, rho: float, most: float = 0.8) -> Score | None:
         """None where the system is singular or more than `most` of the data is used."""
+        from pikanid.optimise.banded_products import substitute
+
         effective, residual = 0.0, self.cost
         for only, band, right, rough, probe in self.blocks:
+            lifted = rho * band
+            lifted += only.band
             try:
-                factor = factor_band(only.band + rho * band)
+                factor = factor_band(lifted)
             except LinAlgError:
                 return None
-            solved = solve_band(factor, right + rho * rough)
+            solved = right.copy()
+            solved[:, -1] += rho * rough
+            substitute(factor, solved)
             effective += float(np.vdot(probe, solved[:, :-1]))
             step = solved[:, -1]
             residual += float(step @ (2.0 * only.slope + _product(only.band, step)))
