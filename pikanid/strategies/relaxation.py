@@ -175,8 +175,7 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
         system = BandedSystem(finer)
         outcome = gauss_newton(system, transfer(coarse, finer, before.at.point), lam,
                                system.lower, system.upper)
-        stages.append(replace(_stage(system, lam, outcome),
-                              std=standard_errors(system, outcome)))
+        stages.append(_stage(system, lam, outcome, standard_errors(system, outcome)))
         gap = moved(before.at.point.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
         if gap > GRID_MISLED or not outcome.converged:
             system, stages, outcome, notes = _from_data(setup, grid, plans)
@@ -251,11 +250,14 @@ def follow(system: BandedSystem, point: Point,
     return stages[:kept + 1], outcomes[kept], notes
 
 
-def _stage(system: BandedSystem, lam: float, outcome: Outcome) -> Stage:
-    noise = row_noise(system.functional, outcome.at, outcome.at.point.theta.size)
-    return Stage(lam, outcome.at.point.theta,
-                 error_bound(system, outcome.at, outcome.step, noise), outcome.at.data_cost,
-                 outcome.at.physics_cost, outcome.iterations, outcome.converged)
+def _stage(system: BandedSystem, lam: float, outcome: Outcome, std: Array | None = None) -> Stage:
+    """A stage with the given standard errors, or else a bound of them."""
+    at = outcome.at
+    if std is None:
+        noise = row_noise(system.functional, at, at.point.theta.size)
+        std = error_bound(system, at, outcome.step, noise)
+    return Stage(lam, at.point.theta, std, at.data_cost, at.physics_cost, outcome.iterations,
+                 outcome.converged)
 
 
 def conclude(setup: Setup, grid: Discretisation, system: BandedSystem, outcome: Outcome,
