@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from random import Random
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -14,7 +16,10 @@ from pikanid import errors
 from pikanid.concealed import signals
 from pikanid.held import HeldInput, acting
 from pikanid.mismatch.catalogue import candidates
+from pikanid.mismatch.noise_level import Level
 from pikanid.mismatch.site import sites
+from pikanid.mismatch.tangent import directions
+from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model_parts import Hold, Parameter
 from pikanid.problem import bind
 from pikanid.simulation.interpreted import Interpreted
@@ -133,3 +138,17 @@ def test_recorded_rates_below_the_limit_change_nothing() -> None:
     plain = pk.systems.sloshing().map_input("u_x", hold="first")
     found, expected = (pk.simulate(m, rec, sigma=0.0)["theta"].values for m in (model, plain))
     assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_play_wider_than_the_input_leaves_nothing_to_look_for_in_it() -> None:
+    level = cast(Level, SimpleNamespace(sigma=0.002, whiten=lambda r, t: r))
+    records = Records((pk.simulate(loose(), wandering(), sigma=0.002, seed=1),),
+                      ({"theta": level},))
+    model = loose().with_values(b=9.0)
+    whitened = Whitened(model, records)
+    theta = whitened.problem.guess
+    assert whitened.choose_steps(theta)
+    found = directions(whitened, theta, candidates(sites(pk.systems.sloshing(),
+                                                         records.recordings)))
+    at = [k for k, c in enumerate(found.candidates) if c.ids[0] == "input_gain"]
+    assert not np.any(found.D[:, np.isin(found.owner, at)])

@@ -110,7 +110,7 @@ def soft_saturation(site: Site) -> list[Candidate]:
             top = float(np.abs(view.u[u]).max())
             return [Sign({k.name: s / top}, push={u: np.tanh(s * view.u[u] / top) * top / s
                                                  - view.u[u]},
-                         one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)]
+                         one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)] if top else []
 
         found.append(Candidate(("soft_saturation",), "an input limited softly", text, "input", site,
                                (k,), _through(u, text), signs, known=False))

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pikanid.evaluated import paths
 from pikanid.expressions import symbol
 from pikanid.held import HeldInput
 from pikanid.mismatch.candidate import Candidate, Sign, View
 from pikanid.mismatch.whitened import Whitened
 from pikanid.model import Model
 from pikanid.recording import Recording
+from pikanid.simulation.input_paths import combined
 from pikanid.simulation.vectorfield import VectorField
 
 TOGETHER = 100  # signs integrated at once
@@ -120,6 +122,8 @@ class Tangent:
                 c = recording[name]
                 if np.all(np.isfinite(c.values)):
                     extra[name] = HeldInput(name, c.time, c.values, "zero").at(self.t)
+        nominal = self.simulator.model
+        acting = combined(nominal, self.u, *paths(nominal, self.p))
         force = {}
         for name in self.model.free_names:
             k = self.model.parameter_names.index(name)
@@ -129,7 +133,7 @@ class Tangent:
                 force[name] = self.fp[:, touched[0], k] * self.p[k]
         return View(self.t, {s: self.x[:, i] for i, s in enumerate(names)},
                     {s: f[:, i] for i, s in enumerate(names)},
-                    {h.name: self.u[:, j] for j, h in enumerate(held)}, extra,
+                    {h.name: acting[:, j] for j, h in enumerate(held)}, extra,
                     {o.name: y[:, i] for i, o in enumerate(self.model.outputs)},
                     {o.name: rate[:, i] for i, o in enumerate(self.model.outputs)}, force)
 

@@ -67,3 +67,14 @@ def split(model: Model, held: tuple[HeldInput, ...], halves: np.ndarray, rates: 
         added += [part for part, formula in ((side, item.backlash), (ramp, item.rate_limit))
                   if formula != 0]
     return (*own, *added)
+
+
+def combined(model: Model, U: np.ndarray, halves: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """The model's own inputs (L, m) from those of `with_parts(model)` (L, m + parts)."""
+    own, part = U[:, :len(model.inputs)].copy(), len(model.inputs)
+    for j, (item, half, rate) in enumerate(zip(model.inputs, halves, rates, strict=True)):
+        for formula, factor in ((item.backlash, half), (item.rate_limit, rate)):
+            if formula != 0:
+                own[:, j] += factor * U[:, part]
+                part += 1
+    return own
