@@ -51,11 +51,12 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
     chosen = [c for c in candidates if not (several and c.per_recording)]
     for r, response in enumerate(whitened.responses(theta, states=True)):
         line = Tangent(whitened, theta, r, response.states)
-        listed = [(k, s) for k, c in enumerate(chosen) for s in c.signs(line.view)]
-        if not kept:
-            kept = listed
-        blocks.append(whitened.whiten(r, line.columns(
-            [(chosen[k], s) for k, s in listed[:len(kept)]])))
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
+            listed = [(k, s) for k, c in enumerate(chosen) for s in c.signs(line.view)]
+            if not kept:
+                kept = listed
+            blocks.append(whitened.whiten(r, line.columns(
+                [(chosen[k], s) for k, s in listed[:len(kept)]])))
     D = np.concatenate(blocks) if blocks else np.empty((0, 0))
     return Directions(D, tuple(chosen), np.array([k for k, _ in kept], int),
                       tuple(s for _, s in kept))
