@@ -24,7 +24,7 @@ Simulation = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @njit(cache=True, error_model="numpy")
-def _numba_rk4(length, d, u, y, J):  # type: ignore[no-untyped-def]
+def _numba_rk4(length, d, u, y, J):  # type: ignore[no-untyped-def]  # numba infers
     th = om = a0 = a1 = b0 = b1 = 0.0
     for i in range(len(u)):
         xs, vs, p0, p1, q0, q1 = th, om, a0, a1, b0, b1

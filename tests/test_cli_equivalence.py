@@ -77,7 +77,7 @@ def test_a_difference_is_exit_code_3(asked: list[dict[str, object]],
     few = equivalence.run_checks
 
     def spoilt(**options: object) -> equivalence.EquivalenceReport:
-        first, *rest = few(**options).rows  # type: ignore[arg-type]
+        first, *rest = few(**options).rows  # type: ignore[arg-type]  # by name
         return equivalence.EquivalenceReport(
             (replace(first, difference=float("nan")), *rest))
 

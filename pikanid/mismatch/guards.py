@@ -1,7 +1,8 @@
 """Laws that are in no catalogue but look like entries of it.
 
-They are never named.  Where one of them explains a recording about as well as an entry does, the
-entry is not named either: |θ'|^1.5 must not be called quadratic drag, nor a soft limit a hard one.
+They are never named alone.  Where one of them explains a recording about as well as an entry does,
+it is given beside the entry; where it does far better, the entry is not named: |θ'|^1.5 must not be
+called quadratic drag, nor a soft limit a hard one.
 """
 
 from __future__ import annotations
