@@ -28,6 +28,8 @@ MODELS = {
                        "d": {"unit": "1/s", "guess": 0.05, "bounds": [0.0, 10.0]}},
         "equations": {"theta": "theta_dot", "theta_dot": "-w2*sin(theta) - d*theta_dot"},
         "outputs": {"theta": {"unit": "rad", "expression": "theta"}}},
+    # Both signals have an offset.  To a linear oscillator the two are one; it stands where it can
+    # also move the point about which a restoring force bends: at the input.
     "silverbox": {
         "name": "linear oscillator with offset",
         "states": {"x": {"unit": "V", "initial": "free"}, "v": {"unit": "V/s", "initial": "free"}},
@@ -35,9 +37,9 @@ MODELS = {
         "parameters": {"omega": {"unit": "rad/s", "guess": 400.0, "bounds": [10.0, 2000.0]},
                        "zeta": {"guess": 0.05, "bounds": [0.0, 5.0]},
                        "b": {"unit": "1/s^2", "guess": 160000.0},
-                       "y0": {"unit": "V", "guess": 0.0}},
-        "equations": {"x": "v", "v": "b*u - 2*zeta*omega*v - omega**2*x"},
-        "outputs": {"y": {"unit": "V", "expression": "x + y0"}}},
+                       "u0": {"unit": "V", "guess": 0.0}},
+        "equations": {"x": "v", "v": "b*(u + u0) - 2*zeta*omega*v - omega**2*x"},
+        "outputs": {"y": {"unit": "V", "expression": "x"}}},
     "fall": {
         "name": "free fall",
         "states": {"h": {"unit": "m", "initial": "free"}, "v": {"unit": "m/s", "initial": "free"}},
