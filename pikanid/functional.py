@@ -9,6 +9,7 @@ elimination of its leading coefficients; any other approximator is tied to them 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
@@ -36,6 +37,7 @@ Penalty = Literal["physics", "roughness"]
 # Rows for an initial state that cannot be eliminated weigh as much as data of this 1/σ: about 1e-6
 # of the units of the model's states.
 START_WEIGHT = 1e6
+ONE = np.ones(1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,7 @@ class Functional:
     @functools.cached_property
     def data_square(self) -> float:
         """Weighted sum of squares of the samples themselves."""
-        return sum(float(np.sum((sites.weight * sites.target) ** 2))
+        return sum(float(np.sum((sites.weight.T * sites.target) ** 2))
                    for part in self.parts for sites in part.data if sites.target is not None)
 
     def complete(self, r: int, coefficients: Array, theta: Array) -> Array:
@@ -129,6 +131,12 @@ class Functional:
             families.append(self._start(part.start, r, coefficients, p))
         return families
 
+    def reweighed(self, r: int, rows: Sequence[Rows], lam: float) -> list[Rows]:
+        """The families of `rows` at another λ."""
+        k = len(self.parts[r].data)
+        physics = replace(rows[k], factor=self._physics_factor(lam))
+        return [*rows[:k], physics, *rows[k + 1:]]
+
     def data_rows(self, r: int, coefficients: Array, theta: Array) -> list[Rows]:
         """The data families of recording r alone."""
         p = self.problem.parameters(theta, r)
@@ -143,21 +151,22 @@ class Functional:
 
     def _physics(self, sites: Sites, c: Array, p: Array, lam: float) -> Rows:
         values, n = sites.values(c), len(self.chains.root)
-        states, tops = values[:n].T, values[n:].T
-        weight = np.sqrt(lam) / self.scale * sites.weight
+        factor, tops = self._physics_factor(lam), values[n:]
         if self.penalty == "roughness":
-            return Rows(weight * tops, None, weight, None)
+            return Rows(sites.weight, factor, np.zeros(tops.T.shape), tops, None, None, True)
         assert sites.lines is not None
-        f, fx, fp = sites.lines(sites.t, states, sites.u, p)
-        minus = -weight[:, :, None]
-        return Rows(weight * (tops - f), minus * fx, weight, minus * fp)
+        f, fx, fp = sites.lines(sites.t, values[:n].T, sites.u, p)
+        return Rows(sites.weight, factor, f, tops, fx, fp, True)
+
+    def _physics_factor(self, lam: float) -> Array:
+        return -math.sqrt(lam) / self.scale
 
     def _start(self, sites: Sites, r: int, c: Array, p: Array) -> Rows:
         experiment = self.problem.experiments[r]
-        gap = self.states(sites, c) - experiment.initial(p)
         jacobian = experiment.initial_jacobian(p)[:, self.problem.columns(r)[0]]
-        weight = sites.weight[:, :, None]
-        return Rows(sites.weight * gap, weight * np.eye(gap.shape[1]), None, -weight * jacobian)
+        n = len(jacobian)
+        return Rows(sites.weight, np.ones(n), self.states(sites, c), experiment.initial(p)[:, None],
+                    np.eye(n)[None], -jacobian[None])
 
     def families(self, r: int) -> list[Sites]:
         """The sites of `rows`, in the same order."""
@@ -224,7 +233,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
             weight = np.empty((seen.size, 1))
             weight[:, 0] = 1.0 / sigma
             data.append(Sites.of(seen, experiment.inputs(seen), weight, states(seen), (),
-                                 samples.y[:, None], samples.output,
+                                 np.ascontiguousarray(samples.y)[None], samples.output,
                                  None if samples.sigma is None else weight[:, 0] * samples.sigma,
                                  vector_field.linearised_outputs([samples.output], free)))
         tops = tuple(Table.of(own[i], times, m, pieces[i]) for i, m in enumerate(chains.lengths))
@@ -249,8 +258,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
 def _data(sites: Sites, c: Array, p: Array) -> Rows:
     assert sites.lines is not None and sites.target is not None
     y, hx, hp = sites.lines(sites.t, sites.values(c).T, sites.u, p)
-    weight = sites.weight[:, :, None]
-    return Rows(sites.weight * (y - sites.target), weight * hx, None, weight * hp)
+    return Rows(sites.weight, ONE, y, sites.target, hx, hp)
 
 
 def _spread(samples: Samples, several: bool) -> Array | float:

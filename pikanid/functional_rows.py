@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ class Sites:
     weight: Array  # (M, E): square root of the quadrature weight, or 1/σ
     states: tuple[Table, ...]  # one per state
     tops: tuple[Table, ...] = ()  # highest derivative of each approximator: E of them
-    target: Array | None = None  # (M, 1): the samples
+    target: Array | None = None  # (1, M): the samples
     output: int = 0  # which output they are samples of
     deviation: Array | None = None  # (M,): of the weighted samples, where σ is known
     lines: Linearised | None = None  # the model's formulas at the sites
@@ -70,13 +70,44 @@ class Part:
         return int(self.physics.tops[-1].part.stop)
 
 
-class Rows(NamedTuple):
-    """Weighted residuals of a family (M, E) and their partial derivatives; None means zero."""
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Residuals of a family, factor·weight·(value - target), and what their derivatives consist of.
 
-    residual: Array  # (M, E)
-    by_state: Array | None  # (M, E, n)
-    by_top: Array | None  # (M, E): residual e depends on the top of approximator e alone
-    by_theta: Array | None  # (M, E, b): columns `problem.columns(r)`
+    Kept in these pieces, so that another λ changes nothing but `factor`; None means zero.
+    """
+
+    weight: Array  # (M, E)
+    factor: Array  # (E,)
+    value: Array  # (M, E)
+    target: Array  # (E, M): the samples, or the tops
+    state_slopes: Array | None  # (M, E, n): of `value`
+    theta_slopes: Array | None  # (M, E, b): of `value`, columns `problem.columns(r)`
+    topped: bool = False  # target e is the top of approximator e
+
+    @functools.cached_property
+    def _scale(self) -> Array:
+        return self.factor * self.weight
+
+    @functools.cached_property
+    def residual(self) -> Array:
+        """Weighted residuals (M, E)."""
+        return self._scale * (self.value - self.target.T)
+
+    @functools.cached_property
+    def by_state(self) -> Array | None:
+        """Derivative of the residuals by the states (M, E, n)."""
+        return None if self.state_slopes is None else self._scale[:, :, None] * self.state_slopes
+
+    @functools.cached_property
+    def by_top(self) -> Array | None:
+        """Derivative (M, E) of residual e by the top of approximator e; it knows no other."""
+        return -self._scale if self.topped else None
+
+    @functools.cached_property
+    def by_theta(self) -> Array | None:
+        """Derivative of the residuals by θ (M, E, b), columns `problem.columns(r)`."""
+        return None if self.theta_slopes is None else self._scale[:, :, None] * self.theta_slopes
 
 
 def by_coefficients(sites: Sites, rows: Rows, c: Array) -> sparse.csr_array:

@@ -90,27 +90,3 @@ def weigh_all(first: np.ndarray, local: np.ndarray, offset: np.ndarray, width: n
             for a in range(width[k]):
                 total += local[place + a] * c[at + a]
             out[k, m] = total
-
-
-@_compiled
-def add_weighed(first: np.ndarray, local: np.ndarray, weight: np.ndarray, c: np.ndarray,
-                out: np.ndarray) -> None:
-    """out[m] += weight[m] Σ_a local[m, a] c[first[m] + a], for rows out (M, q) and c (n, q)."""
-    for m in range(first.size):
-        at = first[m]
-        for a in range(local.shape[1]):
-            share = weight[m] * local[m, a]
-            for k in range(out.shape[1]):
-                out[m, k] += share * c[at + a, k]
-
-
-@_compiled
-def scatter_weighed(first: np.ndarray, local: np.ndarray, weight: np.ndarray, rows: np.ndarray,
-                    out: np.ndarray) -> None:
-    """out[first[m] + a] += weight[m] local[m, a] rows[m], for rows (M, q) and out (n, q)."""
-    for m in range(first.size):
-        at = first[m]
-        for a in range(local.shape[1]):
-            share = weight[m] * local[m, a]
-            for k in range(rows.shape[1]):
-                out[at + a, k] += share * rows[m, k]

@@ -7,6 +7,7 @@ two knots share their columns: a stretch of them is summed up before it goes to 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,8 +19,9 @@ from pikanid.functional import Part, Rows, Sites
 
 Ints = NDArray[np.int64]
 
-# Derivatives that are zero, in the form that the compiled sums take.
-NO_SLOPES, NO_TOPS = np.zeros((0, 0, 0)), np.zeros((0, 0))
+# Slopes that are zero, in the form that the compiled sums take.
+NO_SLOPES = np.zeros((0, 0, 0))
+
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
@@ -70,7 +72,7 @@ class BandedAssembler:
             int((own.columns.max(axis=1) - own.columns.min(axis=1)).max())
             for own in self.stretches])
 
-    def normal(self, rows: list[Rows]) -> BandedNormal:
+    def normal(self, rows: Sequence[Rows]) -> BandedNormal:
         """Assemble JᵀJ and Jᵀr from the residual families."""
         from pikanid.optimise.banded_products import add_products
 
@@ -79,12 +81,16 @@ class BandedAssembler:
         costs = np.zeros(len(rows))
         for k, (own, bases, windows, row) in enumerate(
                 zip(self.stretches, self.bases, self.windows, rows, strict=True)):
-            add_products(row.residual, NO_SLOPES if row.by_state is None else row.by_state,
-                         NO_TOPS if row.by_top is None else row.by_top,
-                         NO_SLOPES if row.by_theta is None else row.by_theta,
-                         bases.local, bases.offset, bases.width, windows.at,
-                         own.starts, own.columns, kd, whole, corner, costs[k:k + 1])
+            add_products(row.weight, row.factor, row.value, row.target, slopes(row.state_slopes),
+                         slopes(row.theta_slopes), row.topped, bases.local, bases.offset,
+                         bases.width, windows.at, own.starts, own.columns, kd, whole, corner,
+                         costs[k:k + 1])
         return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs.tolist()))
+
+
+def slopes(given: Array | None) -> Array:
+    """Slopes (M, E, k) as the compiled sums take them: k = 0 where all are zero."""
+    return NO_SLOPES if given is None else given
 
 
 def _windows(sites: Sites) -> Windows:

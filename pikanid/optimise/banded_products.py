@@ -19,14 +19,16 @@ def _compiled(function: _Function) -> _Function:
 
 
 @_compiled
-def add_products(residual: np.ndarray, by_state: np.ndarray, by_top: np.ndarray,
-                 by_theta: np.ndarray, local: np.ndarray, offset: np.ndarray, width: np.ndarray,
-                 at: np.ndarray, starts: np.ndarray, columns: np.ndarray, kd: int,
-                 whole: np.ndarray, corner: np.ndarray, cost: np.ndarray) -> None:
+def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, target: np.ndarray,
+                 by_state: np.ndarray, by_theta: np.ndarray, topped: bool, local: np.ndarray,
+                 offset: np.ndarray, width: np.ndarray, at: np.ndarray, starts: np.ndarray,
+                 columns: np.ndarray, kd: int, whole: np.ndarray, corner: np.ndarray,
+                 cost: np.ndarray) -> None:
     """Add VᵀV of a family's rows V = [∂r/∂local coefficients | ∂r/∂θ | r]; fill cost (1,), ‖r‖².
 
-    residual (M, E), by_state (M, E, n), by_top (M, E), of chain e in residual e alone, and by_theta
-    (M, E, b); empty ones count as zero.  Table k, states before tops, has its basis (M, width[k])
+    r is factor (E,) times weight (M, E) times (value (M, E) - target (E, M)); by_state (M, E, n)
+    and by_theta (M, E, b) are slopes of the value, empty ones zero; if `topped`, target e is the
+    top of chain e.  Table k, states before tops, has its basis (M, width[k])
     in local from offset[k] on, and its place among the w coefficients columns[g] (G, w) of stretch
     g, rows starts[g] to starts[g + 1], from at[k] on.  Products of the coefficients with each other
     go to the band, with the others behind it: whole (n, kd + 1 + b + 1); those of the others to
@@ -38,21 +40,22 @@ def add_products(residual: np.ndarray, by_state: np.ndarray, by_top: np.ndarray,
     for g in range(columns.shape[0]):
         gram[:] = 0.0
         for m in range(starts[g], starts[g + 1]):
-            for e in range(residual.shape[1]):
+            for e in range(value.shape[1]):
                 row[:w] = 0.0
+                scale = factor[e] * weight[m, e]
                 for s in range(states):
-                    slope = by_state[m, e, s]
+                    slope = scale * by_state[m, e, s]
                     if slope != 0.0:  # an output mostly shows one state only
                         for a in range(width[s]):
                             row[at[s] + a] += slope * local[offset[s] + m * width[s] + a]
-                if by_top.size > 0:
-                    k = at.size - by_top.shape[1] + e
+                if topped:
+                    k = at.size - value.shape[1] + e
                     for a in range(width[k]):
-                        row[at[k] + a] += by_top[m, e] * local[offset[k] + m * width[k] + a]
+                        row[at[k] + a] -= scale * local[offset[k] + m * width[k] + a]
                 for j in range(by_theta.shape[2]):
-                    row[w + j] = by_theta[m, e, j]
-                row[size - 1] = residual[m, e]
-                cost[0] += residual[m, e] ** 2
+                    row[w + j] = scale * by_theta[m, e, j]
+                row[size - 1] = scale * (value[m, e] - target[e, m])
+                cost[0] += row[size - 1] ** 2
                 for i in range(size):
                     left = row[i]
                     for j in range(i + 1):
@@ -67,6 +70,54 @@ def add_products(residual: np.ndarray, by_state: np.ndarray, by_top: np.ndarray,
         for k in range(w, size):
             for j in range(w, size):
                 corner[k - w, j - w] += gram[max(k, j), min(k, j)]
+
+
+@_compiled
+def carry(weight: np.ndarray, factor: np.ndarray, by_state: np.ndarray, by_theta: np.ndarray,
+          topped: bool, first: np.ndarray, local: np.ndarray, offset: np.ndarray,
+          width: np.ndarray, follow: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (E, M, b): derivatives of a family's residuals by θ, the coefficients following.
+
+    follow (n, b) is how they do, table k's functions at m being those from first[k, m] on; the rest
+    is as in `add_products`.
+    """
+    states, b = by_state.shape[2], out.shape[2]
+    for e in range(out.shape[0]):
+        for m in range(out.shape[1]):
+            scale = factor[e] * weight[m, e]
+            for j in range(b):
+                out[e, m, j] = scale * by_theta[m, e, j] if by_theta.size > 0 else 0.0
+            for k in range(first.shape[0]):
+                if k < states:
+                    slope = scale * by_state[m, e, k]
+                else:
+                    slope = -scale if topped and k == first.shape[0] - out.shape[0] + e else 0.0
+                if slope != 0.0:
+                    for a in range(width[k]):
+                        share = slope * local[offset[k] + m * width[k] + a]
+                        for j in range(b):
+                            out[e, m, j] += share * follow[first[k, m] + a, j]
+
+
+@_compiled
+def pull_back(weight: np.ndarray, factor: np.ndarray, by_state: np.ndarray, by_theta: np.ndarray,
+              first: np.ndarray, local: np.ndarray, offset: np.ndarray, width: np.ndarray,
+              rows: np.ndarray, out: np.ndarray, out_theta: np.ndarray) -> None:
+    """Add Jᵀ rows (M, q) of a data family to out (n, q) and, by θ, to out_theta (b, q)."""
+    for m in range(rows.shape[0]):
+        scale = factor[0] * weight[m, 0]
+        for k in range(by_state.shape[2]):
+            slope = scale * by_state[m, 0, k]
+            if slope != 0.0:
+                for a in range(width[k]):
+                    share = slope * local[offset[k] + m * width[k] + a]
+                    for j in range(rows.shape[1]):
+                        out[first[k, m] + a, j] += share * rows[m, j]
+        for i in range(by_theta.shape[2]):
+            slope = scale * by_theta[m, 0, i]
+            if slope != 0.0:
+                for j in range(rows.shape[1]):
+                    out_theta[i, j] += slope * rows[m, j]
 
 
 @_compiled

@@ -6,7 +6,7 @@ covariance Σ, Cov = Zᵀ J_dᵀ Σ J_d Z, Z the θ columns of M⁻¹ (White, Ec
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
-from pikanid.approximators.tables import Table
 from pikanid.functional import Rows, Sites
+from pikanid.optimise.banded import slopes
 from pikanid.optimise.cholesky import eigen, factor_band, whiten_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
 
@@ -98,13 +98,12 @@ def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
 
 def data_response(system: BandedSystem, at: Linearisation, step: Step) -> list[Array]:
     """Derivative (N, b) of every weighted data family by θ, the coefficients following θ."""
-    functional, responses = system.functional, []
-    for r, part in enumerate(functional.parts):
+    responses = []
+    for r, part in enumerate(system.functional.parts):
         follow = following(system, at, step, r)
-        rows = functional.data_rows(r, at.point.coefficients[r], at.point.theta)
         responses += [
             _spread(family_response(sites, row, follow)[0], system.columns[r], at.point.theta.size)
-            for sites, row in zip(part.data, rows, strict=True)]
+            for sites, row in zip(part.data, at.rows[r], strict=False)]
     return responses
 
 
@@ -113,7 +112,6 @@ class Response(NamedTuple):
 
     reduced: Array  # RᵀR (b, b), R the derivative of all rows
     data: list[Array]  # derivative (N, b) of every weighted data family
-    rows: list[list[Rows]]  # the data families themselves, a recording each
 
 
 def respond(system: BandedSystem, at: Linearisation, step: Step) -> Response:
@@ -125,18 +123,15 @@ def respond(system: BandedSystem, at: Linearisation, step: Step) -> Response:
     minimum).
     """
     functional = system.functional
-    found = Response(np.zeros_like(step.schur), [], [])
+    found = Response(np.zeros_like(step.schur), [])
     for r, (part, columns) in enumerate(zip(functional.parts, system.columns, strict=True)):
         follow, square = following(system, at, step, r), (columns[:, None], columns)
-        rows = functional.rows(r, at.point.coefficients[r], at.point.theta, at.lam)
-        count = len(part.data)
-        for k, (sites, row) in enumerate(zip(system.families[r], rows, strict=True)):
+        for k, (sites, row) in enumerate(zip(system.families[r], at.rows[r], strict=True)):
             responses = family_response(sites, row, follow)
             for response in responses:
                 found.reduced[square] += response.T @ response
-            if k < count:
+            if k < len(part.data):
                 found.data.append(_spread(responses[0], columns, at.point.theta.size))
-        found.rows.append(rows[:count])
     return found
 
 
@@ -160,39 +155,24 @@ def following(system: BandedSystem, at: Linearisation, step: Step, r: int) -> Ar
     return follow
 
 
-def family_response(sites: Sites, rows: Rows, follow: Array) -> list[Array]:
-    """Derivative (M, b) of each of a family's E residuals by θ, its coefficients following."""
-    from pikanid.approximators.local_basis import add_weighed
+def family_response(sites: Sites, rows: Rows, follow: Array) -> Array:
+    """Derivatives (E, M, b) of a family's residuals by θ, its coefficients following."""
+    from pikanid.optimise.banded_products import carry
 
-    responses = []
-    for e in range(rows.residual.shape[1]):
-        own = np.zeros((sites.t.size, follow.shape[1]))
-        if rows.by_theta is not None:
-            own += rows.by_theta[:, e]
-        for table, slope in _met(sites, rows, e):
-            add_weighed(*table.window, slope, follow, own)
-        responses.append(own)
-    return responses
+    bases, (count, width) = sites.bases, rows.value.shape
+    assert bases is not None
+    out = np.empty((width, count, follow.shape[1]))
+    carry(rows.weight, rows.factor, slopes(rows.state_slopes), slopes(rows.theta_slopes),
+          rows.topped, bases.first, bases.local, bases.offset, bases.width, follow, out)
+    return out
 
 
-def _met(sites: Sites, rows: Rows, e: int = 0) -> Iterator[tuple[Table, Array]]:
-    """Tables that residual e of a family depends on, and the slopes (M,) by them."""
-    if rows.by_state is not None:
-        for s, table in enumerate(sites.states):
-            by_state = rows.by_state[:, e, s]
-            if by_state.any():
-                yield table, by_state
-    if rows.by_top is not None:
-        yield sites.tops[e], rows.by_top[:, e]
-
-
-def effective_parameters(system: BandedSystem, at: Linearisation, step: Step,
-                         response: Response | None = None) -> float:
+def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) -> float:
     """tr(J_d M⁻¹ J_dᵀ): how many parameters' worth of the data the fit has used up.
 
     Exact for up to 300 samples, else from at most 32 fixed random probes (Hutchinson, 1990).
     """
-    from pikanid.approximators.local_basis import scatter_weighed
+    from pikanid.optimise.banded_products import pull_back
 
     functional = system.functional
     rows = functional.n_data
@@ -209,15 +189,13 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step,
         columns, block = system.columns[r], at.blocks[r]
         pulled = np.zeros((part.n_coefficients, probes.shape[1]))
         pulled_theta = np.zeros((columns.size, probes.shape[1]))
-        own = response.rows[r] if response is not None else functional.data_rows(
-            r, at.point.coefficients[r], at.point.theta)
-        for sites, row in zip(part.data, own, strict=True):
-            assert row.by_theta is not None
-            probe = probes[first:first + sites.t.size]
-            first += sites.t.size
-            for table, by_state in _met(sites, row):
-                scatter_weighed(*table.window, by_state, probe, pulled)
-            pulled_theta += row.by_theta[:, 0].T @ probe
+        for sites, row in zip(part.data, at.rows[r], strict=False):
+            bases, count = sites.bases, sites.t.size
+            assert bases is not None
+            pull_back(row.weight, row.factor, slopes(row.state_slopes), slopes(row.theta_slopes),
+                      bases.first, bases.local, bases.offset, bases.width,
+                      probes[first:first + count], pulled, pulled_theta)
+            first += count
         pulled = pulled[system.assemblers[r].order]
         k = part.held.size
         if block.held_by_theta is not None:

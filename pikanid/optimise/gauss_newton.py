@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
-from pikanid.functional import Functional
+from pikanid.functional import Functional, Rows
 from pikanid.optimise.banded import BandedAssembler, BandedNormal
 from pikanid.optimise.cholesky import factor_band, solve_positive
 
@@ -55,6 +56,7 @@ class Linearisation:
 
     point: Point
     lam: float
+    rows: tuple[Sequence[Rows], ...]  # per recording, per family
     blocks: tuple[Eliminated, ...]
     data_costs: tuple[tuple[float, ...], ...]  # per recording, per data family
     data_cost: float  # their sum
@@ -94,20 +96,25 @@ class BandedSystem:
         other.functional = functional
         return other
 
-    def linearise(self, point: Point, lam: float) -> Linearisation:
-        """Residuals and normal equations at a point."""
+    def linearise(self, at: Point | Linearisation, lam: float) -> Linearisation:
+        """Residuals and normal equations at a point, or at another λ where they are known."""
+        point = at if isinstance(at, Point) else at.point
         blocks, data, seen, physics, cost = [], [], 0.0, 0.0, 0.0
+        families = []
         for r, (part, c) in enumerate(zip(self.functional.parts, point.coefficients, strict=True)):
-            rows = self.functional.rows(r, c, point.theta, lam)
+            rows = (self.functional.rows(r, c, point.theta, lam) if isinstance(at, Point) else
+                    self.functional.reweighed(r, at.rows[r], lam))
             normal = self.assemblers[r].normal(rows)
             held = self.functional.hold_jacobian(r, point.theta) if self.start_moves else None
+            families.append(rows)
             blocks.append(_eliminate(normal, part.held.size, held))
             count = self.counts[r]
             data.append(normal.costs[:count])
             seen += sum(normal.costs[:count])
             physics += normal.costs[count]
             cost += sum(normal.costs)
-        return Linearisation(point, lam, tuple(blocks), tuple(data), seen, physics, cost)
+        return Linearisation(point, lam, tuple(families), tuple(blocks), tuple(data), seen, physics,
+                             cost)
 
     def moved(self, point: Point, step: Step) -> Point:
         """The point after a step, held coefficients set from the initial state."""
@@ -247,15 +254,16 @@ class Outcome:
     converged: bool
 
 
-def gauss_newton(system: BandedSystem, point: Point, lam: float, lower: Array, upper: Array, *,
-                 iterations: int = 50, tolerance: float = 1e-6) -> Outcome:
-    """Minimise Eq. (2) at one λ from a point.
+def gauss_newton(system: BandedSystem, start: Point | Linearisation, lam: float, lower: Array,
+                 upper: Array, *, iterations: int = 50, tolerance: float = 1e-6) -> Outcome:
+    """Minimise Eq. (2) at one λ from a point, or from where the same system was linearised.
 
     Converged when the promised decrease is below `tolerance` of one datum's share of the cost: the
     estimate is then within √tolerance standard errors of the minimum.  Damping starts at zero and
     grows only when a step fails.
     """
-    at = system.linearise(point, lam)
+    at = start if isinstance(start, Linearisation) and start.lam == lam else (
+        system.linearise(start, lam))
     share = 1.0 / max(1, system.functional.n_data)
     nothing = NOTHING * system.functional.data_square
     damping, done = 0.0, 0

@@ -209,7 +209,7 @@ class TorchFunctional:
         return _Family(
             None if whole else torch.as_tensor(index, device=self.device), self._tensor(sites.t),
             self._tensor(sites.u), self._tensor(sites.weight),
-            None if sites.target is None else self._tensor(sites.target), sites.output)
+            None if sites.target is None else self._tensor(sites.target.T), sites.output)
 
     def _tensor(self, values: Array) -> Tensor:
         return torch.tensor(np.asarray(values, float), dtype=torch.float64, device=self.device)

@@ -46,7 +46,7 @@ class Schedule(Protocol):
         """The next λ, or None to stop."""
 
     def keep(self, past: Sequence[Stage]) -> int:
-        """Index of the stage that is the result."""
+        """Index of the stage that is the result: the last one or the one before."""
 
     def locked(self, past: Sequence[Stage]) -> bool:
         """Whether the last stage looks as if the splines could not follow the physics."""

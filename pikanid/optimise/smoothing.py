@@ -47,7 +47,8 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
 
     `system` is built on `functional.smoothing()`; θ stays.
     """
-    data, both = system.linearise(point, 0.0), system.linearise(point, 1.0)
+    data = system.linearise(point, 0.0)
+    both = system.linearise(data, 1.0)
     mass = sum(float(b.band[0].sum()) for b in data.blocks)
     rough = sum(float(b.band[0].sum()) for b in both.blocks) - mass
     if mass <= 0.0 or rough <= 0.0:
@@ -60,7 +61,7 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
         return None
     rho, _, residual, effective = chosen
     try:
-        found = gauss_newton(system, point, rho, point.theta, point.theta, iterations=10)
+        found = gauss_newton(system, both, rho, point.theta, point.theta, iterations=10)
     except LinAlgError:
         return None
     sigma = float(np.sqrt(max(residual, 0.0) / max(count - effective, 1.0)))

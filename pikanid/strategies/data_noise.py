@@ -18,7 +18,7 @@ def noise_level(functional: Functional, smoothed: Smoothed | None) -> float:
     families = [sites for part in functional.parts for sites in part.data]
     if functional.weighted and all([sites.deviation is not None for sites in families]):
         return 1.0
-    rows = [(sites.weight * sites.target).ravel() for sites in families if sites.target is not None]
+    rows = [(sites.weight.T * sites.target)[0] for sites in families if sites.target is not None]
     spread = float(np.std(np.concatenate(rows))) or 1.0
     return max(0.1 * spread if smoothed is None else smoothed.sigma, 1e-5 * spread)
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from pikanid.optimise.gauss_newton import MAX_ITERATIONS, BandedSystem, Point, gauss_newton
+from pikanid.optimise.gauss_newton import (
+    MAX_ITERATIONS,
+    BandedSystem,
+    Linearisation,
+    gauss_newton,
+)
 
 STIFF, STIFFEST = 1e10, 1e16  # λ at which a trajectory may be the solution of its equations
 
 
-def follows_physics(system: BandedSystem, point: Point, lam: float) -> bool:
+def follows_physics(system: BandedSystem, at: Linearisation, lam: float) -> bool:
     """Whether the splines can solve the model's equations at the present θ, as λ asks.
 
     With θ held, a larger and larger λ moves the trajectory alone, until what is left of the physics
@@ -15,10 +20,10 @@ def follows_physics(system: BandedSystem, point: Point, lam: float) -> bool:
     """
     stiff = max(lam, STIFF)
     while stiff <= STIFFEST:
-        held = gauss_newton(system, point, stiff, point.theta, point.theta,
+        held = gauss_newton(system, at, stiff, at.point.theta, at.point.theta,
                             iterations=MAX_ITERATIONS)
         left = held.at.physics_cost * lam / stiff
         if left <= held.at.data_cost / system.functional.n_data:
             return True
-        point, stiff = held.at.point, 100.0 * stiff
+        at, stiff = held.at, 100.0 * stiff
     return False

@@ -25,6 +25,7 @@ from pikanid.optimise.covariance import (
 from pikanid.optimise.gauss_newton import (
     MAX_ITERATIONS,
     BandedSystem,
+    Linearisation,
     Outcome,
     Point,
     gauss_newton,
@@ -169,14 +170,15 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
         refine = False  # no grid settles while a kink wanders through it
     gap = 0.0
     for _ in range(MAX_REFINEMENTS if refine else 0):
-        grid, before, lam = grid.refined(), outcome, stages[-1].lam
+        grid, before, lam = grid.refined(), outcome.at.point, stages[-1].lam
         coarse = system.functional
+        del system, outcome  # most of the memory, and not needed any more
         finer = setup.functional(grid).with_scale(coarse.scale)
         system = BandedSystem(finer)
-        outcome = gauss_newton(system, transfer(coarse, finer, before.at.point), lam,
-                               system.lower, system.upper)
+        outcome = gauss_newton(system, transfer(coarse, finer, before), lam, system.lower,
+                               system.upper)
         stages.append(_stage(system, lam, outcome, standard_errors(system, outcome)))
-        gap = moved(before.at.point.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
+        gap = moved(before.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
         if gap > GRID_MISLED or not outcome.converged:
             system, stages, outcome, notes = _from_data(setup, grid, plans)
         if gap <= GRID_SETTLED:
@@ -226,18 +228,18 @@ def follow(system: BandedSystem, point: Point,
            plan: Schedule) -> tuple[list[Stage], Outcome, list[str]]:
     """Warm up at the first λ, then minimise at every λ that the schedule names."""
     stages: list[Stage] = []
-    outcomes: list[Outcome] = []
+    outcomes: list[Outcome] = []  # the last two: no schedule keeps an earlier one
     lam = plan.next(stages)
     assert lam is not None
+    at: Point | Linearisation = point
     if plan.warmup:
-        point = gauss_newton(system, point, lam, point.theta, point.theta,
-                             iterations=plan.warmup).at.point
+        at = gauss_newton(system, point, lam, point.theta, point.theta, iterations=plan.warmup).at
     while lam is not None:
-        outcomes.append(gauss_newton(system, point, lam, system.lower, system.upper,
-                                     iterations=MAX_ITERATIONS))
-        point = outcomes[-1].at.point
+        outcomes = [*outcomes[-1:], gauss_newton(system, at, lam, system.lower, system.upper,
+                                                 iterations=MAX_ITERATIONS)]
+        at = outcomes[-1].at
         stages.append(_stage(system, lam, outcomes[-1]))
-        if plan.locked(stages) and follows_physics(system, point, lam):
+        if plan.locked(stages) and follows_physics(system, at, lam):
             stages[-1] = replace(stages[-1], free=True)
         lam = plan.next(stages)
         if lam is None and len(stages) > 1:
@@ -247,7 +249,7 @@ def follow(system: BandedSystem, point: Point,
     kept = plan.keep(stages)
     notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
         stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
-    return stages[:kept + 1], outcomes[kept], notes
+    return stages[:kept + 1], outcomes[kept - len(stages)], notes
 
 
 def _stage(system: BandedSystem, lam: float, outcome: Outcome, std: Array | None = None) -> Stage:
@@ -266,7 +268,7 @@ def conclude(setup: Setup, grid: Discretisation, system: BandedSystem, outcome: 
     at, step = outcome.at, outcome.step
     response = respond(system, at, step)
     step = replace(step, schur=response.reduced)
-    effective = effective_parameters(system, at, step, response)
+    effective = effective_parameters(system, at, step)
     noise = row_noise(system.functional, at, effective)
     sandwich, naive = theta_covariance(system, at, step, noise, response)
     return RelaxedFit(setup.problem, at.point.theta, sandwich, naive, at.point.coefficients,
