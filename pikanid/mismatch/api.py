@@ -27,6 +27,7 @@ from pikanid.mismatch.preparation import (
     with_refined_noise,
     with_sigma,
 )
+from pikanid.mismatch.repeats import repeats
 from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import sites
@@ -90,6 +91,8 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     case.search.workers = threads(workers)
     tell("detection")
     detection = case.test(case.base)
+    if case.repeats is not None:
+        detection = replace(detection, p_value=case.repeats.p_value)
     if detection.p_value >= alpha:
         answer = Answer("none", (), ())
     else:
@@ -157,11 +160,17 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     held = None
     if later is not None:
         held = prepared(model, later, None, notes, together, records.levels[0])
+    again = repeats(nominal, records, held if proves else None)
+    if again is not None:
+        notes += again.notes
+        records = records.with_levels(again.levels)
+        held = None if held is None else held.with_levels(again.levels)
     found = sites(nominal, records.recordings)
     listed = catalogue_of(found)
     search = Search(nominal, records, listed, tell)
     base = search.base()
-    case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {})
+    case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {},
+                again)
     search.predicts = case.predicts
     return case
 

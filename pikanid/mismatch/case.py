@@ -16,6 +16,7 @@ from pikanid.mismatch.in_turn import side_by_side
 from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
 from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.preparation import with_refined_noise
+from pikanid.mismatch.repeats import Repeats
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site
 from pikanid.mismatch.verdict import WORTH
@@ -44,6 +45,7 @@ class Case:
     notes: list[str]
     tests: dict[tuple[frozenset[str], float], Detection]
     predictions: dict[tuple[frozenset[str], float], HeldOut | None]
+    repeats: Repeats | None = None
 
     @property
     def rate(self) -> float:
@@ -64,8 +66,11 @@ class Case:
         return self.search
 
     def relevelled(self, best: Hypothesis, quiet: tuple[float, float] | None) -> bool:
-        """Read the noise from what the best explanation leaves; whether that made a difference."""
-        if best.far:
+        """Read the noise from what the best explanation leaves; whether that made a difference.
+
+        What repeats have told of the noise needs no explanation.
+        """
+        if best.far or self.repeats is not None:
             return False
         fit = as_estimate(best, self.before)
         new, count = with_refined_noise(self.records, fit, self.rate, quiet)
@@ -78,8 +83,7 @@ class Case:
         self.records = new
         self.resumed(self.search)
         if self.later is not None:
-            self.later = Records(self.later.recordings,
-                                 tuple(new.levels[0] for _ in self.later.recordings))
+            self.later = self.later.with_levels(new.levels[0])
         return True
 
     def clear_later(self, best: Hypothesis) -> None:

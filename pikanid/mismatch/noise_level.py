@@ -20,6 +20,7 @@ QUIET = 100  # samples of a quiet stretch that say something about low frequenci
 ABOVE = 6.0  # natural frequencies from which on a residual is noise
 BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
 BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
+GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
 CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
@@ -156,16 +157,28 @@ def bridged(grid: np.ndarray) -> np.ndarray:
 def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float | None
              ) -> tuple[float, float, float]:
     """(σ, ρ, relative standard error of the power at low frequencies); σ may be `given`."""
-    grid = np.linspace(0.0, 0.95, 191)
     costs, scales = [], []
     total = sum(w * len(p) for _, p, w in spectra)
-    for rho in grid:
+    for rho in GRID:
         shapes = [1.0 / (1 - 2 * rho * np.cos(o) + rho**2) for o, _, _ in spectra]
         power = sum(w * np.sum(_calm(p / s)) for (_, p, w), s in zip(spectra, shapes, strict=True))
         scale = power / total if given is None else given**2 * (1 - rho**2)
         costs.append(total * np.log(scale) + power / scale + sum(
             w * np.sum(np.log(s)) for (_, _, w), s in zip(spectra, shapes, strict=True)))
         scales.append(scale)
+    return likeliest(GRID, np.array(costs), np.array(scales), total)
+
+
+def likeliest(grid: np.ndarray, costs: np.ndarray, scales: np.ndarray, total: float
+              ) -> tuple[float, float, float]:
+    """(σ, ρ, relative standard error of the power at low frequencies) of the likeliest AR(1).
+
+    Args:
+        grid: (m,) evenly spaced ρ, from 0 on.
+        costs: (m,) -2 ln of the likelihood of each.
+        scales: (m,) Power of e_t with each.
+        total: Number of ordinates that count.
+    """
     best = int(np.argmin(costs))
     if costs[0] - costs[best] < BELIEVED * np.log(total):
         best = 0

@@ -36,6 +36,10 @@ class Records:
             tuple(_cut(r, r.start + share * (r.stop - r.start)) for r in self.recordings),
             self.levels)
 
+    def with_levels(self, levels: dict[str, Level]) -> Records:
+        """The same with one noise level of each output for all recordings."""
+        return Records(self.recordings, tuple(levels for _ in self.recordings))
+
 
 def _cut(recording: Recording, stop: float) -> Recording:
     short = []
