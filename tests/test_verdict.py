@@ -77,6 +77,21 @@ def test_the_held_out_recording_decides_between_them() -> None:
     assert answered(fits, {"a+b": 10.0}).given[0].key == {"a"}
 
 
+def test_what_fits_a_little_worse_may_predict_far_better() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1010.0, B)]
+    assert [h.key for h in answered(fits).given] == [{"a"}]
+    assert [h.key for h in answered(fits, {"a": 20.0}).given] == [{"b"}]
+
+
+def test_each_of_several_effects_has_to_help_on_the_held_out_recording() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1010.0, B), hypothesis(900.0, A, B)]
+    assert answered(fits, {"a": 50.0, "b": 50.0}).verdict == "named"
+    assert answered(fits, {"a": 50.0}).verdict == "unconfirmed"
+    # where the held-out recording speaks against one more effect, it is not given
+    nearly = [BASE, hypothesis(1000.0, A), hypothesis(989.0, A, B)]
+    assert answered(nearly, {"a+b": 1.0}).verdict == "named"
+
+
 def test_a_law_outside_the_catalogue_that_predicts_far_better_keeps_names_away() -> None:
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1010.0, GUARD)]
     assert answered(fits).verdict == "named"

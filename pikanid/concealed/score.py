@@ -28,6 +28,7 @@ SYMBOLIC = "symbolic:"
 # What the formula of a law that is in no catalogue must hold; who writes another one is wrong.
 FORMULAS = {
     "stribeck_friction": r"exp\(.*sign\(\w+_dot\)",
+    "hard_stop": r"max\(.*\)\*\(1 [+-] ",
     "one_way_friction": r"sign\([^)]*_dot\) [+-] (1|force_0)|force_0 [+-] .*sign\([^)]*_dot\)",
     "rate_limited_input": r"changing by at most",
     "soft_saturation": r"u_\w\*\*3|Abs\(u_\w\)|tanh\(",

@@ -12,6 +12,7 @@ from pikanid.mismatch.case import SEARCHED, Case, note_outliers
 from pikanid.mismatch.catalogue import candidates as catalogue_of
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
+from pikanid.mismatch.explained import explanations
 from pikanid.mismatch.force_shape import ForceShape, force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.in_turn import threads
@@ -32,7 +33,7 @@ from pikanid.mismatch.result import Diagnosis, Proof
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import sites
 from pikanid.mismatch.symbols import symbolic_candidates
-from pikanid.mismatch.verdict import Answer, explanations, settle, with_formulas
+from pikanid.mismatch.verdict import Answer, settle, with_formulas
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
@@ -167,7 +168,8 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
         held = None if held is None else held.with_levels(again.levels)
     found = sites(nominal, records.recordings)
     listed = catalogue_of(found)
-    search = Search(nominal, records, listed, tell)
+    search = Search(nominal, records, listed, tell,
+                    guess={n: model.parameter(n).value for n in model.free_names})
     base = search.base()
     case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {},
                 again)

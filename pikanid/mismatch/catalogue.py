@@ -18,8 +18,8 @@ ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
     forces.initial_state, channels.input_hold)
 GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
     guards.even_stiffness, guards.quintic_stiffness, guards.one_way_friction,
-    guards.stribeck_friction, guards.velocity_coupled_drive, guards.soft_saturation,
-    guards.clock_error, guards.wobble, guards.rate_limit)
+    guards.stribeck_friction, guards.dissipating_wall, guards.velocity_coupled_drive,
+    guards.soft_saturation, guards.clock_error, guards.wobble, guards.rate_limit)
 
 
 def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:

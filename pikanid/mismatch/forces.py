@@ -14,6 +14,7 @@ from pikanid.model import Model
 from pikanid.model_parts import Parameter, State
 
 INF = float("inf")
+SIDE = "negative side"
 
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
@@ -130,21 +131,15 @@ def parameter_drift(site: Site) -> list[Candidate]:
 
 
 def wall_impact(site: Site) -> list[Candidate]:
-    """A stiff stop on one side that dissipates: k δ (1 + α δ'), δ how deep the wall gives way.
-
-    K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42, 1975.
-    """
+    """A stiff stop on one side that gives way elastically."""
     # a contact shorter than from one sample to the next looks the same, however short
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
-    # with more, it would hold fast what leaves it at full speed
-    most = 1.0 / max(site.swing * site.rate, 1e-3)
 
     def one(side: int) -> Candidate:
         w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
         k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
-        a = Parameter(site.name("a_wall"), 0.0, f"s/({site.unit})", (0.0, most))
-        text = (f"-{k.name}*max({site.q} - {w.name}, 0)*(1 + {a.name}*{site.v})" if side > 0
-                else f"{k.name}*max(-{site.q} - {w.name}, 0)*(1 - {a.name}*{site.v})")
+        text = (f"-{k.name}*max({site.q} - {w.name}, 0)" if side > 0
+                else f"{k.name}*max(-{site.q} - {w.name}, 0)")
 
         def signs(view: View) -> list[Sign]:
             x = side * view.x[site.q]
@@ -154,9 +149,9 @@ def wall_impact(site: Site) -> list[Candidate]:
                          scales=False)
                     for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5) for s in (1e4,)] if top else []
 
-        return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k, a),
+        return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
                          lambda m: m.with_term(site.v, text), signs,
-                         variant="" if side > 0 else "negative side",
+                         variant="" if side > 0 else SIDE,
                          hills=(0.985, 0.993, 0.997, 1.003, 1.007, 1.015))
 
     return [one(1), one(-1)]

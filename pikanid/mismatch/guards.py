@@ -13,7 +13,7 @@ import numpy as np
 
 from pikanid.held import HeldInput, acting
 from pikanid.mismatch.candidate import Candidate, Sign, View
-from pikanid.mismatch.forces import INF, sense, term
+from pikanid.mismatch.forces import INF, sense, term, wall_impact
 from pikanid.mismatch.site import Site
 from pikanid.model import Model
 from pikanid.model_parts import Parameter
@@ -87,6 +87,29 @@ def stribeck_friction(site: Site) -> list[Candidate]:
     return [Candidate(("stribeck_friction",), "friction that rises at low speed", text, "dynamics",
                       site, (c, rise, slow), lambda m: m.with_term(site.v, text), signs,
                       known=False, covers=("coulomb_friction",))]
+
+
+def dissipating_wall(site: Site) -> list[Candidate]:
+    """A stop that takes energy out: k δ (1 + α δ'), δ how deep the wall gives way; in the limit of
+    a stiff one a stop of some restitution.
+
+    K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42, 1975.
+    """
+    found = []
+    # with more, it would hold fast what leaves it at full speed
+    most = 1.0 / max(site.swing * site.rate, 1e-3)
+    for wall in wall_impact(site):
+        a = Parameter(site.name("a_wall"), 0.3 * most, f"s/({site.unit})", (0.0, most))
+        text = f"({wall.expression})*(1 {'-' if wall.variant else '+'} {a.name}*{site.v})"
+        found.append(Candidate(
+            ("dissipating_wall",), "impact on a wall that takes energy out", text, "dynamics",
+            site, (*wall.parameters, a), _with_term(site.v, text), lambda view: [], wall.variant,
+            known=False, covers=(wall.key,)))
+    return found
+
+
+def _with_term(v: str, text: str) -> Callable[[Model], Model]:
+    return lambda m: m.with_term(v, text)
 
 
 def velocity_coupled_drive(site: Site) -> list[Candidate]:

@@ -65,6 +65,13 @@ class Hypothesis:
         return self.minimum.chi2 > CERTAIN * max(self.whitened.rows, 1)
 
     @property
+    def pinned(self) -> bool:
+        """Whether an estimate lies at a bound."""
+        problem, theta = self.whitened.problem, self.minimum.theta
+        near = 1e-6 * np.maximum(np.abs(theta), 1e-12)
+        return bool(np.any((theta - problem.lower < near) | (problem.upper - theta < near)))
+
+    @property
     def noise(self) -> float:
         """Standard deviation of what is left, in units of the noise that was assumed."""
         return (self.minimum.chi2 / max(self.whitened.rows - len(self.minimum.theta), 1)) ** 0.5

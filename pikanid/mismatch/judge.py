@@ -13,11 +13,13 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection, detect, frequency_bands, past_inputs, unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis, extended
 from pikanid.mismatch.least_squares import minimise
+from pikanid.mismatch.prior import elsewhere, of_fit
 from pikanid.mismatch.tangent import directions
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
 
 MOST_ROWS = 6000  # of a residual that is tested as it is
+NEAR, AGAIN = 3.0, 4  # standard deviations that a linearisation holds for; how often it is renewed
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,9 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     """Predict records that the hypothesis was not fitted to, and test what is left.
 
     Shared parameters keep their estimates, with the fit's uncertainty as prior: the residual is
-    whitened by I + J_h (JᵀJ)⁻¹ J_hᵀ.  What each recording has for itself is estimated anew; what
-    happens once (a disturbance) is left out.
+    whitened by I + J_h (JᵀJ)⁻¹ J_hᵀ.  Where that leads far from the estimates, J is taken anew: far
+    from a wall that was touched once, the uncertainty is no ellipsoid.  What each recording has for
+    itself is estimated anew; what happens once (a disturbance) is left out.
     """
     effects = [e for e in hypothesis.effects if not e.absent]
     model = extended(nominal, effects).with_values(
@@ -116,9 +119,9 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     guess = whitened.problem.guess.copy()
     names = [f.name for f in hypothesis.whitened.problem.free]
     shared = [k for k, f in enumerate(free) if f.recording is None and f.name in names]
-    theta_hat = np.array([hypothesis.values[free[k].name] for k in shared])
-    guess[shared] = theta_hat
-    root = _information_root(hypothesis, [free[k].name for k in shared])
+    known = [free[k].name for k in shared]
+    guess[shared] = [hypothesis.values[n] for n in known]
+    prior = fit = of_fit(hypothesis, known)
     misfit = hypothesis.minimum.chi2 / max(hypothesis.whitened.rows, 1)
     if not whitened.choose_steps(guess, misfit=misfit):
         return None
@@ -127,10 +130,10 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         at = whitened.residual(theta)
         if at is None:
             return None
-        prior = np.zeros((len(root), len(theta)))
-        prior[:, shared] = root
-        return (np.concatenate([at[0], root @ (theta[shared] - theta_hat)]),
-                np.vstack([at[1], prior]))
+        rows = np.zeros((len(prior.root), len(theta)))
+        rows[:, shared] = prior.root
+        return (np.concatenate([at[0], prior.residual(theta[shared])]),
+                np.vstack([at[1], rows]))
 
     own = np.array([k not in shared for k in range(len(free))])
     if own.any():
@@ -142,6 +145,14 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         if first is not None:
             guess = first.theta
     found = minimise(evaluate, guess, whitened.problem.lower, whitened.problem.upper, 25)
+    for _ in range(AGAIN):
+        if found is None or prior.distance(found.theta[shared]) < NEAR:
+            break
+        anew = elsewhere(prior, hypothesis, found.theta[shared])
+        if anew is None:
+            break
+        prior = anew
+        found = minimise(evaluate, found.theta, whitened.problem.lower, whitened.problem.upper, 25)
     if found is None or not np.isfinite(found.J).all():
         return None
     tests = functools.partial(residual_tests, whitened, found.theta, found.r, found.J, candidates,
@@ -150,10 +161,10 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     responses = whitened.responses(plain)
     gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
     rmse = float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
-    big, small = _volume(found.J), _volume(root)
+    big, small = _volume(found.J), _volume(fit.root)
     # where corners stop the fit, as of a wall hardly touched, the tests forgive a last linear step
     q, _ = np.linalg.qr(found.J)
-    chi2 = found.chi2 - float(np.sum((q.T @ found.r) ** 2))
+    chi2 = found.chi2 + prior.constant - float(np.sum((q.T @ found.r) ** 2))
     samples = whitened.problem.experiments[0].samples[0]
     return HeldOut(rmse, tests, chi2, chi2 + big - small, samples.t, samples.y,
                    responses[0].y[: len(samples.t)], tuple(_residuals(whitened, gaps)))
@@ -175,15 +186,3 @@ def _volume(J: np.ndarray) -> float:
         return 0.0
     return float(2 * np.sum(np.log(np.maximum(np.abs(np.diag(np.linalg.qr(J, mode="r"))), 1e-300))))
 
-
-def _information_root(hypothesis: Hypothesis, names: list[str]) -> np.ndarray:
-    """R (n, n) with RᵀR the information on the named parameters, all others estimated too."""
-    free = [f.name for f in hypothesis.whitened.problem.free]
-    inside = [free.index(n) for n in names]
-    others = [k for k in range(len(free)) if k not in inside]
-    J = hypothesis.minimum.J
-    rest = J[:, inside]
-    if others:
-        q, _ = np.linalg.qr(J[:, others])
-        rest = rest - q @ (q.T @ rest)
-    return np.asarray(np.linalg.qr(rest, mode="r")) if inside else np.empty((0, 0))

@@ -95,3 +95,12 @@ def _boxed_step(A: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray)
         x[out] = np.clip(x[out], low[out], high[out])
         free &= ~out
     return x
+
+
+def repeated(r: np.ndarray) -> float:
+    """How many neighbouring rows of a residual (N,) say the same: Σ ρ_k², at least one."""
+    n = len(r)
+    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
+    rho = np.fft.irfft(spectrum)[1:max(n // 4, 2)] / max(float(r @ r), 1e-300)
+    # noise alone has ρ² = 1/N
+    return max(1.0, 1 + 2 * float(np.sum(rho**2 - 1 / n)))

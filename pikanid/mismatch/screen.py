@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -34,6 +34,23 @@ def as_strong(h: Hypothesis, effect: Candidate, other: Candidate, n: float | Non
     return float(size * np.mean(speed ** (a + 1)) / max(float(np.mean(speed ** (b + 1))), 1e-12))
 
 
+def law(c: Candidate) -> bool:
+    """A force of one parameter.  Where the model's own parameters took most of such a force up,
+    they are far from the truth, and a first step from there does not see it.
+    """
+    return c.known and c.channel == "dynamics" and len(c.parameters) == 1
+
+
+def fixed(c: Candidate) -> bool:
+    """An effect without parameters.  What another one does to an input bends its sign."""
+    return c.known and not c.parameters
+
+
+def nothing(c: Candidate) -> bool:
+    """No candidate at all."""
+    return False
+
+
 class Screen:
     """What each candidate would take away from a residual, to first order."""
 
@@ -63,9 +80,15 @@ class Screen:
                 break
         return chosen
 
-    def singles(self, count: int, least: float = 0.0) -> list[tuple[Candidate, list[Start]]]:
-        """The most promising candidates, with the starts of their fits; χ² has to fall by at
-        `least` so much to first order.
+    def singles(self, count: int, least: float = 0.0,
+                always: Callable[[Candidate], bool] = nothing
+                ) -> list[tuple[Candidate, list[Start]]]:
+        """The most promising candidates, with the starts of their fits.
+
+        Args:
+            count: How many.
+            least: That χ² has to fall by, to first order.
+            always: Says which ones are listed besides, whatever they promise.
         """
         several = [self.best(c, 3) for c in range(len(self.found.candidates))]
         order = sorted((k for k, s in enumerate(several) if s),
@@ -80,6 +103,8 @@ class Screen:
             listed.append((candidate, [self._start(candidate, s, self.z[s]) for s in signs]))
         # guards beside the entries, not in their place
         known = [entry for entry in listed if entry[0].known][:count]
+        known += [(c, [Start(self.about.point, self.about.point)]) for c in self.found.candidates
+                  if always(c) and all(c is not entry[0] for entry in known)]
         return known + [entry for entry in listed if not entry[0].known][:max(count // 3, 1)]
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:

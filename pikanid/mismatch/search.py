@@ -12,7 +12,8 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
 from pikanid.mismatch.in_turn import in_turn
-from pikanid.mismatch.screen import Screen, as_strong
+from pikanid.mismatch.least_squares import repeated
+from pikanid.mismatch.screen import Screen, as_strong, fixed, law, nothing
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
@@ -42,6 +43,7 @@ class Search:
         tell: Called with what is being done.
         predicts: Whether the second hypothesis is worth its effects beyond the first one, as far as
             other recordings say.
+        guess: Parameters that the nominal model was given with.
         workers: Threads that fit side by side; the results do not depend on their number.
     """
 
@@ -50,6 +52,7 @@ class Search:
     candidates: tuple[Candidate, ...]
     tell: Callable[[str], None] = lambda text: None
     predicts: Callable[[Hypothesis, Hypothesis], bool] = lambda fewer, more: True
+    guess: Mapping[str, float] = field(default_factory=dict)
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     spent: float = 0.0
     workers: int = 1
@@ -70,9 +73,18 @@ class Search:
 
     def run(self, adequate: Adequate) -> list[Hypothesis]:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
-        screen = Screen(self.base(), [c for c in self.candidates if c.fits])
+        every = [c for c in self.candidates if c.fits]
+        screen = Screen(self.base(), every)
         self.tell("single effects")
-        self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES)], always=True)
+        self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES, always=law)],
+                      always=True)
+        if self.base().far and self.base().pinned:
+            # at a bound the model explains as little as it can: effects show about the guess
+            about = fitted(self.nominal, (), self.records, [self.guess], self.choices,
+                           Closest(self._closest_chi2()))
+            self._fit_all([] if about is None else [
+                ((c,), starts) for c, starts in Screen(about, every).singles(SINGLES)],
+                again=True, always=True, beside=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
         if not adequate(self.ranked()[0]):
@@ -98,6 +110,7 @@ class Search:
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
+            self._simplify()  # what led out of a dead end may have done its part
         self._simplify()
         best = self.ranked()[0]
         if adequate(best):
@@ -208,7 +221,7 @@ class Search:
                     starts = [{size.name: as_strong(best, effect, other, n), more[0].name: n}]
                 else:
                     starts = [{size.name: as_strong(best, effect, other),
-                               **{p.name: p.value for p in more},
+                               **{p.name: p.value for p in more if p.name not in best.point},
                                more[-1].name: share * more[-1].value} for share in WIDER]
                 self._fit((*rest, other), [{**best.point, **start} for start in starts],
                           again=not other.known)
@@ -241,17 +254,20 @@ class Search:
         screen = Screen(hypothesis, others)
         if hypothesis.far:
             least = TELLING * hypothesis.minimum.chi2
+        always = fixed if any(e.channel == "input" for e in hypothesis.effects) else nothing
         self._fit_all([((*hypothesis.effects, candidate), starts)
-                       for candidate, starts in screen.singles(count, least)])
+                       for candidate, starts in screen.singles(count, least, always)])
 
     def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False
              ) -> Hypothesis:
         self._fit_all([(effects, starts)], again, always=True)
         return self.fits.get(frozenset(e.key for e in effects), self.fits[frozenset()])
 
-    def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False) -> None:
+    def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False,
+                 beside: float = 0.0) -> None:
         """Fit these effects from these starts, one after the other, and keep what is better; what
         is known is fitted `again` only, and nothing once the search is tired, except `always`.
+        Fits far above the closest one, and above `beside` [χ²], are given up.
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
 
@@ -270,17 +286,9 @@ class Search:
                 self.fits[key] = found
 
         in_turn([job for job in jobs if again or frozenset(e.key for e in job[0]) not in self.fits],
-                self._closest_chi2, work, take, lambda: always or not self.tired, self.workers,
+                lambda: max(self._closest_chi2(), beside), work, take,
+                lambda: always or not self.tired, self.workers,
                 lambda result, chi2: result[1].stands(chi2))
 
     def _closest_chi2(self) -> float:
         return min((h.minimum.chi2 for h in self.fits.values()), default=np.inf)
-
-
-def repeated(r: np.ndarray) -> float:
-    """How many neighbouring rows of a residual (N,) say the same: Σ ρ_k², at least one."""
-    n = len(r)
-    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
-    rho = np.fft.irfft(spectrum)[1:max(n // 4, 2)] / max(float(r @ r), 1e-300)
-    # noise alone has ρ² = 1/N
-    return max(1.0, 1 + 2 * float(np.sum(rho**2 - 1 / n)))

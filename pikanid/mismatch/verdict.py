@@ -7,16 +7,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pikanid.mismatch.candidate import SYMBOLIC, Candidate
+from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut
-from pikanid.mismatch.result import Explanation, NamedEffect, Verdict, values_of
+from pikanid.mismatch.result import Verdict
 from pikanid.mismatch.screen import EXPONENTS
 from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
-BEHIND = 3.0  # times that, and a law outside the catalogue can still be what predicts best
+BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
+PROVEN = 4.0  # of the criterion: what each of several effects must gain on held-out recordings
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
 WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
@@ -71,7 +72,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     ahead(near)
 
     def total(h: Hypothesis) -> float:
-        return _total(h, predict(h), scale) if predict(h) or not checked else np.inf
+        return criterion(h, predict(h), scale) if predict(h) or not checked else np.inf
 
     def passes(h: Hypothesis) -> bool:
         if test(h).p_value < ADEQUATE:
@@ -84,12 +85,18 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     given = [h for h in near if passes(h)]
     given = [h for h in given if not _needless(h, near, given, scale)]
     if checked:
-        # a law outside the catalogue that the recording speaks against a little may predict better
+        # what the recording speaks against a little may predict better
         best = min(map(total, near))
-        given += [h for h in tried if not h.known and h not in near
-                  and h.score(scale) < lowest + BEHIND * WITHIN and total(h) < best and passes(h)]
+        behind = [h for h in tried if h not in near
+                  and _handicapped(h, scale) < lowest + BEHIND * WITHIN][:PREDICTED]
+        given += [h for h in behind if total(h) < best and passes(h)]
+        for h in [h for h in given if any(
+                o.key < h.key and total(o) < total(h) and _speaks(o, h, predict) for o in given)]:
+            reasons[h.key] = "the held-out recording speaks against one of its effects"
+            given.remove(h)
     if checked and len(given) > 1:
         given = _by_evidence(given, total, reasons)
+    proves = proves and any(_proven(h, tried, predict, scale) for h in given)
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
     if not known:
@@ -107,6 +114,21 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
     return Answer(verdict, tuple(merged), tuple(others), twins, reasons)
+
+
+def _speaks(one: Hypothesis, other: Hypothesis, predict: Predict, least: float = 0.0) -> bool:
+    """Whether the held-out recording speaks for one hypothesis rather than another, by `least`."""
+    a, b = predict(one), predict(other)
+    return a is not None and b is not None and a.evidence < b.evidence - least
+
+
+def _proven(h: Hypothesis, tried: Sequence[Hypothesis], predict: Predict, scale: float) -> bool:
+    """Whether the held-out recording speaks for each of several effects, too.
+
+    One of several is easily found that takes up what the others leave, whatever that is.
+    """
+    rest = {h.key - {e.key} for e in h.effects if not e.absent} if len(h.effects) > 1 else ()
+    return all(_speaks(h, o, predict, PROVEN * scale) for o in tried if o.key in rest)
 
 
 def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
@@ -142,7 +164,7 @@ def _handicapped(h: Hypothesis, scale: float) -> float:
     return h.score(scale) + _handicap(h)
 
 
-def _total(h: Hypothesis, predicted: HeldOut | None, scale: float) -> float:
+def criterion(h: Hypothesis, predicted: HeldOut | None, scale: float) -> float:
     """The criterion over the recording and the held-out one, where there is one."""
     return _handicapped(h, scale) + (0.0 if predicted is None else predicted.evidence / scale)
 
@@ -259,32 +281,3 @@ def _merged(known: list[Hypothesis], tried: Sequence[Hypothesis]
                     h.values[e.parameters[1].name] < NARROW * e.site.swing):
                 table[e.key] += ("coulomb_friction",)
     return [h for h in first.values() if h.key not in absorbed], twins
-
-
-def explanations(answer: Answer, scale: float, test: Test, predict: Predict
-                 ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
-    """Given and rejected hypotheses, for reports."""
-    pool = [*answer.given, *answer.others]
-    if not pool:
-        return (), ()
-
-    scores = np.array([_total(h, predict(h), scale) for h in answer.given] or [0.0])
-    weights = np.exp(-0.5 * (scores - scores.min()))
-    weights = weights / weights.sum()
-
-    def one(h: Hypothesis, probability: float, why: str) -> Explanation:
-        table = answer.twins.get(h.key, {})
-        effects = tuple(NamedEffect(
-            table.get(e.key, e.ids if e.known else (SYMBOLIC + e.expression,)), e.name,
-            e.expression, values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
-        p = predict(h) if h in answer.given else None
-        return Explanation(effects, probability, h.model.with_values(
-            {n: v for n, v in h.values.items()}), h.score(scale),
-            test(h).p_value if h in answer.given else None,
-            None if p is None else p.detection.p_value, why)
-
-    given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
-    best = answer.given[0].score(scale) if answer.given else pool[0].score(scale)
-    others = tuple(one(h, 0.0, answer.reasons.get(
-        h.key, f"fits worse by {h.score(scale) - best:.0f}")) for h in answer.others)
-    return given, others

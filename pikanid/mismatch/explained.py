@@ -1,0 +1,39 @@
+"""Hypotheses as they are reported."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pikanid.mismatch.candidate import SYMBOLIC
+from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.result import Explanation, NamedEffect, values_of
+from pikanid.mismatch.verdict import Answer, Predict, Test, criterion
+
+
+def explanations(answer: Answer, scale: float, test: Test, predict: Predict
+                 ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
+    """Given and rejected hypotheses, for reports."""
+    pool = [*answer.given, *answer.others]
+    if not pool:
+        return (), ()
+
+    scores = np.array([criterion(h, predict(h), scale) for h in answer.given] or [0.0])
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    weights = weights / weights.sum()
+
+    def one(h: Hypothesis, probability: float, why: str) -> Explanation:
+        table = answer.twins.get(h.key, {})
+        effects = tuple(NamedEffect(
+            table.get(e.key, e.ids if e.known else (SYMBOLIC + e.expression,)), e.name,
+            e.expression, values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
+        p = predict(h) if h in answer.given else None
+        return Explanation(effects, probability, h.model.with_values(
+            {n: v for n, v in h.values.items()}), h.score(scale),
+            test(h).p_value if h in answer.given else None,
+            None if p is None else p.detection.p_value, why)
+
+    given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
+    best = answer.given[0].score(scale) if answer.given else pool[0].score(scale)
+    others = tuple(one(h, 0.0, answer.reasons.get(
+        h.key, f"fits worse by {h.score(scale) - best:.0f}")) for h in answer.others)
+    return given, others

@@ -1,0 +1,80 @@
+"""What a fit says of parameters that another recording shares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid.mismatch.hypothesis import Hypothesis
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A fit's information on the parameters with `names`, all of its others estimated too.
+
+    χ² of the fit is |R (θ - θ₁) + z|² and a constant, linearised at θ₁: about its estimates, where
+    z = 0, or elsewhere, where the uncertainty of a law far from linear has another shape.
+
+    Attributes:
+        root: R (n, n).
+        about: θ₁ (n,).
+        offset: z (n,).
+        constant: By how much χ² at its least exceeds that of the fit.
+        all: All of the fit's parameters (p,) at θ₁.
+        follow: (p, n) how all of them move along, so that χ² stays least.
+        inside: Places of the shared ones among them.
+    """
+
+    root: np.ndarray
+    about: np.ndarray
+    offset: np.ndarray
+    constant: float
+    all: np.ndarray
+    follow: np.ndarray
+    inside: tuple[int, ...]
+
+    def residual(self, theta: np.ndarray) -> np.ndarray:
+        """(n,) of the shared parameters."""
+        return np.asarray(self.root @ (theta - self.about) + self.offset)
+
+    def distance(self, theta: np.ndarray) -> float:
+        """From θ₁, in standard deviations."""
+        return float(np.linalg.norm(self.root @ (theta - self.about)))
+
+
+def of_fit(hypothesis: Hypothesis, names: list[str]) -> Prior:
+    """The information of a fit, linearised at its estimates."""
+    free = [f.name for f in hypothesis.whitened.problem.free]
+    inside = tuple(free.index(n) for n in names)
+    found = hypothesis.minimum
+    return _linearised(found.theta, found.J, np.zeros(len(found.r)), inside)
+
+
+def elsewhere(prior: Prior, hypothesis: Hypothesis, theta: np.ndarray) -> Prior | None:
+    """The same, linearised at these shared parameters; None where that cannot be simulated."""
+    problem = hypothesis.whitened.problem
+    moved = np.clip(prior.all + prior.follow @ (theta - prior.about), problem.lower, problem.upper)
+    moved[list(prior.inside)] = theta
+    at = hypothesis.whitened.residual(moved)
+    if at is None or not np.isfinite(at[1]).all():
+        return None
+    return _linearised(moved, at[1], at[0], prior.inside, hypothesis.minimum.chi2)
+
+
+def _linearised(theta: np.ndarray, J: np.ndarray, r: np.ndarray, inside: tuple[int, ...],
+                least: float = 0.0) -> Prior:
+    shared, count = list(inside), len(theta)
+    others = [k for k in range(count) if k not in inside]
+    follow = np.zeros((count, len(inside)))
+    follow[shared, np.arange(len(inside))] = 1.0
+    rest, left = J[:, shared], r
+    if others:
+        q, _ = np.linalg.qr(J[:, others])
+        follow[others] = -np.linalg.lstsq(J[:, others], rest, rcond=None)[0]
+        rest, left = rest - q @ (q.T @ rest), left - q @ (q.T @ left)
+    if not inside:
+        return Prior(np.empty((0, 0)), np.empty(0), np.empty(0), 0.0, theta, follow, inside)
+    q, root = np.linalg.qr(rest)
+    z = q.T @ left
+    return Prior(root, theta[shared], z, float(left @ left - z @ z) - least, theta, follow, inside)
