@@ -201,13 +201,14 @@ class Functional:
 def bind(problem: Problem, vector_field: VectorField, chains: Chains,
          approximators: Sequence[tuple[AnyApproximator, ...]],
          nodes: Sequence[tuple[Array, Array]], *, given_start: bool = True,
-         weighted: bool = True) -> Functional:
+         weighted: bool = True, like: Functional | None = None) -> Functional:
     """Eq. (2) for approximators (one tuple a recording, one entry a chain) and physics nodes.
 
     `nodes` are (times (M,), weights (M,)) a recording: Gauss points with their weights for the
     integral, the samples with weight 1 for the sum of Eq. (5).  With `given_start` the initial
     state of the model is kept, exactly where the approximators are clamped.  `weighted` divides
     data by their σ (where it is unknown, by the visible noise if there are several outputs).
+    `like` is one bound to the same problem: its data are taken over.
 
     Raises:
         BadSetting: If a delay, a backlash or a rate limit is to be estimated: no functional over
@@ -226,8 +227,9 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
             return tuple(Table.of(own[i], t, q, pieces[i])
                          for i, q in zip(chains.root, chains.order, strict=True))
 
-        data = []
-        for samples in experiment.samples:
+        data = [] if like is None else [
+            sites.with_states(states(sites.t)) for sites in like.parts[r].data]
+        for samples in experiment.samples if like is None else ():
             seen = np.maximum(samples.t - late[samples.output], experiment.t0)
             sigma = _spread(samples, len(problem.model.outputs) > 1) if weighted else 1.0
             weight = np.empty((seen.size, 1))

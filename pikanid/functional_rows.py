@@ -41,6 +41,11 @@ class Sites:
         n = len(states)
         return Sites(t, u, weight, tables[:n], tables[n:], target, output, deviation, lines, bases)
 
+    def with_states(self, states: Sequence[Table]) -> Sites:
+        """The same sites with other tables of the states, of data."""
+        return Sites.of(self.t, self.u, self.weight, states, (), self.target, self.output,
+                        self.deviation, self.lines)
+
     def with_tops(self, tops: Sequence[Table]) -> Sites:
         """The same sites with other tables on top."""
         return Sites.of(self.t, self.u, self.weight, self.states, tops, self.target, self.output,

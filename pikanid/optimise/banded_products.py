@@ -121,6 +121,27 @@ def pull_back(weight: np.ndarray, factor: np.ndarray, by_state: np.ndarray, by_t
 
 
 @_compiled
+def factor_in_place(band: np.ndarray) -> bool:
+    """Cholesky factor of a lower band, column after column: (n, kd + 1), row j column j of it.
+
+    False where the matrix is not positive definite.
+    """
+    n, reach = band.shape
+    for j in range(n):
+        if not band[j, 0] > 0.0:
+            return False
+        band[j, 0] = np.sqrt(band[j, 0])
+        last = min(reach, n - j)
+        for i in range(1, last):
+            band[j, i] /= band[j, 0]
+        for i in range(1, last):
+            share = band[j, i]
+            for k in range(i, last):
+                band[j + i, k - i] -= share * band[j, k]
+    return True
+
+
+@_compiled
 def substitute_forward(factor: np.ndarray, columns: np.ndarray) -> None:
     """Solve Lx = b in place for columns (n, q), L a lower band factor (kd + 1, n)."""
     size, reach, count = factor.shape[1], factor.shape[0], columns.shape[1]
@@ -151,17 +172,26 @@ def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
 
 
 @_compiled
-def reduce_block(factor: np.ndarray, right: np.ndarray, corner: np.ndarray, columns: np.ndarray,
-                 solved: np.ndarray, schur: np.ndarray, slope: np.ndarray) -> float:
+def reduce_block(band: np.ndarray, damping: float, right: np.ndarray, corner: np.ndarray,
+                 columns: np.ndarray, solved: np.ndarray, schur: np.ndarray, slope: np.ndarray
+                 ) -> float:
     """Fill solved (n, b + 1) with A⁻¹ right and add corner - rightᵀ solved at columns (b,).
 
-    factor (kd + 1, n) is that of A.  The part by θ goes to schur (symmetric), the last column to
-    slope; the last entry of the product is returned.  Sums of some rows are summed up in turn: the
-    difference may be all that is left of large numbers.
+    band (kd + 1, n) is the lower one of A; its diagonal and that of the corner are raised by the
+    share `damping` first.  The part by θ goes to schur (symmetric), the last column to slope; the
+    last entry of the product is returned, NaN where A is not positive definite.  Sums of some rows
+    are summed up in turn: the difference may be all that is left of large numbers.
     """
     count = right.shape[1]
+    factor = np.empty((band.shape[1], band.shape[0]))
+    for m in range(factor.shape[0]):
+        for k in range(factor.shape[1]):
+            factor[m, k] = band[k, m]
+        factor[m, 0] *= 1.0 + damping
+    if not factor_in_place(factor):
+        return np.nan
     solved[:] = right
-    substitute(factor, solved)
+    substitute(factor.T, solved)
     total, part = np.zeros((count, count)), np.empty((count, count))
     for begin in range(0, right.shape[0], 64):
         part[:] = 0.0
@@ -176,6 +206,7 @@ def reduce_block(factor: np.ndarray, right: np.ndarray, corner: np.ndarray, colu
         for j in range(count - 1):
             schur[columns[i], columns[j]] += 0.5 * (
                 corner[i, j] - total[i, j] + corner[j, i] - total[j, i])
+        schur[columns[i], columns[i]] += damping * corner[i, i]
         slope[columns[i]] += corner[i, count - 1] - total[i, count - 1]
     return total[count - 1, count - 1]
 
@@ -190,3 +221,31 @@ def follow_theta(solved: np.ndarray, change: np.ndarray, columns: np.ndarray, or
         for k in range(b):
             total += solved[m, k] * change[columns[k]]
         move[order[held + m]] = -total
+
+
+@_compiled
+def penalised(data: np.ndarray, rough: np.ndarray, rho: float, right: np.ndarray,
+              bent: np.ndarray, probe: np.ndarray) -> tuple[float, float]:
+    """Use of the data and change of their cost at the minimum of a quadratic of A_d + ρ A_q.
+
+    data and rough are the lower bands (n, kd + 1) as in `factor_in_place`, probe (n, q) the probes
+    divided by their number, right (n, q + 1) A_d times the probes and minus the data's slope, bent
+    (n,) the slope of the roughness.  Returns Σ probeᵀ(A_d + ρ A_q)⁻¹ A_d probe, NaN where the
+    matrix is not positive definite, and xᵀA_d x + 2 xᵀ slope at the minimum x.
+    """
+    band, solved = data + rho * rough, right.copy()
+    n, q = probe.shape
+    for j in range(n):
+        solved[j, q] -= rho * bent[j]
+    if not factor_in_place(band):
+        return np.nan, np.nan
+    substitute(band.T, solved)
+    used = change = 0.0
+    for j in range(n):
+        for c in range(q):
+            used += probe[j, c] * solved[j, c]
+        total = 0.5 * data[j, 0] * solved[j, q] - right[j, q]
+        for k in range(1, min(data.shape[1], n - j)):
+            total += data[j, k] * solved[j + k, q]
+        change += 2.0 * solved[j, q] * total
+    return used, change

@@ -20,7 +20,7 @@ from scipy.linalg import LinAlgError
 from pikanid.approximators import Array
 from pikanid.functional import Functional, Rows
 from pikanid.optimise.banded import BandedAssembler, BandedNormal
-from pikanid.optimise.cholesky import factor_band, solve_positive
+from pikanid.optimise.cholesky import solve_positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +140,11 @@ class BandedSystem:
         schur, slope, promised = np.zeros((b, b)), np.zeros(b), 0.0
         solutions, inner = [], []
         for columns, block in zip(self.columns, at.blocks, strict=True):
-            band, corner = block.band, block.corner
-            if damping > 0.0:
-                band, corner = band.copy(order="F"), corner.copy()
-                band[0] *= 1.0 + damping
-                corner[np.diag_indices(columns.size)] *= 1.0 + damping
             solved = np.empty(block.right.shape)
-            promised += reduce_block(factor_band(band), block.right, corner, columns, solved,
-                                     schur, slope)
+            promised += reduce_block(block.band, damping, block.right, block.corner, columns,
+                                     solved, schur, slope)
+            if math.isnan(promised):
+                raise LinAlgError("a recording's band is not positive definite")
             solutions.append(solved)
             inner.append(solved[:, :-1])
         change = np.empty(b)

@@ -6,6 +6,7 @@ Math. 31, 1979); edf = tr((A_d + ρ A_q)⁻¹ A_d), estimated from a few fixed r
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +15,6 @@ from scipy.linalg import LinAlgError
 from scipy.linalg.blas import dsbmv
 
 from pikanid.approximators import Array
-from pikanid.optimise.cholesky import factor_band
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, gauss_newton
 
 # The splines use all that they can of the data once a decade adds less than this share to it.
@@ -81,8 +81,9 @@ class Pencil:
             probe = generator.choice([-1.0, 1.0], size=(size, number))
             right = np.empty((size, number + 1))
             right[:, :-1], right[:, -1] = multiply(only.band, probe), -only.slope
-            self.blocks.append((only, all_.band - only.band, right, only.slope - all_.slope,
-                                probe / number))
+            self.blocks.append((np.ascontiguousarray(only.band.T),
+                                np.ascontiguousarray((all_.band - only.band).T), right,
+                                all_.slope - only.slope, probe / number))
 
     def search(self, ridge: float) -> Score | None:
         """The least score, by decades and then half a decade beside it.
@@ -108,22 +109,15 @@ class Pencil:
 
     def at(self, rho: float, most: float = 0.8) -> Score | None:
         """None where the system is singular or more than `most` of the data is used."""
-        from pikanid.optimise.banded_products import substitute
+        from pikanid.optimise.banded_products import penalised
 
         effective, residual = 0.0, self.cost
-        for only, band, right, rough, probe in self.blocks:
-            lifted = rho * band
-            lifted += only.band
-            try:
-                factor = factor_band(lifted)
-            except LinAlgError:
-                return None
-            solved = right.copy()
-            solved[:, -1] += rho * rough
-            substitute(factor, solved)
-            effective += float(np.vdot(probe, solved[:, :-1]))
-            step = solved[:, -1]
-            residual += float(step @ (2.0 * only.slope + _product(only.band, step)))
+        for data, rough, right, bent, probe in self.blocks:
+            used, change = penalised(data, rough, float(rho), right, bent, probe)
+            effective += used
+            residual += change
+        if math.isnan(effective):
+            return None
         if effective >= most * self.count and most < 1.0:
             return None
         left = max(self.count - effective, 1e-3)
@@ -137,8 +131,6 @@ def multiply(band: Array, columns: Array) -> Array:
     array([[2., 1.],
            [1., 2.]])
     """
-    return np.array([_product(band, column) for column in columns.T]).T
-
-
-def _product(band: Array, column: Array) -> Array:
-    return dsbmv(band.shape[0] - 1, 1.0, band, column, lower=1)
+    straight = np.asfortranarray(band)
+    return np.array([dsbmv(band.shape[0] - 1, 1.0, straight, column, lower=1)
+                     for column in columns.T]).T

@@ -110,11 +110,11 @@ class Setup:
     weighted: bool
     nondimensional: bool  # λ in units of N·σ²/(T·s²), s the size of the physics terms
 
-    def functional(self, grid: Discretisation) -> Functional:
-        """Eq. (2) on a grid."""
+    def functional(self, grid: Discretisation, like: Functional | None = None) -> Functional:
+        """Eq. (2) on a grid, with the data of one on another grid where that is given."""
         return bind(self.problem, self.field, self.chains, grid.splines(self.problem, self.chains),
                     grid.nodes(self.problem, self.chains), given_start=self.given_start,
-                    weighted=self.weighted)
+                    weighted=self.weighted, like=like)
 
 
 def start_is_estimated(problem: Problem) -> bool:
@@ -173,7 +173,7 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
         grid, before, lam = grid.refined(), outcome.at.point, stages[-1].lam
         coarse = system.functional
         del system, outcome  # most of the memory, and not needed any more
-        finer = setup.functional(grid).with_scale(coarse.scale)
+        finer = setup.functional(grid, coarse).with_scale(coarse.scale)
         system = BandedSystem(finer)
         outcome = gauss_newton(system, transfer(coarse, finer, before), lam, system.lower,
                                system.upper)
