@@ -238,6 +238,7 @@ def test_drag_is_found_on_light_balls_only(recordings_folder: object) -> None:
     for row in diagnosis_real.falling_balls(light):
         assert row.verdict in ("named", "set")
         assert any("power_drag" in h or "quadratic_drag" in h for h in row.hypotheses)
-        assert row.after < 0.25 * row.before
+        # two drops of the tennis ball differ by a fifth in their drag
+        assert row.after < (0.25 if row.recording == "Tennis Ball" else 0.2) * row.before
     heavy = ("Golf Ball", "Baseball", "Bowling Ball")
     assert [row.verdict for row in diagnosis_real.falling_balls(heavy)] == ["none"] * 3
