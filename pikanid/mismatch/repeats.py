@@ -27,6 +27,7 @@ MOVED_ALIKE = 0.2  # of an output's swing: beyond it the same missing law leaves
 COVERED = 0.8  # of the longest repeat that the shortest has to last
 MODES = 800  # of a residual that are told apart
 WIDER = 1.25  # ratio of the frequencies between which a spectrum counts as flat
+CAUTION = 0.25  # of the number of independent modes that is believed: so much allows for its error
 HOLDS = 0.05  # p-value of the differences from which on the noise that was found is believed
 SHARED = 0.01  # of the largest singular value from which on a direction is one that fits take up
 
@@ -224,13 +225,15 @@ class Spectra:
 
         The better of two, times two.  All power: F-distributed, with the number of modes that
         equal shares would need, (Σ P)²/Σ P², as that of rows (G. V. Bayley and J. M. Hammersley,
-        J. R. Stat. Soc. Suppl. 8, 1946): it is nearer to a third of the true number, which allows
-        for its own error.  Block for block: within one the ratio is F-distributed whatever the
-        spectrum, and the logarithms of the p-values add up (R. A. Fisher).
+        J. R. Stat. Soc. Suppl. 8, 1946), of which `CAUTION` is believed.  Block for block: within
+        one the ratio is F-distributed whatever the spectrum, and the logarithms of the p-values add
+        up (R. A. Fisher).
         """
         from scipy.stats import f, gamma
 
-        many = float(np.sum(self.power) ** 2 / np.sum(self.power**2))
+        # each P is a χ² of m - 1 degrees: its square is too large by 1 + 2/(m - 1) on average
+        equal = (1 + 2 / self.freedom) * np.sum(self.power) ** 2 / np.sum(self.power**2)
+        many = CAUTION * float(equal)
         share = float(np.sum(self.common**2) / np.sum(self.power))
         whole = float(f.sf(share, many, self.freedom * many))
         sizes, common, power = self._by_block(np.ones(len(self.omega)))
