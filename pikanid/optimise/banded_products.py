@@ -105,19 +105,19 @@ def pull_back(weight: np.ndarray, factor: np.ndarray, by_state: np.ndarray, by_t
               rows: np.ndarray, out: np.ndarray, out_theta: np.ndarray) -> None:
     """Add Jᵀ rows (M, q) of a data family to out (n, q) and, by θ, to out_theta (b, q)."""
     for m in range(rows.shape[0]):
-        scale = factor[0] * weight[m, 0]
+        scale, row = factor[0] * weight[m, 0], rows[m]
         for k in range(by_state.shape[2]):
             slope = scale * by_state[m, 0, k]
             if slope != 0.0:
                 for a in range(width[k]):
-                    share = slope * local[offset[k] + m * width[k] + a]
-                    for j in range(rows.shape[1]):
-                        out[first[k, m] + a, j] += share * rows[m, j]
+                    share, place = slope * local[offset[k] + m * width[k] + a], out[first[k, m] + a]
+                    for j in range(row.size):
+                        place[j] += share * row[j]
         for i in range(by_theta.shape[2]):
-            slope = scale * by_theta[m, 0, i]
+            slope, place = scale * by_theta[m, 0, i], out_theta[i]
             if slope != 0.0:
-                for j in range(rows.shape[1]):
-                    out_theta[i, j] += slope * rows[m, j]
+                for j in range(row.size):
+                    place[j] += slope * row[j]
 
 
 @_compiled
@@ -249,3 +249,16 @@ def penalised(data: np.ndarray, rough: np.ndarray, rho: float, right: np.ndarray
             total += data[j, k] * solved[j + k, q]
         change += 2.0 * solved[j, q] * total
     return used, change
+
+
+@_compiled
+def add_product(band: np.ndarray, columns: np.ndarray, out: np.ndarray) -> None:
+    """Add A times columns (n, q) to out (n, q), band (n, kd + 1) as in `factor_in_place`."""
+    n, count = columns.shape
+    for j in range(n):
+        for c in range(count):
+            out[j, c] += band[j, 0] * columns[j, c]
+        for k in range(1, min(band.shape[1], n - j)):
+            for c in range(count):
+                out[j, c] += band[j, k] * columns[j + k, c]
+                out[j + k, c] += band[j, k] * columns[j, c]

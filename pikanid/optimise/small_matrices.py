@@ -61,9 +61,14 @@ def free_minimum(matrix: np.ndarray, slope: np.ndarray, theta: np.ndarray, lower
                  upper: np.ndarray, change: np.ndarray) -> float:
     """Fill change (b,) with the minimum of ½dᵀMd + sᵀd; by how much dᵀMd + 2sᵀd falls there.
 
-    NaN unless θ + d lies inside the box, lower < upper holds and the matrix is positive definite.
+    NaN unless θ + d lies inside the box, lower < upper holds and the matrix is positive definite,
+    or θ has no freedom at all.
     """
     size = slope.size
+    if (lower >= upper).all():
+        for i in range(size):
+            change[i] = min(max(0.0, lower[i] - theta[i]), upper[i] - theta[i])
+        return fall(matrix, slope, change)
     root, factor = np.empty(size), np.empty((size, size))
     if not ((lower < upper).all() and scaled_factor(matrix, np.arange(size), root, factor)):
         return np.nan

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.linalg.blas import dsbmv
 
 from pikanid.approximators import Array
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, gauss_newton
@@ -131,6 +130,8 @@ def multiply(band: Array, columns: Array) -> Array:
     array([[2., 1.],
            [1., 2.]])
     """
-    straight = np.asfortranarray(band)
-    return np.array([dsbmv(band.shape[0] - 1, 1.0, straight, column, lower=1)
-                     for column in columns.T]).T
+    from pikanid.optimise.banded_products import add_product
+
+    out = np.zeros(columns.shape)
+    add_product(np.ascontiguousarray(band.T), np.ascontiguousarray(columns), out)
+    return out
