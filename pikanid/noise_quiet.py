@@ -75,13 +75,15 @@ def _is_quiet(values: Array, loudest: float) -> bool:
         return False  # a stuck sensor shows no noise at all
     # One real pole: an oscillation needs a pair of complex ones, and must not pass for noise.
     model = fit(centred, highest=1)
-    # An oscillation or a drift is predictable over the whole stretch, noise is not.
-    if max(model.memory, fit(centred).memory) * _MEMORIES > n:
+    if model.memory * _MEMORIES > n:
         return False
     # A busy signal can look like coloured noise: it must at least be much louder elsewhere.
     if len(model.coefficients) and float(np.var(centred)) > 0.25 * loudest:
         return False
-    return _flat_spectrum(innovations(centred, model)) and _stationary(centred, model)
+    if not (_flat_spectrum(innovations(centred, model)) and _stationary(centred, model)):
+        return False
+    # An oscillation or a drift is predictable over the whole stretch, noise is not.
+    return fit(centred).memory * _MEMORIES <= n
 
 
 def _flat_spectrum(white: Array) -> bool:

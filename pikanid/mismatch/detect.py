@@ -14,7 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
-DRAWS = 4000
+DRAWS, BATCH = 4000, 500
+CLEAR = (1e-6, 0.1)  # p-values beyond which more draws would decide nothing
 SHARES = (0.6, 0.2, 0.2)  # of α for catalogue, bands and inputs
 
 
@@ -55,6 +56,9 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
            bands: list[np.ndarray], inputs: np.ndarray, spread: float, seed: int = 0) -> Detection:
     """Test a whitened residual r (N,) of a fit with Jacobian J (N, n).
 
+    Draws go on until their number no longer matters (as in J. Besag and P. Clifford, Biometrika 78,
+    1991), or to `DRAWS`.
+
     Args:
         units: (N, m) signs from `unit_columns`.
         one_sided: (m,) whether only positive scores count.
@@ -62,36 +66,47 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
         inputs: (N, k) columns of the inputs' past, orthonormal.
         spread: Relative standard error of the noise's power.
     """
-    blocks = [units, *(project(J, b) for b in bands), project(J, inputs)]
-    L = np.concatenate(blocks, axis=1)
+    lines = project(J, np.concatenate([*bands, inputs], axis=1))
+    L = np.concatenate([units, lines], axis=1)
+    m = units.shape[1]
+    ends = m + np.cumsum([0, *(b.shape[1] for b in (*bands, inputs))])
+    freedom = np.maximum(np.diff(ends), 1)
+
+    def statistics(scores: np.ndarray) -> np.ndarray:
+        """(k, 3) of scores (k, m + ...): the strongest sign, the loudest band, the inputs."""
+        signs = scores[:, :m]
+        size = np.where(one_sided, np.maximum(signs, 0.0), np.abs(signs))
+        powers = np.stack([np.einsum("ki,ki->k", part, part) for part in (
+            scores[:, a:b] for a, b in pairwise(ends))], axis=1)
+        # bands of many and of few lines compare by their standard scores (Wilson and Hilferty)
+        normal = ((powers / freedom) ** (1 / 3) - (1 - 2 / (9 * freedom))) / np.sqrt(
+            2 / (9 * freedom))
+        return np.stack([np.max(size, axis=1, initial=0.0) ** 2, np.max(normal[:, :-1], axis=1),
+                         normal[:, -1]], axis=1)
+
     C = L.T @ L
     # signs and bands overlap: what they share makes C singular up to rounding
     root = np.linalg.cholesky(C + 1e-7 * max(float(np.diag(C).max(initial=0.0)), 1e-12)
-                              * np.eye(len(C)))
+                              * np.eye(len(C))).T
     rng = np.random.default_rng(seed)
-    draws = rng.standard_normal((DRAWS, len(C))) @ root.T
-    draws *= np.exp(0.5 * spread * rng.standard_normal((DRAWS, 1)))
     z = L.T @ r
-    everything = np.vstack([z, draws])
-    ends = np.cumsum([0, *(b.shape[1] for b in blocks)])
-    m = units.shape[1]
-    scores = everything[:, :m]
-    strongest = np.max(np.where(one_sided, np.maximum(scores, 0.0), np.abs(scores)) ** 2, axis=1,
-                       initial=0.0)
-    powers = np.stack([np.sum(everything[:, a:b] ** 2, axis=1) for a, b in pairwise(ends[1:])],
-                      axis=1)
-    # bands of many and of few lines compare by their standard scores (Wilson and Hilferty)
-    freedom = np.maximum(np.diff(ends)[1:], 1)
-    normal = ((powers / freedom) ** (1 / 3) - (1 - 2 / (9 * freedom))) / np.sqrt(2 / (9 * freedom))
-    loudest = np.max(normal[:, :-1], axis=1)
-    p = [_tail(strongest), _tail(loudest), _tail(normal[:, -1])]
-    total = min(1.0, min(q / share for q, share in zip(p, SHARES, strict=True)))
+    observed = statistics(z[None])[0]
+    drawn: list[np.ndarray] = []
+    for _ in range(DRAWS // BATCH):
+        noise = rng.standard_normal((BATCH, len(C))) @ root
+        noise *= np.exp(0.5 * spread * rng.standard_normal((BATCH, 1)))
+        drawn.append(statistics(noise))
+        p = [_tail(value, column) for value, column in
+             zip(observed, np.concatenate(drawn).T, strict=True)]
+        total = min(1.0, min(q / share for q, share in zip(p, SHARES, strict=True)))
+        if not CLEAR[0] < total < CLEAR[1]:
+            break
     return Detection(total, p[0], p[1], p[2], z[:m], float(r @ r))
 
 
-def _tail(values: np.ndarray) -> float:
-    """p-value of the first against the others; beyond them by the exponential tail of a χ²."""
-    observed, drawn = float(values[0]), np.sort(values[1:])
+def _tail(observed: float, drawn: np.ndarray) -> float:
+    """p-value of a value against those drawn; beyond them by the exponential tail of a χ²."""
+    drawn = np.sort(drawn)
     above = len(drawn) - int(np.searchsorted(drawn, observed))
     if above >= 10:
         return (above + 1) / (len(drawn) + 1)
