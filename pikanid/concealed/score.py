@@ -25,6 +25,8 @@ VERDICTS = ("none", "named", "set", "unconfirmed", "unnamed")
 ANSWERS = ("named", "set")
 MOST_HYPOTHESES = 2
 SYMBOLIC = "symbolic:"
+# Laws that an entry of the catalogue includes: dry friction with or without a rise at low speed.
+INCLUDED = {"stribeck_friction": "coulomb_friction"}
 # What the formula of a law that is in no catalogue must hold; who writes another one is wrong.
 FORMULAS = {
     "stribeck_friction": r"exp\(.*sign\(\w+_dot\)",
@@ -148,7 +150,8 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
         raise errors.BadSetting(errors.diagnosis_unreadable(str(case["id"]), verdict))
     given.sort(key=lambda hypothesis: -hypothesis[1])
     explanations = [effects for effects, _ in given]
-    truth = [{effect["id"], *effect["twins"]} for effect in case["effects"]]
+    truth = [{effect["id"], *effect["twins"], INCLUDED.get(effect["id"], effect["id"])}
+             for effect in case["effects"]]
     outcome, reason = _outcome(case, truth, verdict, mismatch, explanations)
     answered = verdict in ANSWERS and bool(given)
     return Score(
