@@ -242,3 +242,15 @@ def test_drag_is_found_on_light_balls_only(recordings_folder: object) -> None:
         assert row.after < (0.25 if row.recording == "Tennis Ball" else 0.2) * row.before
     heavy = ("Golf Ball", "Baseball", "Bowling Ball")
     assert [row.verdict for row in diagnosis_real.falling_balls(heavy)] == ["none"] * 3
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_cubic_spring_of_the_silverbox_is_found(recordings_folder: object) -> None:
+    import diagnosis_real
+
+    (row,) = diagnosis_real.silverbox()
+    assert row.verdict in ("named", "set", "unconfirmed")
+    assert row.hypotheses == ("cubic_stiffness + input_hold",)
+    # both official tests, the extrapolating one too
+    assert all(float(part.split()[1]) <= 1.1 for part in row.remark.split(", "))
