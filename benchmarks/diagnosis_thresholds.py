@@ -47,6 +47,7 @@ SKIPPED: Mapping[str, Any] = {"advice": "", "force_over_time": None, "patch": No
 AFTERWARDS = "says where, how large or what next once the verdict stands"
 BEFOREHAND = "plans experiments, diagnoses none"
 LONGER = "acts on longer recordings only"
+REPEATED = "acts on repeated experiments only"
 STEPS = "iterations or steps of a numerical method"
 LEFT_OUT: Mapping[str, Mapping[str, str]] = {
     AFTERWARDS: {"advice": "*", "force_shape": "ADEQUATE OWN", "latent_force": "*", "locate": "*",
@@ -54,11 +55,12 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
     BEFOREHAND: {"confusable": "*", "experiments": "*", "profiles": "*", "seen": "*",
                  "sizing": "*"},
     LONGER: {"case": "SEARCHED", "judge": "MOST_ROWS", "preparation": "LONG FINE"},
-    STEPS: {"hypothesis": "LIMIT HURRIED HILLS COARSE", "least_squares": "PATIENCE",
-            "tangent": "*", "whitened": "FINEST"},
+    REPEATED: {"repeats": "*"},
+    STEPS: {"hypothesis": "LIMIT HURRIED HILLS COARSE", "judge": "AGAIN",
+            "least_squares": "PATIENCE", "tangent": "*", "whitened": "FINEST"},
     "number of threads": {"in_turn": "*"},
     "number of draws, points or knots": {
-        "detect": "DRAWS", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
+        "detect": "DRAWS BATCH", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
     "where fits begin": {"beginning": "SHARE", "channels": "LAGS"},
     "acts without a held-out recording only": {"preparation": "ASIDE LEAST"}}
 
