@@ -136,8 +136,8 @@ def _real(work: Path, names: Sequence[str]) -> str:
 
 REAL = """Two drops of one ball repeat one experiment: what differs between them is noise, of any
 colour, and what is missing has to repeat.  Silverbox: fitted to 24,000 samples; in the last column
-both official tests.  Water carried by a robot: runs named by motion, time and turn; the delay of the
-film comes from the energies of film and motion, before any model.
+both official tests.  Water carried by a robot: runs named by motion, time and turn; the delay of
+the film comes from the energies of film and motion, before any model.
 """
 
 INTRODUCTION = """
