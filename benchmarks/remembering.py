@@ -16,6 +16,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.whitened import Whitened
 
@@ -78,6 +79,10 @@ class Memory:
             return tuple((self.mark(k), self.mark(v)) for k, v in thing.items())
         if isinstance(thing, Sequence):
             return tuple(self.mark(element) for element in thing)
+        if isinstance(thing, frozenset):
+            return frozenset(self.mark(element) for element in thing)
+        if isinstance(thing, Closest):
+            return "Closest", thing.chi2  # what was asked of it serves fits side by side only
         return self._mark_of_object(thing)
 
     def _mark_of_object(self, thing: Any) -> Hashable:

@@ -148,9 +148,10 @@ hypotheses, of the cases that the recordings could tell ("nameable": the nominal
 hidden effects one may be too weak for anybody (the recording without it fits to less than 4 sigma);
 to name the other one alone is neither right nor wrong, but *wrong strictly*. A *formula* is an
 answer `symbolic:...` of the kind of law that is hidden, where that is in no catalogue; any other
-formula is wrong. Dry friction that rises at low speed (Stribeck) counts as `coulomb_friction`, whose
-entry in the catalogue includes it. Noise of a case: white, coloured, with outliers, dropouts or quantised. Held-out
-RMSEs are of plain predictions: they carry the parameters' error. Intervals are Wilson's at 95 %.
+formula is wrong. Dry friction that rises at low speed (Stribeck) counts as `coulomb_friction`,
+whose entry in the catalogue includes it. Noise of a case: white, coloured, with outliers, dropouts
+or quantised. Held-out RMSEs are of plain predictions: they carry the parameters' error. Intervals
+are Wilson's at 95 %.
 """
 
 

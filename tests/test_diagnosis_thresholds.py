@@ -8,7 +8,7 @@ from remembering import Memory
 
 import pikanid as pk
 from pikanid import excitation
-from pikanid.mismatch import hypothesis, verdict, whitened
+from pikanid.mismatch import hypothesis, search, verdict, whitened
 
 NUMBERS = {str(t): t for t in varied.named_numbers()}
 
@@ -84,6 +84,19 @@ def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
     assert "| `verdict.BEHIND` | 3 → 3.75 | 1 of 1 | 1 of 1 | rich 001 |" in text
     assert "rich 001 (`verdict.BEHIND`, `verdict.GUARD`)" in text
     assert "No verdict of 1 depends on `case." in text and "`case.BETTER`" in text
+
+
+def test_a_diagnosis_repeated_fits_nothing_anew(monkeypatch):
+    train, other = (pk.simulate(pk.systems.sloshing(), excitation.two_pulse(), sigma=0.002,
+                                seed=seed) for seed in (1, 2))
+    fits = []
+    fitted = search.fitted
+    monkeypatch.setattr(search, "fitted", lambda *given: fits.append(1) or fitted(*given))
+    memory = Memory()
+    varied.diagnosed(train, other, memory)
+    count = len(fits)
+    varied.diagnosed(train, other, memory.fork())
+    assert len(fits) == count > 0
 
 
 @pytest.mark.slow

@@ -129,7 +129,8 @@ class Start:
 
 def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
            starts: Sequence[Start | Mapping[str, float]], choices: int,
-           closest: Closest | None = None) -> Hypothesis | None:
+           closest: Closest | None = None, settled: frozenset[str] = frozenset()
+           ) -> Hypothesis | None:
     """Refit the nominal model with effects added.
 
     Args:
@@ -140,6 +141,7 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         choices: Number of effects to choose from.
         closest: χ² of the closest fit so far: one that stays far above is not carried through, and
             simulations need not be much more accurate than it is.
+        settled: Keys of effects that need not be looked for beyond the hills about the start.
 
     Returns:
         The best local fit, or None where none of the starts can be simulated.
@@ -178,10 +180,10 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
                         beyond=beyond)
         if best is None:
             return None
-    if any(e.hills for e in effects) and not beyond(best.chi2):
-        for effect in effects:
-            if effect.hills:
-                best = _over_hills(whitened, best, effect, limit)
+    hilly = [e for e in effects if e.hills and e.key not in settled]
+    if hilly and not beyond(best.chi2):
+        for effect in hilly:
+            best = _over_hills(whitened, best, effect, limit)
     penalty = _penalty(effects, whitened.rows, choices)
     return Hypothesis(tuple(effects), model, whitened, best, penalty)
 

@@ -256,7 +256,8 @@ class Search:
             least = TELLING * hypothesis.minimum.chi2
         always = fixed if any(e.channel == "input" for e in hypothesis.effects) else nothing
         self._fit_all([((*hypothesis.effects, candidate), starts)
-                       for candidate, starts in screen.singles(count, least, always)])
+                       for candidate, starts in screen.singles(count, least, always)],
+                      settled=frozenset() if hypothesis.far else hypothesis.key)
 
     def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False
              ) -> Hypothesis:
@@ -264,7 +265,7 @@ class Search:
         return self.fits.get(frozenset(e.key for e in effects), self.fits[frozenset()])
 
     def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False,
-                 beside: float = 0.0) -> None:
+                 beside: float = 0.0, settled: frozenset[str] = frozenset()) -> None:
         """Fit these effects from these starts, one after the other, and keep what is better; what
         is known is fitted `again` only, and nothing once the search is tired, except `always`.
         Fits far above the closest one, and above `beside` [χ²], are given up.
@@ -274,7 +275,7 @@ class Search:
         def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
             (effects, starts), closest = job, Closest(chi2)
             return fitted(self.nominal, sorted(effects, key=lambda e: order[e.key]), self.records,
-                          starts, self.choices, closest), closest
+                          starts, self.choices, closest, settled), closest
 
         def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
             found, _ = result
