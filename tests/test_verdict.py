@@ -41,15 +41,19 @@ def hypothesis(chi2: float, *effects: Candidate) -> Hypothesis:
 
 
 def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
-             refused: tuple[str, ...] = ()) -> Answer:
-    """The answer with these held-out evidences (0 unless given), some effects refuted there."""
+             refused: tuple[str, ...] = (), unseen: tuple[str, ...] = ()) -> Answer:
+    """The answer with these held-out evidences (0 unless given), some effects refuted there, some
+    not to be seen.
+    """
     def found(h: Hypothesis) -> Detection:
         p = 1e-6 if h.key & set(refused) else 0.5
         return cast(Detection, SimpleNamespace(p_value=p))
 
     def predicted(h: Hypothesis) -> HeldOut:
         value = (evidence or {}).get("+".join(sorted(h.key)), 0.0)
-        return cast(HeldOut, SimpleNamespace(detection=found(h), evidence=value, rmse=1.0))
+        rest = np.array([3.0 * (name in h.key) * (name not in unseen) for name in ("a", "b")])
+        return cast(HeldOut, SimpleNamespace(detection=found(h), evidence=value, rmse=1.0,
+                                             rest=rest))
 
     def adequate(h: Hypothesis) -> Detection:
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
@@ -87,6 +91,8 @@ def test_each_of_several_effects_has_to_help_on_the_held_out_recording() -> None
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1010.0, B), hypothesis(900.0, A, B)]
     assert answered(fits, {"a": 50.0, "b": 50.0}).verdict == "named"
     assert answered(fits, {"a": 50.0}).verdict == "unconfirmed"
+    assert answered(fits, {"a": 50.0}, unseen=("a",)).verdict == "named"
+    assert answered(fits, {"a": 50.0}, unseen=("b",)).verdict == "unconfirmed"
     # where the held-out recording speaks against one more effect, it is not given
     nearly = [BASE, hypothesis(1000.0, A), hypothesis(989.0, A, B)]
     assert answered(nearly, {"a+b": 1.0}).verdict == "named"

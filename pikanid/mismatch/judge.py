@@ -33,6 +33,7 @@ class HeldOut:
         evidence: -2 ln of the probability density of the recording, given the fit (up to a
             constant that all hypotheses share).
         predicted, measured, t: First output.
+        rest: (N,) whitened residual with that forgiveness.
         residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
     """
 
@@ -44,6 +45,7 @@ class HeldOut:
     measured: np.ndarray
     predicted: np.ndarray
     residuals: tuple[tuple[int, str, np.ndarray, np.ndarray], ...]
+    rest: np.ndarray
 
     @functools.cached_property
     def detection(self) -> Detection:
@@ -167,7 +169,8 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     chi2 = found.chi2 + prior.constant - float(np.sum((q.T @ found.r) ** 2))
     samples = whitened.problem.experiments[0].samples[0]
     return HeldOut(rmse, tests, chi2, chi2 + big - small, samples.t, samples.y,
-                   responses[0].y[: len(samples.t)], tuple(_residuals(whitened, gaps)))
+                   responses[0].y[: len(samples.t)], tuple(_residuals(whitened, gaps)),
+                   found.r[: whitened.rows])
 
 
 def _residuals(whitened: Whitened, gaps: list[np.ndarray]

@@ -125,10 +125,18 @@ def _speaks(one: Hypothesis, other: Hypothesis, predict: Predict, least: float =
 def _proven(h: Hypothesis, tried: Sequence[Hypothesis], predict: Predict, scale: float) -> bool:
     """Whether the held-out recording speaks for each of several effects, too.
 
-    One of several is easily found that takes up what the others leave, whatever that is.
+    One of several is easily found that takes up what the others leave, whatever that is.  Of an
+    effect that would hardly show in the held-out recording no proof can be asked.
     """
     rest = {h.key - {e.key} for e in h.effects if not e.absent} if len(h.effects) > 1 else ()
-    return all(_speaks(h, o, predict, PROVEN * scale) for o in tried if o.key in rest)
+    return all(_speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
+               for o in tried if o.key in rest)
+
+
+def _alike(one: Hypothesis, other: Hypothesis, predict: Predict, scale: float) -> bool:
+    """Whether what two hypotheses predict differs by less than a standard deviation in all."""
+    a, b = predict(one), predict(other)
+    return a is not None and b is not None and float(np.sum((a.rest - b.rest) ** 2)) < scale
 
 
 def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
