@@ -41,6 +41,11 @@ def law(c: Candidate) -> bool:
     return c.known and c.channel == "dynamics" and len(c.parameters) == 1
 
 
+def entry(c: Candidate) -> bool:
+    """An entry of the catalogue.  About a model that is far off, first steps say little."""
+    return c.known
+
+
 def fixed(c: Candidate) -> bool:
     """An effect without parameters.  What another one does to an input bends its sign."""
     return c.known and not c.parameters
@@ -102,10 +107,20 @@ class Screen:
                 several[k][0]].scales else several[k][:1]
             listed.append((candidate, [self._start(candidate, s, self.z[s]) for s in signs]))
         # guards beside the entries, not in their place
-        known = [entry for entry in listed if entry[0].known][:count]
-        known += [(c, [Start(self.about.point, self.about.point)]) for c in self.found.candidates
-                  if always(c) and all(c is not entry[0] for entry in known)]
-        return known + [entry for entry in listed if not entry[0].known][:max(count // 3, 1)]
+        known = [one for one in listed if one[0].known][:count]
+        known += [(c, self._anyhow(k)) for k, c in enumerate(self.found.candidates)
+                  if always(c) and all(c is not one[0] for one in known)]
+        return known + [one for one in listed if not one[0].known][:max(count // 3, 1)]
+
+    def _anyhow(self, candidate: int) -> list[Start]:
+        """Where fits of a candidate begin that promises nothing: at some of its levels, or at no
+        effect.
+        """
+        own = np.flatnonzero((self.found.owner == candidate) & (self.lengths > 0))
+        levels = [int(k) for k in own if not self.found.signs[k].scales]
+        some = levels[::-2][:3] if len(levels) > 3 else levels
+        return [self._start(self.found.candidates[candidate], k, 0.0) for k in some] or [
+            Start(self.about.point, self.about.point)]
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
         size = float(amplitude / self.lengths[sign])

@@ -13,7 +13,7 @@ from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
 from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.least_squares import repeated
-from pikanid.mismatch.screen import Screen, as_strong, fixed, law, nothing
+from pikanid.mismatch.screen import Screen, as_strong, entry, fixed, law, nothing
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
@@ -76,7 +76,8 @@ class Search:
         every = [c for c in self.candidates if c.fits]
         screen = Screen(self.base(), every)
         self.tell("single effects")
-        self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES, always=law)],
+        always = entry if self.base().far else law
+        self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES, always=always)],
                       always=True)
         if self.base().far and self.base().pinned:
             # at a bound the model explains as little as it can: effects show about the guess
