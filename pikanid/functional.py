@@ -21,7 +21,7 @@ from scipy import sparse
 from pikanid import errors
 from pikanid.adequacy import difference_noise
 from pikanid.approximators import Array
-from pikanid.approximators.tables import Table, anchor, side_by_side
+from pikanid.approximators.tables import Shown, anchor, side_by_side
 from pikanid.chains import Chains
 from pikanid.evaluated import delays
 from pikanid.expressions import symbol
@@ -67,9 +67,8 @@ class Functional:
         """
         parts = self.parts
         if extra:
-            parts = tuple(replace(part, physics=part.physics.with_tops([
-                Table.of(table.approximator, table.t, table.derivative + extra, table.part)
-                for table in part.physics.tops])) for part in self.parts)
+            parts = tuple(replace(part, physics=part.physics.differentiated(extra))
+                          for part in self.parts)
         return replace(self, penalty="roughness", parts=parts)
 
     @functools.cached_property
@@ -221,26 +220,22 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
         free = problem.columns(r)[0].tolist()
         sizes = [a.n_coefficients for a in own]
         pieces = [slice(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
-
-        def states(t: Array, own: tuple[AnyApproximator, ...] = own,
-                   pieces: list[slice] = pieces) -> tuple[Table, ...]:
-            return tuple(Table.of(own[i], t, q, pieces[i])
-                         for i, q in zip(chains.root, chains.order, strict=True))
-
+        states = [Shown(own[i], q, pieces[i])
+                  for i, q in zip(chains.root, chains.order, strict=True)]
+        tops = [Shown(own[i], m, pieces[i]) for i, m in enumerate(chains.lengths)]
         data = [] if like is None else [
-            sites.with_states(states(sites.t)) for sites in like.parts[r].data]
+            sites.with_states(states) for sites in like.parts[r].data]
         for samples in experiment.samples if like is None else ():
             seen = np.maximum(samples.t - late[samples.output], experiment.t0)
             sigma = _spread(samples, len(problem.model.outputs) > 1) if weighted else 1.0
             weight = np.empty((seen.size, 1))
             weight[:, 0] = 1.0 / sigma
-            data.append(Sites.of(seen, experiment.inputs(seen), weight, states(seen), (),
+            data.append(Sites.of(seen, experiment.inputs(seen), weight, states, (),
                                  np.ascontiguousarray(samples.y)[None], samples.output,
                                  None if samples.sigma is None else weight[:, 0] * samples.sigma,
                                  vector_field.linearised_outputs([samples.output], free)))
-        tops = tuple(Table.of(own[i], times, m, pieces[i]) for i, m in enumerate(chains.lengths))
         weight = np.sqrt(weights)[:, None] * np.ones(len(own))
-        physics = Sites.of(times, experiment.inputs(times), weight, states(times), tops,
+        physics = Sites.of(times, experiment.inputs(times), weight, states, tops,
                            lines=vector_field.linearised_rhs(chains.top, free))
         held, hold, start = np.zeros(0, np.int64), np.zeros((0, len(chains.root))), None
         if given_start:
@@ -248,7 +243,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
             if grip is None:
                 at = np.array([experiment.t0])
                 heavy = np.full((1, len(chains.root)), START_WEIGHT)
-                start = Sites.of(at, experiment.inputs(at), heavy, states(at))
+                start = Sites.of(at, experiment.inputs(at), heavy, states)
             else:
                 held, hold = grip[0], np.empty_like(grip[1])
                 hold[:, np.lexsort((chains.order, chains.root))] = grip[1]

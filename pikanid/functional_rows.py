@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from pikanid.approximators import Approximator, Array, LinearApproximator
-from pikanid.approximators.tables import Bases, Table, side_by_side
+from pikanid.approximators.tables import Bases, Shown, Table, side_by_side
 from pikanid.simulation.vectorfield import Linearised
 
 AnyApproximator = Approximator | LinearApproximator
@@ -33,22 +33,24 @@ class Sites:
     bases: Bases | None = None  # of states and tops together, where they are linear
 
     @staticmethod
-    def of(t: Array, u: Array, weight: Array, states: Sequence[Table], tops: Sequence[Table] = (),
+    def of(t: Array, u: Array, weight: Array, states: Sequence[Shown], tops: Sequence[Shown] = (),
            target: Array | None = None, output: int = 0, deviation: Array | None = None,
            lines: Linearised | None = None) -> Sites:
         """Sites whose tables share their memory."""
-        tables, bases = Bases.shared((*states, *tops))
+        tables, bases = Bases.of((*states, *tops), t)
         n = len(states)
         return Sites(t, u, weight, tables[:n], tables[n:], target, output, deviation, lines, bases)
 
-    def with_states(self, states: Sequence[Table]) -> Sites:
+    def with_states(self, states: Sequence[Shown]) -> Sites:
         """The same sites with other tables of the states, of data."""
         return Sites.of(self.t, self.u, self.weight, states, (), self.target, self.output,
                         self.deviation, self.lines)
 
-    def with_tops(self, tops: Sequence[Table]) -> Sites:
-        """The same sites with other tables on top."""
-        return Sites.of(self.t, self.u, self.weight, self.states, tops, self.target, self.output,
+    def differentiated(self, extra: int) -> Sites:
+        """The same sites, the tops `extra` derivatives higher."""
+        states = [table.shown for table in self.states]
+        tops = [table.shown._replace(derivative=table.derivative + extra) for table in self.tops]
+        return Sites.of(self.t, self.u, self.weight, states, tops, self.target, self.output,
                         self.deviation, self.lines)
 
     def values(self, c: Array) -> Array:

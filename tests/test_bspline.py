@@ -19,7 +19,7 @@ from pikanid.approximators.bspline import (
     split_breakpoints,
     uniform_knots,
 )
-from pikanid.approximators.tables import Bases, Table, anchor, gauss_nodes
+from pikanid.approximators.tables import Bases, Shown, Table, anchor, gauss_nodes
 
 
 def repeated(degree: int, multiplicity: int) -> BSpline:
@@ -147,8 +147,9 @@ def test_bases_in_one_piece_of_memory_are_the_tables() -> None:
     splines, t = (repeated(4, 2), repeated(3, 1)), np.linspace(0.0, 3.0, 13)
     ends = np.cumsum([0, *(spline.n_basis for spline in splines)]).tolist()
     parts = [slice(ends[0], ends[1]), slice(ends[1], ends[2])]
-    tables = [Table.of(splines[i], t, q, parts[i]) for i, q in ((0, 0), (1, 1), (0, 2))]
-    shared, bases = Bases.shared(tables)
+    shown = [Shown(splines[i], q, parts[i]) for i, q in ((0, 0), (1, 1), (0, 2))]
+    tables = [Table.of(spline, t, q, part) for spline, q, part in shown]
+    shared, bases = Bases.of(shown, t)
     c = np.random.default_rng(4).normal(size=ends[-1])
     assert bases is not None
     values = bases.values(c)

@@ -87,13 +87,21 @@ class BSpline:
         Raises:
             ValueError: If a time lies outside [start, stop].
         """
-        from pikanid.approximators.local_basis import tabulate
-
         t = np.array(t, dtype=float)  # writeable and contiguous: one compiled form serves all
         first, values = np.empty(t.size, np.int64), np.empty((t.size, self.degree + 1))
+        self.fill(t, derivative, first, values)
+        return first, values
+
+    def fill(self, t: Array, derivative: int, first: NDArray[np.int64], values: Array) -> None:
+        """The same as ``local`` into arrays of the caller's; all of them writeable, contiguous.
+
+        Raises:
+            ValueError: If a time lies outside [start, stop].
+        """
+        from pikanid.approximators.local_basis import tabulate
+
         if not tabulate(self.knots, self.degree, derivative, t, first, values):
             raise ValueError(errors.outside_spline(self.start, self.stop))
-        return first, values
 
     def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
         """The ``derivative``-th time derivative at ``t`` (M,) for coefficients (n_basis,)."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,14 @@ from pikanid.approximators import (
 from pikanid.approximators.bspline import BSpline
 
 Matrix = Array | sparse.csr_array
+
+
+class Shown(NamedTuple):
+    """What a table is to show: a derivative of the approximator of coefficients `part`."""
+
+    approximator: Approximator | LinearApproximator
+    derivative: int
+    part: slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +55,11 @@ class Table:
             return Table(approximator, t, derivative, part)
         first, local = _window(approximator, t, derivative)
         return Table(approximator, t, derivative, part, first + part.start, local)
+
+    @property
+    def shown(self) -> Shown:
+        """What it shows, whatever the times."""
+        return Shown(self.approximator, self.derivative, self.part)
 
     def values(self, coefficients: Array) -> Array:
         """Values (M,) for a recording's coefficients (n,)."""
@@ -81,20 +95,26 @@ class Bases:
     width: NDArray[np.int64]  # (T,)
 
     @staticmethod
-    def shared(tables: Sequence[Table]) -> tuple[tuple[Table, ...], Bases | None]:
-        """The tables with their bases in one piece of memory; None where one is not linear."""
-        windows = [(table.first, table.local) for table in tables]
-        local = [own for _, own in windows if own is not None]
-        if len(local) < len(tables):
-            return tuple(tables), None
-        ends = list(itertools.accumulate((own.size for own in local), initial=0))
-        bases = Bases(np.array([first for first, _ in windows]),
-                      np.concatenate([own.ravel() for own in local]), np.array(ends[:-1]),
-                      np.array([own.shape[1] for own in local]))
-        return tuple(
-            Table(table.approximator, table.t, table.derivative, table.part, bases.first[k],
-                  bases.local[ends[k]:ends[k + 1]].reshape(own.shape))
-            for k, (table, own) in enumerate(zip(tables, local, strict=True))), bases
+    def of(shown: Sequence[Shown], t: Array) -> tuple[tuple[Table, ...], Bases | None]:
+        """Tables at times t (M,), their bases in one piece of memory; None if one is not linear."""
+        linear = [one.approximator for one in shown if is_linear(one.approximator)]
+        if len(linear) < len(shown):
+            return tuple(Table.of(one.approximator, t, one.derivative, one.part)
+                         for one in shown), None
+        times = np.array(t, dtype=float)  # writeable and contiguous
+        windows = [_placing(approximator, times, one.derivative)
+                   for approximator, one in zip(linear, shown, strict=True)]
+        width = [own for own, _ in windows]
+        ends = list(itertools.accumulate((t.size * own for own in width), initial=0))
+        bases = Bases(np.empty((len(shown), t.size), np.int64), np.empty(ends[-1]),
+                      np.array(ends[:-1]), np.array(width))
+        tables = []
+        for k, (one, (own, place)) in enumerate(zip(shown, windows, strict=True)):
+            first, local = bases.first[k], bases.local[ends[k]:ends[k + 1]].reshape(-1, own)
+            place(first, local)
+            first += one.part.start
+            tables.append(Table(one.approximator, t, one.derivative, one.part, first, local))
+        return tuple(tables), bases
 
     def values(self, coefficients: Array) -> Array:
         """Values (T, M) for a recording's coefficients (n,)."""
@@ -118,6 +138,19 @@ def side_by_side(tables: Sequence[Table], coefficients: Array) -> Array:
             own = coefficients[table.part]
             out[:, k] = table.approximator.values(table.t, own, table.derivative)
     return out
+
+
+def _placing(approximator: LinearApproximator, t: Array, derivative: int
+             ) -> tuple[int, Callable[[NDArray[np.int64], Array], None]]:
+    """Width of a local basis, and what writes its first functions (M,) and values to a place."""
+    if isinstance(approximator, BSpline):  # no values before the place is known
+        return approximator.degree + 1, functools.partial(approximator.fill, t, derivative)
+    found = local_rows(approximator.basis(t, derivative))
+
+    def place(first: NDArray[np.int64], local: Array) -> None:
+        first[:], local[:] = found
+
+    return found[1].shape[1], place
 
 
 def _window(approximator: LinearApproximator, t: Array, derivative: int

@@ -60,9 +60,10 @@ def _interpolated(spline: BSpline, t: Array, values: Array) -> Array:
     """Coefficients (n,) of the spline through values (n,) at as many times t, a banded system."""
     first, local = spline.local(t)
     k = spline.degree
-    matrix, columns = np.zeros((3 * k + 1, t.size)), first[:, None] + np.arange(k + 1)
+    # column after column, as LAPACK works on it in place
+    matrix, columns = np.zeros((t.size, 3 * k + 1)).T, first[:, None] + np.arange(k + 1)
     matrix[2 * k + np.arange(t.size)[:, None] - columns, columns] = local
-    _, _, coefficients, info = dgbsv(k, k, matrix, values)
+    _, _, coefficients, info = dgbsv(k, k, matrix, values, overwrite_ab=1)
     if info:
         raise np.linalg.LinAlgError("the sites do not determine the spline")
     return coefficients
