@@ -93,6 +93,7 @@ class Candidate:
     fits: bool = True
     covers: tuple[str, ...] = ()
     hills: tuple[float, ...] = ()
+    levels: tuple[Mapping[str, float], ...] = ()
 
     @property
     def key(self) -> str:

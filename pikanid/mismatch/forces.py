@@ -134,6 +134,7 @@ def wall_impact(site: Site) -> list[Candidate]:
     """A stiff stop on one side that gives way elastically."""
     # a contact shorter than from one sample to the next looks the same, however short
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
+    walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.swing, np.array([0.03, 0.1, 0.3])
 
     def one(side: int) -> Candidate:
         w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
@@ -152,7 +153,9 @@ def wall_impact(site: Site) -> list[Candidate]:
         return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
                          lambda m: m.with_term(site.v, text), signs,
                          variant="" if side > 0 else SIDE,
-                         hills=(0.985, 0.993, 0.997, 1.003, 1.007, 1.015))
+                         hills=(0.985, 0.993, 0.997, 1.003, 1.007, 1.015),
+                         levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
+                                      for at in walls for share in stiffnesses))
 
     return [one(1), one(-1)]
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import unit_columns
-from pikanid.mismatch.hypothesis import Hypothesis, Start, start_from
+from pikanid.mismatch.hypothesis import GLANCE, Hypothesis, Start, start_from
 from pikanid.mismatch.tangent import Directions, directions
+from pikanid.mismatch.whitened import Whitened
 
 FAINT, FAINT_PAIR = 3.0, 6.0  # χ² that one effect, and two, must gain to first order to be tried
 EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # of |v|, that have names
@@ -54,6 +55,21 @@ def fixed(c: Candidate) -> bool:
 def nothing(c: Candidate) -> bool:
     """No candidate at all."""
     return False
+
+
+def best_level(h: Hypothesis, candidate: Candidate) -> Start:
+    """The level of a candidate that leaves the least χ² beside a hypothesis as it stands."""
+    whitened = Whitened(candidate.applied(h.model), h.whitened.records)
+    problem = whitened.problem
+
+    def at(level: Mapping[str, float]) -> np.ndarray:
+        named = {**h.point, **level}
+        return np.array([named.get(f.label, named.get(f.name, f.guess)) for f in problem.free])
+
+    # which one is best is told at a glance
+    whitened.choose_steps(at(candidate.levels[len(candidate.levels) // 2]), misfit=GLANCE)
+    best = min(candidate.levels, key=lambda level: whitened.chi2(at(level)))
+    return Start({**h.point, **best}, {**h.point, **best})
 
 
 class Screen:
@@ -108,19 +124,21 @@ class Screen:
             listed.append((candidate, [self._start(candidate, s, self.z[s]) for s in signs]))
         # guards beside the entries, not in their place
         known = [one for one in listed if one[0].known][:count]
-        known += [(c, self._anyhow(k)) for k, c in enumerate(self.found.candidates)
-                  if always(c) and all(c is not one[0] for one in known)]
+        # where no start is better than another, each has to be followed to its end
+        known += [(c, [start]) for k, c in enumerate(self.found.candidates)
+                  if always(c) and (c.levels or all(c is not one[0] for one in known))
+                  for start in self._anyhow(k)]
         return known + [one for one in listed if not one[0].known][:max(count // 3, 1)]
 
     def _anyhow(self, candidate: int) -> list[Start]:
-        """Where fits of a candidate begin that promises nothing: at some of its levels, or at no
-        effect.
-        """
+        """Where a fit of a candidate begins that promises nothing."""
+        c = self.found.candidates[candidate]
+        if c.levels:
+            return [best_level(self.about, c)]
         own = np.flatnonzero((self.found.owner == candidate) & (self.lengths > 0))
         levels = [int(k) for k in own if not self.found.signs[k].scales]
         some = levels[::-2][:3] if len(levels) > 3 else levels
-        return [self._start(self.found.candidates[candidate], k, 0.0) for k in some] or [
-            Start(self.about.point, self.about.point)]
+        return [self._start(c, k, 0.0) for k in some] or [Start(self.about.point, self.about.point)]
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
         size = float(amplitude / self.lengths[sign])

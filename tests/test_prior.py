@@ -1,0 +1,51 @@
+"""What a fit says of shared parameters: exact where it is linearised, and where it is renewed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.api import _opened
+from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.prior import elsewhere, of_fit
+
+
+@pytest.fixture(scope="module")
+def fit() -> Hypothesis:
+    """Nominal fit whose start is free as well: a parameter that no other recording shares."""
+    model = pk.systems.sloshing().with_initial(theta="free", theta_dot="free")
+    recs = [pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=0.002, seed=seed)
+            for seed in (0, 1)]
+    return _opened(model, (recs[0],), (recs[1],), None, lambda text: None).base
+
+
+def test_the_others_follow_so_that_chi_squared_stays_least(fit: Hypothesis) -> None:
+    names = ["d_theta", "l_theta"]
+    prior = of_fit(fit, names)
+    step = np.linalg.solve(prior.root, [0.3, -0.2])
+    expected = np.array([fit.values[n] for n in names]) + step
+    # least squares over the others, to first order
+    free = [f.name for f in fit.whitened.problem.free]
+    shared = [free.index(n) for n in names]
+    others = [k for k in range(len(free)) if k not in shared]
+    assert len(others) == 2
+    J = fit.minimum.J
+    moved = np.linalg.lstsq(J[:, others], -J[:, shared] @ step, rcond=None)[0]
+    np.testing.assert_allclose(prior.follow[others] @ step, moved, rtol=1e-9, atol=1e-15)
+    rise = np.sum((J[:, shared] @ step + J[:, others] @ moved) ** 2)
+    assert np.sum(prior.residual(expected) ** 2) == pytest.approx(rise, rel=1e-9)
+    assert prior.distance(expected) == pytest.approx(np.hypot(0.3, 0.2))
+
+
+def test_far_from_the_estimates_chi_squared_is_that_of_a_simulation(fit: Hypothesis) -> None:
+    names = [f.name for f in fit.whitened.problem.free]
+    prior = of_fit(fit, names)
+    away = fit.minimum.theta + np.linalg.solve(prior.root, np.full(len(names), 40.0))
+    renewed = elsewhere(prior, fit, away)
+    assert renewed is not None
+    truth = fit.whitened.chi2(away) - fit.minimum.chi2
+    found = renewed.constant + float(np.sum(renewed.residual(away) ** 2))
+    assert found == pytest.approx(truth, rel=1e-9)
+    # so far away the ellipsoid of the estimates says something else
+    assert abs(float(np.sum(prior.residual(away) ** 2)) / truth - 1) > 1e-3
