@@ -3,7 +3,9 @@
 Usage: python benchmarks/ipda_scaling.py [SAMPLES ...]
 
 Every size runs in a process of its own, so that its peak memory is its own.  Two inputs: pulses
-every two seconds, and a zero-order hold that jumps at every sample.
+every two seconds, and a zero-order hold that jumps at every sample.  A machine does not run at one
+speed all the time: three rounds over all sizes and inputs, of which the median and the extremes are
+shown.
 """
 
 from __future__ import annotations
@@ -11,27 +13,45 @@ from __future__ import annotations
 import json
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import time
+from typing import Any
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 KINDS = ("pulses", "every sample")
+ROUNDS = 3
 
 
 def main(sizes: tuple[int, ...]) -> None:
-    """Print one table row a size and kind of input."""
-    print("## iPDA, time and memory against the number of samples\n")
-    print("| input | N | intervals | seconds | µs a sample | bytes a sample |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for kind in KINDS:
-        for size in sizes:
+    """Print one table row a size and kind of input, then how evenly the cost grows."""
+    rows: dict[tuple[str, int], list[dict[str, Any]]] = {
+        (kind, size): [] for kind in KINDS for size in sizes}
+    for _ in range(ROUNDS):  # the rounds outermost: a slow minute meets all sizes, not one
+        for (kind, size), found in rows.items():
             done = subprocess.run(
                 [sys.executable, __file__, "--one", kind, str(size)], capture_output=True,
                 text=True, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
-            row = json.loads(done.stdout.splitlines()[-1])
-            print(f"| {kind} | {size} | {row['intervals']} | {row['seconds']:.3g} "
-                  f"| {1e6 * row['seconds'] / size:.3g} | {row['bytes'] / size:.4g} |", flush=True)
+            found.append(json.loads(done.stdout.splitlines()[-1]))
+    print("## iPDA, time and memory against the number of samples\n")
+    print(f"Median of {ROUNDS} rounds, each over all sizes; in brackets the fastest and the "
+          "slowest round.\n")
+    print("| input | N | intervals | seconds | µs a sample | bytes a sample |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for (kind, size), found in rows.items():
+        costs = sorted(1e6 * row["seconds"] / size for row in found)
+        middle = statistics.median(costs)
+        print(f"| {kind} | {size} | {found[0]['intervals']} | {1e-6 * size * middle:.3g} "
+              f"| {middle:.3g} ({costs[0]:.3g} to {costs[-1]:.3g}) "
+              f"| {statistics.median(row['bytes'] for row in found) / size:.4g} |")
+    print()
+    for kind in KINDS:
+        each = [[1e6 * row["seconds"] / size for row in rows[kind, size]] for size in sizes]
+        medians, fastest = list(map(statistics.median, each)), list(map(min, each))
+        print(f"Cost a sample, dearest size over cheapest, {kind}: "
+              f"{max(medians) / min(medians):.2f} by the medians, "
+              f"{max(fastest) / min(fastest):.2f} by the fastest rounds.\n")
 
 
 def one(kind: str, size: int) -> None:
