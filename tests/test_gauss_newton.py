@@ -98,7 +98,7 @@ def test_sandwich_and_effective_parameters(name: str) -> None:
     assert np.allclose(naive, bread[-size:, -size:] * np.mean(noise**2), rtol=1e-5)
     bound = error_bound(system, at, step, [noise])
     assert np.all(bound >= np.sqrt(np.diag(sandwich))) and np.all(np.isfinite(bound))
-    used = effective_parameters(system, at, step)
+    used = effective_parameters(system, at, step, respond(system, at, step).data)
     assert used == pytest.approx(np.trace(data @ bread @ data.T), rel=1e-6)
 
 

@@ -73,19 +73,18 @@ class BandedAssembler:
             for own in self.stretches])
 
     def normal(self, rows: Sequence[Rows]) -> BandedNormal:
-        """Assemble JᵀJ and Jᵀr from the residual families."""
+        """Assemble JᵀJ and Jᵀr from the residual families, all of them or the first ones."""
         from pikanid.optimise.banded_products import add_products
 
         b, kd = self.b, self.bandwidth
         whole, corner = np.zeros((self.n, kd + b + 2)), np.zeros((b + 1, b + 1))
-        costs = np.zeros(len(rows))
-        for k, (own, bases, windows, row) in enumerate(
-                zip(self.stretches, self.bases, self.windows, rows, strict=True)):
+        costs = [
             add_products(row.weight, row.factor, row.value, row.target, slopes(row.state_slopes),
                          slopes(row.theta_slopes), row.topped, bases.local, bases.offset,
-                         bases.width, windows.at, own.starts, own.columns, kd, whole, corner,
-                         costs[k:k + 1])
-        return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs.tolist()))
+                         bases.width, windows.at, own.starts, own.columns, whole, corner)
+            for own, bases, windows, row in zip(self.stretches, self.bases, self.windows, rows,
+                                                strict=False)]
+        return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs))
 
 
 def slopes(given: Array | None) -> Array:

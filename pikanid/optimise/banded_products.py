@@ -22,9 +22,8 @@ def _compiled(function: _Function) -> _Function:
 def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, target: np.ndarray,
                  by_state: np.ndarray, by_theta: np.ndarray, topped: bool, local: np.ndarray,
                  offset: np.ndarray, width: np.ndarray, at: np.ndarray, starts: np.ndarray,
-                 columns: np.ndarray, kd: int, whole: np.ndarray, corner: np.ndarray,
-                 cost: np.ndarray) -> None:
-    """Add VᵀV of a family's rows V = [∂r/∂local coefficients | ∂r/∂θ | r]; fill cost (1,), ‖r‖².
+                 columns: np.ndarray, whole: np.ndarray, corner: np.ndarray) -> float:
+    """Add VᵀV of a family's rows V = [∂r/∂local coefficients | ∂r/∂θ | r]; its ‖r‖².
 
     r is factor (E,) times weight (M, E) times (value (M, E) - target (E, M)); by_state (M, E, n)
     and by_theta (M, E, b) are slopes of the value, empty ones zero; if `topped`, target e is the
@@ -35,7 +34,7 @@ def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, targ
     corner (b + 1, b + 1).
     """
     w, states = columns.shape[1], by_state.shape[2]
-    size = w + corner.shape[0]
+    size, kd, cost = w + corner.shape[0], whole.shape[1] - corner.shape[0] - 1, 0.0
     row, gram = np.zeros(size), np.empty((size, size))
     for g in range(columns.shape[0]):
         gram[:] = 0.0
@@ -55,7 +54,7 @@ def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, targ
                 for j in range(by_theta.shape[2]):
                     row[w + j] = scale * by_theta[m, e, j]
                 row[size - 1] = scale * (value[m, e] - target[e, m])
-                cost[0] += row[size - 1] ** 2
+                cost += row[size - 1] ** 2
                 for i in range(size):
                     left = row[i]
                     for j in range(i + 1):
@@ -70,6 +69,7 @@ def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, targ
         for k in range(w, size):
             for j in range(w, size):
                 corner[k - w, j - w] += gram[max(k, j), min(k, j)]
+    return cost
 
 
 @_compiled
@@ -100,27 +100,6 @@ def carry(weight: np.ndarray, factor: np.ndarray, by_state: np.ndarray, by_theta
 
 
 @_compiled
-def pull_back(weight: np.ndarray, factor: np.ndarray, by_state: np.ndarray, by_theta: np.ndarray,
-              first: np.ndarray, local: np.ndarray, offset: np.ndarray, width: np.ndarray,
-              rows: np.ndarray, out: np.ndarray, out_theta: np.ndarray) -> None:
-    """Add Jᵀ rows (M, q) of a data family to out (n, q) and, by θ, to out_theta (b, q)."""
-    for m in range(rows.shape[0]):
-        scale, row = factor[0] * weight[m, 0], rows[m]
-        for k in range(by_state.shape[2]):
-            slope = scale * by_state[m, 0, k]
-            if slope != 0.0:
-                for a in range(width[k]):
-                    share, place = slope * local[offset[k] + m * width[k] + a], out[first[k, m] + a]
-                    for j in range(row.size):
-                        place[j] += share * row[j]
-        for i in range(by_theta.shape[2]):
-            slope, place = scale * by_theta[m, 0, i], out_theta[i]
-            if slope != 0.0:
-                for j in range(row.size):
-                    place[j] += slope * row[j]
-
-
-@_compiled
 def factor_in_place(band: np.ndarray) -> bool:
     """Cholesky factor of a lower band, column after column: (n, kd + 1), row j column j of it.
 
@@ -142,8 +121,11 @@ def factor_in_place(band: np.ndarray) -> bool:
 
 
 @_compiled
-def substitute_forward(factor: np.ndarray, columns: np.ndarray) -> None:
-    """Solve Lx = b in place for columns (n, q), L a lower band factor (kd + 1, n)."""
+def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
+    """Solve LLᵀ x = b in place for columns (n, q), L the lower band factor (kd + 1, n).
+
+    Row by row, all columns at once: LAPACK takes them one after the other.
+    """
     size, reach, count = factor.shape[1], factor.shape[0], columns.shape[1]
     for j in range(size):
         pivot = 1.0 / factor[0, j]
@@ -152,16 +134,6 @@ def substitute_forward(factor: np.ndarray, columns: np.ndarray) -> None:
         for k in range(1, min(reach, size - j)):
             for c in range(count):
                 columns[j + k, c] -= factor[k, j] * columns[j, c]
-
-
-@_compiled
-def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
-    """Solve LLᵀ x = b in place for columns (n, q), L the lower band factor (kd + 1, n).
-
-    Row by row, all columns at once: LAPACK takes them one after the other.
-    """
-    substitute_forward(factor, columns)
-    size, reach, count = factor.shape[1], factor.shape[0], columns.shape[1]
     for j in range(size - 1, -1, -1):
         for k in range(1, min(reach, size - j)):
             for c in range(count):
@@ -169,6 +141,40 @@ def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
         pivot = 1.0 / factor[0, j]
         for c in range(count):
             columns[j, c] *= pivot
+
+
+@_compiled
+def trace_of_quotient(share: np.ndarray, band: np.ndarray, lift: float) -> float:
+    """tr(A⁻¹ A_d) of lower bands (kd + 1, n), A_d the share; A's diagonal rises by its `lift`.
+
+    NaN where A is not positive definite.  Of Z = A⁻¹ the band is enough, and follows from the
+    factor A = LLᵀ backwards (K. Takahashi, J. Fagan and M.-S. Chin, PICA Conf. 1973): with
+    l = L[j+1:, j]/L[j, j],  Z[j+1:, j] = -Z[j+1:, j+1:] l  and  Z[j, j] = L[j, j]⁻² - l·Z[j+1:, j].
+    """
+    reach, n = band.shape
+    inverse, column = np.empty((n, reach)), np.empty(reach)  # row j: column j of L, then of Z
+    for j in range(n):
+        for k in range(reach):
+            inverse[j, k] = band[k, j]
+        inverse[j, 0] *= 1.0 + lift
+    if not factor_in_place(inverse):
+        return np.nan
+    trace = 0.0
+    for j in range(n - 1, -1, -1):
+        last, pivot = min(reach, n - j), inverse[j, 0]
+        for k in range(1, last):
+            column[k] = inverse[j, k] / pivot
+        inverse[j, 0] = 1.0 / pivot**2
+        for i in range(1, last):
+            total = 0.0
+            for k in range(1, last):
+                total -= column[k] * inverse[j + min(i, k), abs(i - k)]
+            inverse[j, i] = total
+        for k in range(1, last):
+            inverse[j, 0] -= column[k] * inverse[j, k]
+            trace += 2.0 * share[k, j] * inverse[j, k]
+        trace += share[0, j] * inverse[j, 0]
+    return trace
 
 
 @_compiled

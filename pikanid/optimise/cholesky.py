@@ -39,15 +39,6 @@ def solve_band(factor: Array, columns: Array) -> Array:
     return solved
 
 
-def whiten_band(factor: Array, columns: Array) -> Array:
-    """L⁻¹ of columns (n, q), for A = LLᵀ: their squares sum to those of xᵀA⁻¹x."""
-    from pikanid.optimise.banded_products import substitute_forward
-
-    solved = np.array(columns, dtype=float, order="C")
-    substitute_forward(factor, solved)
-    return solved
-
-
 def solve_positive(matrix: Array, columns: Array) -> Array:
     """A⁻¹ of columns (n,) or (n, q), A a small dense matrix.
 

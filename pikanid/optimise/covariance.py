@@ -6,6 +6,7 @@ covariance Σ, Cov = Zᵀ J_dᵀ Σ J_d Z, Z the θ columns of M⁻¹ (White, Ec
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -16,12 +17,8 @@ from scipy.linalg import LinAlgError
 from pikanid.approximators import Array
 from pikanid.functional import Rows, Sites
 from pikanid.optimise.banded import slopes
-from pikanid.optimise.cholesky import eigen, factor_band, whiten_band
+from pikanid.optimise.cholesky import eigen
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step
-
-EXACT_UP_TO = 300  # data rows; beyond, the trace is estimated
-PROBES = 32
-PROBE_ROWS = 100_000  # fewer probes for longer records, where the trace hardly matters
 
 
 def theta_covariance(system: BandedSystem, at: Linearisation, step: Step,
@@ -167,55 +164,31 @@ def family_response(sites: Sites, rows: Rows, follow: Array) -> Array:
     return out
 
 
-def effective_parameters(system: BandedSystem, at: Linearisation, step: Step) -> float:
+def effective_parameters(system: BandedSystem, at: Linearisation, step: Step,
+                         data: Sequence[Array]) -> float:
     """tr(J_d M⁻¹ J_dᵀ): how many parameters' worth of the data the fit has used up.
 
-    Exact for up to 300 samples, else from at most 32 fixed random probes (Hutchinson, 1990).
+    With A the band of the coefficients, A_d the data's share of it, S the reduced matrix of θ and
+    R_d the `data` families' derivatives by θ, (N, b) each, the coefficients following θ:
+    tr(A⁻¹ A_d) + tr(S⁻¹ R_dᵀ R_d).
     """
-    from pikanid.optimise.banded_products import pull_back
-
-    functional = system.functional
-    rows = functional.n_data
-    if rows <= EXACT_UP_TO:
-        probes = np.eye(rows)
-    else:
-        number = min(max(PROBE_ROWS // rows, 2), PROBES)
-        probes = np.random.default_rng(0).integers(0, 2, size=(rows, number)).astype(float)
-        probes *= 2.0
-        probes -= 1.0
-    theta = np.zeros((at.point.theta.size, probes.shape[1]))
-    total, first = 0.0, 0
-    for r, part in enumerate(functional.parts):
-        columns, block = system.columns[r], at.blocks[r]
-        pulled = np.zeros((part.n_coefficients, probes.shape[1]))
-        pulled_theta = np.zeros((columns.size, probes.shape[1]))
-        for sites, row in zip(part.data, at.rows[r], strict=False):
-            bases, count = sites.bases, sites.t.size
-            assert bases is not None
-            pull_back(row.weight, row.factor, slopes(row.state_slopes), slopes(row.theta_slopes),
-                      bases.first, bases.local, bases.offset, bases.width,
-                      probes[first:first + count], pulled, pulled_theta)
-            first += count
-        pulled = pulled[system.assemblers[r].order]
-        k = part.held.size
-        if block.held_by_theta is not None:
-            pulled_theta += block.held_by_theta.T @ pulled[:k]
-        total += float(np.sum(whiten_band(_factor(block.band), pulled[k:]) ** 2))
-        theta[columns] += pulled_theta - step.inner[r].T @ pulled[k:]
-    if theta.size:
-        total += float(np.sum(theta * (invert(step.schur, inside_bounds(system, at)) @ theta)))
-    return total if rows <= EXACT_UP_TO else total / probes.shape[1]
+    total = 0.0
+    for r, part in enumerate(system.functional.parts):
+        share = system.assemblers[r].normal(at.rows[r][:len(part.data)]).band[:, part.held.size:]
+        total += _trace_of_quotient(share, at.blocks[r].band)
+    square = np.zeros_like(step.schur)
+    for jacobian in data:
+        square += jacobian.T @ jacobian
+    return total + float(np.sum(invert(step.schur, inside_bounds(system, at)) * square))
 
 
-def _factor(band: Array) -> Array:
-    """Cholesky factor of a band that rounding may have left just short of positive definite."""
+def _trace_of_quotient(share: Array, band: Array) -> float:
+    """tr(A⁻¹ A_d), A a band that rounding may have left just short of positive definite."""
+    from pikanid.optimise.banded_products import trace_of_quotient
+
     lift = 0.0
-    while True:
-        lifted = band.copy(order="F")
-        lifted[0] *= 1.0 + lift
-        try:
-            return factor_band(lifted)
-        except LinAlgError:
-            lift = max(1e-14, 10.0 * lift)
-            if lift > 1e-2:
-                raise
+    while math.isnan(trace := trace_of_quotient(share, band, lift)):
+        lift = max(1e-14, 10.0 * lift)
+        if lift > 1e-2:
+            raise LinAlgError("a recording's band is not positive definite")
+    return trace

@@ -14,9 +14,10 @@ from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
 from pikanid.optimise.bordered import Bordered, BorderedSystem, Evaluation, Solved
-from pikanid.optimise.covariance import PROBES, invert
+from pikanid.optimise.covariance import invert
 from pikanid.optimise.local_rows import Family, Layout
 
+PROBES = 32  # for the trace of the effective parameters
 TRACE = 1e-3  # of damping: χ² charged for a move by one unit
 Noise = Callable[[float], Sequence[Array | float]]
 

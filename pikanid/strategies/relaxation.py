@@ -268,7 +268,7 @@ def conclude(setup: Setup, grid: Discretisation, system: BandedSystem, outcome: 
     at, step = outcome.at, outcome.step
     response = respond(system, at, step)
     step = replace(step, schur=response.reduced)
-    effective = effective_parameters(system, at, step)
+    effective = effective_parameters(system, at, step, response.data)
     noise = row_noise(system.functional, at, effective)
     sandwich, naive = theta_covariance(system, at, step, noise, response)
     return RelaxedFit(setup.problem, at.point.theta, sandwich, naive, at.point.coefficients,
