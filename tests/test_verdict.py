@@ -120,3 +120,11 @@ def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:
     # a formula that explains far less than the law outside the catalogue is none
     poor = [*fits[:3], hypothesis(1012.0, LAW)]
     assert answered(poor, refused=("a",)).verdict == "unnamed"
+
+
+def test_a_law_outside_the_catalogue_that_does_better_than_a_formula_stands_beside_it() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1000.0, GUARD)]
+    both = answered([*fits, hypothesis(1006.0, LAW)], refused=("a",))
+    assert both.verdict == "set" and {frozenset(h.key) for h in both.given} == {
+        frozenset({GUARD.key}), frozenset({LAW.key})}
+    assert answered([*fits, hypothesis(1020.0, LAW)], refused=("a",)).verdict == "unnamed"

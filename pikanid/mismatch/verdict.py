@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part
 NARROW = 0.03  # of the swing: a loop no wider is dry friction that gives a little before it slips
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
 WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
+BETTER = 1.0  # of the criterion: a smaller gain may be the same law, written in another way
 PREDICTED = 8  # hypotheses of which that is found out
 # p-value below which a hypothesis leaves something unexplained: asked on both recordings, it
 # refuses one right hypothesis in a hundred
@@ -196,14 +197,19 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
                   predict: Predict, checked: bool, proves: bool) -> Answer:
     """The answer where nothing in the catalogue would do, after formulas have been fitted as well.
 
-    A formula stands for the law outside the catalogue that kept names away; it is given where it
-    explains about as much as the best of those and predicts what is held out.
+    A formula is given where it explains about as much as the laws outside the catalogue that kept
+    names away, and predicts what is held out; one of those that does better stands beside it.
     """
-    laws = [h.minimum.chi2 for h in ranked if h.symbolic]
-    if not laws or min(laws) > ranked[0].minimum.chi2 + WITHIN * scale:
+    if not any(h.symbolic for h in ranked):
         return answer
-    found = settle([h for h in ranked if h.known], scale, test, predict, checked, proves)
-    return found if found.given and all(h.symbolic for h in found.given) else answer
+    found = settle(ranked, scale, test, predict, checked, proves)
+    totals = {h.key: criterion(h, predict(h), scale) - _handicap(h) for h in found.given}
+    least = min((totals[h.key] for h in found.given if h.symbolic), default=-np.inf)
+    given = tuple(h for h in found.given if h.symbolic or totals[h.key] < least - BETTER)
+    if not given or any(h.known and not h.symbolic for h in given):
+        return answer
+    return replace(found, given=given, verdict="named" if proves and len(given) == 1
+                   else found.verdict)
 
 
 def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
