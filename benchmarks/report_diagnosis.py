@@ -104,9 +104,9 @@ def _together(scores: list[Score], folder: Path) -> str:
                   label="answers, 95 %")
     for p, t, (_, share) in zip(stated, true, rows, strict=True):
         axis.annotate(f"{share.count}/{share.n}", (p, t), textcoords="offset points",
-                      xytext=(-6, -14), ha="right", fontsize=8)
+                      xytext=(5, 5), fontsize=8)
     axis.set(xlabel="probability stated of the first hypothesis", ylabel="share that was true",
-             xlim=(0, 1.05), ylim=(0, 1.05))
+             xlim=(0, 1.2), ylim=(-0.05, 1.12))
     axis.legend(loc="upper left", fontsize=8)
     save_figure(figure, folder / "figures" / "diagnosis_reliability.png")
     lines = [f"\n## All {len(scores)} cases together\n", "| what | share |", "| --- | --- |"]
