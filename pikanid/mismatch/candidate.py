@@ -75,6 +75,8 @@ class Candidate:
         covers: Keys of candidates that it contains as special cases.
         hills: Factors of its first parameter by which χ² may have other minima, as where a motion
             comes to rest between two samples.
+        levels: Values of its parameters, from the best of which a fit begins where the model is far
+            off: no first step leads to them.
     """
 
     ids: tuple[str, ...]

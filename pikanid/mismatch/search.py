@@ -269,7 +269,8 @@ class Search:
                  beside: float = 0.0, settled: frozenset[str] = frozenset()) -> None:
         """Fit these effects from these starts, one after the other, and keep what is better; what
         is known is fitted `again` only, and nothing once the search is tired, except `always`.
-        Fits far above the closest one, and above `beside` [χ²], are given up.
+        Fits far above the closest one, and above `beside` [χ²], are given up; effects that are
+        `settled` are not looked for beyond hills.
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
 
