@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -67,10 +68,23 @@ def initial_state(model: Model) -> InitialState:
     if all(e.is_number for e in start):
         x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
         return InitialState(lambda p, u: x0, lambda p, u: zero)
-    arguments = [p_symbols, [symbol(q) for q in model.input_names]]
-    value = sp.lambdify(arguments, start, [_TOOLS, "numpy"], cse=True)
-    table = [[e.diff(q) for q in p_symbols] for e in start]
-    jacobian = sp.lambdify(arguments, table, [_TOOLS, "numpy"], cse=True)
-    return InitialState(
-        lambda p, u: np.array(value(p, u), float),
-        lambda p, u: np.array(jacobian(p, u), float).reshape(n, len(p_symbols)))
+    used = [k for k, q in enumerate(p_symbols) if any(e.has(q) for e in start)]
+    value, slopes = _start_functions(tuple(start), tuple(p_symbols[k] for k in used),
+                                     model.input_names)
+
+    def jacobian(p: np.ndarray, u: np.ndarray) -> np.ndarray:
+        full = np.zeros((n, len(p_symbols)))
+        full[:, used] = np.array(slopes(p[used], u), float).reshape(n, len(used))
+        return full
+
+    return InitialState(lambda p, u: np.array(value(p[used], u), float), jacobian)
+
+
+# models that differ elsewhere begin alike
+@functools.lru_cache(maxsize=64)
+def _start_functions(start: tuple[sp.Expr, ...], parameters: tuple[sp.Symbol, ...],
+                     inputs: tuple[str, ...]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    arguments = [parameters, [symbol(q) for q in inputs]]
+    table = [[e.diff(q) for q in parameters] for e in start]
+    return (sp.lambdify(arguments, list(start), [_TOOLS, "numpy"], cse=True),
+            sp.lambdify(arguments, table, [_TOOLS, "numpy"], cse=True))

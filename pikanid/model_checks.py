@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -99,11 +100,21 @@ _NODES = (sp.Add, sp.Mul, sp.Pow, sp.Symbol, sp.Rational, sp.Float, sp.exp, type
 
 
 def _check_symbols(expr: sp.Expr, known: Iterable[str], where: str, model: Model) -> None:
-    unknown = sorted({s.name for s in expr.free_symbols} - set(known))
-    functions = {f.func.__name__ for f in expr.atoms(sp.core.function.AppliedUndef)}
+    names, functions, forbidden = _content(expr)
+    unknown = sorted(names - set(known))
     unknown += sorted(functions - {s.name for s in model.splines})
     if unknown:
         raise errors.BadModel(errors.foreign_symbols(unknown, where))
-    for node in sp.preorder_traversal(expr):
-        if not isinstance(node, _NODES):
-            raise errors.BadModel(errors.formula_forbidden(str(node), where[0].lower() + where[1:]))
+    if forbidden:
+        raise errors.BadModel(errors.formula_forbidden(forbidden, where[0].lower() + where[1:]))
+
+
+# a model is made from another by many small steps, each of which checks all formulas again
+@functools.lru_cache(maxsize=4096)
+def _content(expr: sp.Expr) -> tuple[frozenset[str], frozenset[str], str]:
+    """Names of symbols, names of splines, and the first node that no formula may hold, if any."""
+    forbidden = next((str(node) for node in sp.preorder_traversal(expr)
+                      if not isinstance(node, _NODES)), "")
+    return (frozenset(s.name for s in expr.free_symbols),
+            frozenset(f.func.__name__ for f in expr.atoms(sp.core.function.AppliedUndef)),
+            forbidden)

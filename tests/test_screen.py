@@ -50,10 +50,10 @@ def test_a_wall_that_no_first_step_leads_to_is_found(walled: Case) -> None:
     number = next(k for k, c in enumerate(screen.found.candidates) if c.key == "wall_impact")
     wall = screen.found.candidates[number]
     assert not screen.best(number)  # to first order a wall would make it worse
-    begun = best_level(walled.base, wall).values
+    begun = best_level(walled.base, wall, walled.base.point).values
     assert begun["wall"] == pytest.approx(0.08, rel=0.15)
     starts = [s for c, s in screen.singles(1, np.inf, entry) if c is wall]
-    assert starts == [[best_level(walled.base, wall)]]
+    assert starts == [[best_level(walled.base, wall, walled.base.point)]]
     walled.search.run(walled.adequate)
     best = walled.search.ranked()[0]
     assert best.key == {"wall_impact"}

@@ -52,8 +52,8 @@ def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
     def predicted(h: Hypothesis) -> HeldOut:
         value = (evidence or {}).get("+".join(sorted(h.key)), 0.0)
         rest = np.array([3.0 * (name in h.key) * (name not in unseen) for name in ("a", "b")])
-        return cast(HeldOut, SimpleNamespace(detection=found(h), evidence=value, rmse=1.0,
-                                             rest=rest))
+        return cast(HeldOut, SimpleNamespace(detection=found(h), together=None, evidence=value,
+                                             rmse=1.0, rest=rest))
 
     def adequate(h: Hypothesis) -> Detection:
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))

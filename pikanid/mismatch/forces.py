@@ -153,7 +153,7 @@ def wall_impact(site: Site) -> list[Candidate]:
         return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
                          lambda m: m.with_term(site.v, text), signs,
                          variant="" if side > 0 else SIDE,
-                         hills=(0.985, 0.993, 0.997, 1.003, 1.007, 1.015),
+                         hills=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection, detect, frequency_bands, past_inputs, unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis, extended
 from pikanid.mismatch.least_squares import minimise
-from pikanid.mismatch.prior import elsewhere, of_fit
+from pikanid.mismatch.prior import Prior, elsewhere, of_fit
 from pikanid.mismatch.tangent import directions
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
@@ -28,7 +28,7 @@ class HeldOut:
 
     Attributes:
         rmse: Of the residual, in the output's unit.
-        tested: Makes `detection`.
+        tested, tested_together: Make `detection` and `together`.
         chi2: Of the residual with that forgiveness.
         evidence: -2 ln of the probability density of the recording, given the fit (up to a
             constant that all hypotheses share).
@@ -39,6 +39,7 @@ class HeldOut:
 
     rmse: float
     tested: Callable[[], Detection]
+    tested_together: Callable[[], Detection | None]
     chi2: float
     evidence: float
     t: np.ndarray
@@ -51,6 +52,11 @@ class HeldOut:
     def detection(self) -> Detection:
         """Tests of what is left, with the parameters' uncertainty forgiven."""
         return self.tested()
+
+    @functools.cached_property
+    def together(self) -> Detection | None:
+        """Tests of what one fit of all recordings leaves in them; None where no such fit is."""
+        return self.tested_together()
 
 
 def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
@@ -113,9 +119,9 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     itself is estimated anew; what happens once (a disturbance) is left out.
     """
     effects = [e for e in hypothesis.effects if not e.absent]
-    model = extended(nominal, effects).with_values(
-        {n: v for n, v in hypothesis.values.items()
-         if n in extended(nominal, effects).parameter_names})
+    bare = extended(nominal, effects)
+    model = bare.with_values({n: v for n, v in hypothesis.values.items()
+                              if n in bare.parameter_names})
     whitened = Whitened(model, records)
     free = whitened.problem.free
     guess = whitened.problem.guess.copy()
@@ -159,17 +165,18 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         return None
     tests = functools.partial(residual_tests, whitened, found.theta, found.r, found.J, candidates,
                               rate)
+    together = functools.partial(_tested_together, hypothesis, whitened, found.theta, candidates,
+                                 rate)
     plain = guess
     responses = whitened.responses(plain)
     gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
     rmse = float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
-    big, small = _volume(found.J), _volume(fit.root)
     # where corners stop the fit, as of a wall hardly touched, the tests forgive a last linear step
     q, _ = np.linalg.qr(found.J)
     chi2 = found.chi2 + prior.constant - float(np.sum((q.T @ found.r) ** 2))
     samples = whitened.problem.experiments[0].samples[0]
-    return HeldOut(rmse, tests, chi2, chi2 + big - small, samples.t, samples.y,
-                   responses[0].y[: len(samples.t)], tuple(_residuals(whitened, gaps)),
+    return HeldOut(rmse, tests, together, chi2, chi2 + _room(found.J, shared, fit), samples.t,
+                   samples.y, responses[0].y[: len(samples.t)], tuple(_residuals(whitened, gaps)),
                    found.r[: whitened.rows])
 
 
@@ -181,6 +188,45 @@ def _residuals(whitened: Whitened, gaps: list[np.ndarray]
             name = whitened.problem.model.outputs[s.output].name
             yield r, name, s.t, gap[first:first + len(s.t)]
             first += len(s.t)
+
+
+def _tested_together(hypothesis: Hypothesis, later: Whitened, theta: np.ndarray,
+                     candidates: tuple[Candidate, ...], rate: float) -> Detection | None:
+    """Test what a hypothesis leaves in the recordings that it was fitted to and in others, all
+    fitted at once: what is weak in each of them adds up where it is the same in all.
+
+    θ of the held-out ones is where the fit begins.  What happens once is not the same in all.
+    """
+    if any(e.absent for e in hypothesis.effects):
+        return None
+    first = hypothesis.whitened
+    count = len(first.records.recordings)
+    whitened = Whitened(hypothesis.model, Records(
+        first.records.recordings + later.records.recordings,
+        first.records.levels + later.records.levels))
+    whitened.step_as(first, later)
+    own = {(f.name, f.recording): v for f, v in zip(
+        first.problem.free, hypothesis.minimum.theta, strict=True)}
+    own |= {(f.name, None if f.recording is None else f.recording + count): v
+            for f, v in zip(later.problem.free, theta, strict=True)}
+    problem = whitened.problem
+    start = np.array([own[f.name, f.recording] for f in problem.free])
+    found = minimise(whitened.residual, start, problem.lower, problem.upper, 25)
+    return residual_tests(whitened, found.theta, found.r, found.J, candidates, rate
+                          ) if found else None
+
+
+def _room(J: np.ndarray, shared: Sequence[int], fit: Prior) -> float:
+    """What the parameters' uncertainty costs of the probability density of a recording.
+
+    Shared ones: the logarithm of how much narrower the recording makes what a fit has left of them.
+    Others know nothing before, and cost what the recording tells of them beyond one of its rows.
+    """
+    own = [k for k in range(J.shape[1]) if k not in shared]
+    q, _ = np.linalg.qr(J[:, own])
+    known = J[:, shared] - q @ (q.T @ J[:, shared])
+    # far from the estimates a law may tell nothing: no recording makes that uncertainty wider
+    return max(_volume(known) - _volume(fit.root), 0.0) + len(own) * float(np.log(len(J)))
 
 
 def _volume(J: np.ndarray) -> float:

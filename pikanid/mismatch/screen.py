@@ -13,6 +13,7 @@ from pikanid.mismatch.tangent import Directions, directions
 from pikanid.mismatch.whitened import Whitened
 
 FAINT, FAINT_PAIR = 3.0, 6.0  # χ² that one effect, and two, must gain to first order to be tried
+NOWHERE: Mapping[str, float] = {}
 EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # of |v|, that have names
 
 
@@ -57,26 +58,31 @@ def nothing(c: Candidate) -> bool:
     return False
 
 
-def best_level(h: Hypothesis, candidate: Candidate) -> Start:
-    """The level of a candidate that leaves the least χ² beside a hypothesis as it stands."""
+def best_level(h: Hypothesis, candidate: Candidate, point: Mapping[str, float]) -> Start:
+    """The level of a candidate that leaves the least χ² beside a hypothesis' effects at `point`."""
     whitened = Whitened(candidate.applied(h.model), h.whitened.records)
     problem = whitened.problem
 
     def at(level: Mapping[str, float]) -> np.ndarray:
-        named = {**h.point, **level}
+        named = {**point, **level}
         return np.array([named.get(f.label, named.get(f.name, f.guess)) for f in problem.free])
 
     # which one is best is told at a glance
     whitened.choose_steps(at(candidate.levels[len(candidate.levels) // 2]), misfit=GLANCE)
     best = min(candidate.levels, key=lambda level: whitened.chi2(at(level)))
-    return Start({**h.point, **best}, {**h.point, **best})
+    return Start({**point, **best}, {**point, **best})
 
 
 class Screen:
-    """What each candidate would take away from a residual, to first order."""
+    """What each candidate would take away from a residual, to first order.
 
-    def __init__(self, about: Hypothesis, candidates: Sequence[Candidate]):
-        self.about = about
+    `guess` holds parameters that the model was given with: what effects of several levels may begin
+    beside, as the fit without them may have led away.
+    """
+
+    def __init__(self, about: Hypothesis, candidates: Sequence[Candidate],
+                 guess: Mapping[str, float] = NOWHERE):
+        self.about, self.guess = about, guess
         self.found: Directions = directions(about.whitened, about.minimum.theta, candidates)
         self.units, self.lengths = unit_columns(self.found.D, about.minimum.J)
         # r = ŷ - y: a sign that is present in y shows as its negative
@@ -134,7 +140,8 @@ class Screen:
         """Where a fit of a candidate begins that promises nothing."""
         c = self.found.candidates[candidate]
         if c.levels:
-            return [best_level(self.about, c)]
+            points = [self.about.point, *([{**self.about.point, **self.guess}] * bool(self.guess))]
+            return [best_level(self.about, c, point) for point in points]
         own = np.flatnonzero((self.found.owner == candidate) & (self.lengths > 0))
         levels = [int(k) for k in own if not self.found.signs[k].scales]
         some = levels[::-2][:3] if len(levels) > 3 else levels

@@ -74,7 +74,7 @@ class Search:
     def run(self, adequate: Adequate) -> list[Hypothesis]:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
         every = [c for c in self.candidates if c.fits]
-        screen = Screen(self.base(), every)
+        screen = Screen(self.base(), every, self.guess)
         self.tell("single effects")
         always = entry if self.base().far else law
         self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES, always=always)],
@@ -114,6 +114,8 @@ class Search:
             self._simplify()  # what led out of a dead end may have done its part
         self._simplify()
         best = self.ranked()[0]
+        if any(e.hills for e in best.effects) and not adequate(best):
+            best = self._fit(best.effects, [best.point], again=True)  # beyond hills left for later
         if adequate(best):
             # what a test of everything misses may still be worth its penalty, or nearly
             price = float(np.log(best.whitened.rows) + 2 * np.log(self.choices))

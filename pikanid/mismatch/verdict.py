@@ -7,30 +7,26 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut
 from pikanid.mismatch.result import Verdict
-from pikanid.mismatch.screen import EXPONENTS
+from pikanid.mismatch.same_law import integer_laws, merged_twins
 from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
 PROVEN = 4.0  # of the criterion: what each of several effects must gain on held-out recordings
+STRONG = 50.0  # of χ² in all recordings, that each effect must gain: 5 standard deviations in two
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
-SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
-WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
-OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
 PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
-NARROW = 0.03  # of the swing: a loop no wider is dry friction that gives a little before it slips
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
 WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
 BETTER = 1.0  # of the criterion: a smaller gain may be the same law, written in another way
 PREDICTED = 8  # hypotheses of which that is found out
-# p-value below which a hypothesis leaves something unexplained: asked on both recordings, it
-# refuses one right hypothesis in a hundred
-ADEQUATE = 0.005
+# p-values below which a hypothesis leaves something unexplained, in the recordings it was fitted to
+# or in held-out ones, and in all together: one right hypothesis in a hundred is refused
+ADEQUATE, TOGETHER = 0.005, 0.001
 Test = Callable[[Hypothesis], Detection]
 Predict = Callable[[Hypothesis], HeldOut | None]
 
@@ -69,7 +65,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         return Answer("unnamed", (), tuple(tried[:3]))
     lowest = min(_handicapped(h, scale) for h in tried)
     near = [h for h in tried if h.score(scale) < lowest + WITHIN]
-    near = _integer_laws(near)
+    near = integer_laws(near)
     ahead(near)
 
     def total(h: Hypothesis) -> float:
@@ -78,9 +74,14 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     def passes(h: Hypothesis) -> bool:
         if test(h).p_value < ADEQUATE:
             reasons[h.key] = "leaves something unexplained in the recording"
-        elif checked and ((prediction := predict(h)) is None
-                         or prediction.detection.p_value < ADEQUATE):
+        elif checked and ((seen := predict(h)) is None or seen.detection.p_value < ADEQUATE):
             reasons[h.key] = "does not predict the held-out recording"
+        return h.key not in reasons
+
+    def explains_all(h: Hypothesis) -> bool:
+        seen = predict(h)
+        if checked and seen and (both := seen.together) and both.p_value < TOGETHER:
+            reasons[h.key] = "leaves something unexplained in all recordings together"
         return h.key not in reasons
 
     given = [h for h in near if passes(h)]
@@ -97,21 +98,22 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             given.remove(h)
     if checked and len(given) > 1:
         given = _by_evidence(given, total, reasons)
-    proves = proves and any(_proven(h, tried, predict, scale) for h in given)
+    given = [h for h in given if explains_all(h)]
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
     if not known:
         rest = tuple(h for h in near if h not in given) + tuple(given)
         most = _largest_part(base, tried, scale, predict) if not given else ()
         if most:
-            merged, twins = _merged(list(most), tried)
+            merged, twins = merged_twins(list(most), tried)
             return Answer("unconfirmed", tuple(merged),
                           tuple(h for h in rest if h not in most)[:5], twins, reasons)
         return Answer("unnamed", (), rest[:5], {}, reasons)
-    merged, twins = _merged(known, tried)
+    merged, twins = merged_twins(known, tried)
     # laws outside the catalogue that would do as well are for the reader to know
     least = min(map(total, known))
     merged += [h for h in outside if total(h) - _handicap(h) < least + WITHIN]
+    proves = proves and _proven(known[0], ranked, predict, scale)
     verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
     return Answer(verdict, tuple(merged), tuple(others), twins, reasons)
@@ -124,14 +126,24 @@ def _speaks(one: Hypothesis, other: Hypothesis, predict: Predict, least: float =
 
 
 def _proven(h: Hypothesis, tried: Sequence[Hypothesis], predict: Predict, scale: float) -> bool:
-    """Whether the held-out recording speaks for each of several effects, too.
+    """Whether each effect is strong, and the held-out recording speaks for each of several, too.
 
-    One of several is easily found that takes up what the others leave, whatever that is.  Of an
-    effect that would hardly show in the held-out recording no proof can be asked.
+    What is weak can be a facet of anything: laws that no catalogue holds leave nothing beside it
+    that a test would find.  And of several effects one is easily found that takes up what the
+    others leave, whatever that is.  Of an effect that would hardly show in the held-out recording
+    no proof can be asked.
     """
-    rest = {h.key - {e.key} for e in h.effects if not e.absent} if len(h.effects) > 1 else ()
-    return all(_speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
-               for o in tried if o.key in rest)
+    rest = {h.key - {e.key} for e in h.effects}
+    asked = {h.key - {e.key} for e in h.effects if not e.absent} if len(h.effects) > 1 else ()
+
+    def strong(o: Hypothesis) -> bool:
+        a, b = predict(h), predict(o)
+        later = 0.0 if a is None or b is None else max(b.evidence - a.evidence, 0.0)
+        return o.minimum.chi2 - h.minimum.chi2 + later >= STRONG * scale
+
+    return all(strong(o) for o in tried if o.key in rest) and all(
+        _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
+        for o in tried if o.key in asked)
 
 
 def _alike(one: Hypothesis, other: Hypothesis, predict: Predict, scale: float) -> bool:
@@ -208,49 +220,8 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
     given = tuple(h for h in found.given if h.symbolic or totals[h.key] < least - BETTER)
     if not given or any(h.known and not h.symbolic for h in given):
         return answer
-    return replace(found, given=given, verdict="named" if proves and len(given) == 1
+    return replace(found, given=given, verdict="named" if found.verdict == "set" and len(given) == 1
                    else found.verdict)
-
-
-def _integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
-    """A power law whose exponent is sharply a whole number is left to the law of that name."""
-    kept = [h for h in near if not any(
-        (gap := _exponent_gap(h, whole)) is not None and gap < WHOLE and _sharp(h)
-        for whole in (0, 1, 2))]
-    return kept or near
-
-
-def _exponent(h: Hypothesis) -> str | None:
-    """Name of the exponent of a hypothesis' power law, if it has one."""
-    return next((e.parameters[1].name for e in h.effects if e.ids[0] == "power_drag"), None)
-
-
-def _exponent_gap(h: Hypothesis, whole: float) -> float | None:
-    """Standard errors between that exponent and a whole number; one at its lower bound is zero."""
-    n = _exponent(h)
-    if n is None:
-        return None
-    if whole == 0 and h.values[n] <= h.model.parameter(n).bounds[0]:
-        return 0.0
-    return abs(h.values[n] - whole) / max(h.std[n], 1e-9)
-
-
-def _sharp(h: Hypothesis) -> bool:
-    n = _exponent(h)
-    return n is not None and h.std[n] < SHARP
-
-
-def _open_exponent(h: Hypothesis, whole: float) -> bool:
-    """Whether the exponent of a hypothesis' power law may be `whole`, or something else as well."""
-    gap = _exponent_gap(h, whole)
-    return gap is not None and gap < OPEN and not (gap < WHOLE and _sharp(h))
-
-
-def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) -> Hypothesis | None:
-    """The hypothesis with a law of free exponent in the place of one of `h`'s effects."""
-    rest = h.key - {effect.key}
-    return next((o for o in tried for e in o.effects
-                 if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
 
 
 def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
@@ -263,35 +234,3 @@ def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
         if h not in kept:
             reasons[h.key] = "predicts the held-out recording worse"
     return sorted(kept, key=lambda h: found[h.key])
-
-
-def _merged(known: list[Hypothesis], tried: Sequence[Hypothesis]
-            ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
-    """Hypotheses that differ in twins only become one; what stands for what is noted.
-
-    A law of whole exponent has the power law as a twin where the recording leaves the exponent
-    open, and hysteresis dry friction where its loop is narrow (P. Dahl, AIAA J. 14, 1976).
-    """
-    def group(e: Candidate) -> str:
-        return e.twin + e.site.suffix if e.twin else e.key
-
-    first: dict[frozenset[str], Hypothesis] = {}
-    twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = {}
-    absorbed = set()
-    for h in known:
-        signature = frozenset(group(e) for e in h.effects)
-        leader = first.setdefault(signature, h)
-        table = twins.setdefault(leader.key, {e.key: e.ids for e in leader.effects})
-        for e in leader.effects:
-            for o in h.effects:
-                if group(o) == group(e):
-                    table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.ids)))
-        for e in h.effects:
-            power = _power_law(h, e, tried) if e.ids[0] in EXPONENTS else None
-            if leader is h and power and _open_exponent(power, EXPONENTS[e.ids[0]]):
-                table[e.key] += ("power_drag",)
-                absorbed.add(power.key)
-            if leader is h and e.ids[0] == "hysteresis" and e.channel == "dynamics" and (
-                    h.values[e.parameters[1].name] < NARROW * e.site.swing):
-                table[e.key] += ("coulomb_friction",)
-    return [h for h in first.values() if h.key not in absorbed], twins

@@ -65,7 +65,7 @@ class Interpreted(Simulator):
 
     located: bool = False
 
-    @property
+    @functools.cached_property
     def corners(self) -> bool:
         """Whether it runs through corners that it could stop at."""
         return can_run(self.acting) and tape(Structure(self.acting), self.located).corners > 0
