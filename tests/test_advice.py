@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.advice import EXPLORE, PROVE, advice
+from pikanid.mismatch.advice import EXPLORE, PROVE, STRENGTHEN, advice
 from pikanid.mismatch.noise_level import Level
 from pikanid.mismatch.result import Explanation
 from pikanid.mismatch.whitened import Records
@@ -50,3 +50,4 @@ def test_other_verdicts_have_sentences_of_their_own(records: Records) -> None:
     assert advice("named", (FRICTION,), records, RATE, True) == ""
     assert advice("unnamed", (), records, RATE, True) == EXPLORE
     assert advice("unconfirmed", (FRICTION,), records, RATE, False) == PROVE
+    assert advice("unconfirmed", (FRICTION,), records, RATE, True, weak=True) == STRENGTHEN

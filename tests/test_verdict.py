@@ -41,19 +41,21 @@ def hypothesis(chi2: float, *effects: Candidate) -> Hypothesis:
 
 
 def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
-             refused: tuple[str, ...] = (), unseen: tuple[str, ...] = ()) -> Answer:
+             refused: tuple[str, ...] = (), unseen: tuple[str, ...] = (),
+             contradicted: tuple[str, ...] = ()) -> Answer:
     """The answer with these held-out evidences (0 unless given), some effects refuted there, some
-    not to be seen.
+    not to be seen, some contradicted by all recordings together.
     """
-    def found(h: Hypothesis) -> Detection:
-        p = 1e-6 if h.key & set(refused) else 0.5
+    def found(h: Hypothesis, where: tuple[str, ...] = refused) -> Detection:
+        p = 1e-6 if h.key & set(where) else 0.5
         return cast(Detection, SimpleNamespace(p_value=p))
 
     def predicted(h: Hypothesis) -> HeldOut:
         value = (evidence or {}).get("+".join(sorted(h.key)), 0.0)
         rest = np.array([3.0 * (name in h.key) * (name not in unseen) for name in ("a", "b")])
-        return cast(HeldOut, SimpleNamespace(detection=found(h), together=None, evidence=value,
-                                             rmse=1.0, rest=rest))
+        return cast(HeldOut, SimpleNamespace(
+            detection=found(h), together=found(h, contradicted), evidence=value, rmse=1.0,
+            rest=rest))
 
     def adequate(h: Hypothesis) -> Detection:
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
@@ -96,6 +98,23 @@ def test_each_of_several_effects_has_to_help_on_the_held_out_recording() -> None
     # where the held-out recording speaks against one more effect, it is not given
     nearly = [BASE, hypothesis(1000.0, A), hypothesis(989.0, A, B)]
     assert answered(nearly, {"a+b": 1.0}).verdict == "named"
+
+
+def test_a_weak_effect_is_not_named() -> None:
+    weak = [hypothesis(1040.0), hypothesis(1000.0, A)]
+    given = answered(weak, {"": 5.0})
+    assert given.verdict == "unconfirmed" and "weak" in given.doubt
+    # both recordings count, and every effect
+    assert answered(weak, {"": 20.0}).verdict == "named"
+    pair = [BASE, hypothesis(1000.0, A), hypothesis(1900.0, B), hypothesis(960.0, A, B)]
+    assert answered(pair, {"": 99.0, "a": 5.0, "b": 99.0}).verdict == "unconfirmed"
+    assert answered(pair, {"": 99.0, "a": 20.0, "b": 99.0}).verdict == "named"
+
+
+def test_what_all_recordings_together_refute_is_not_given() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1100.0, B)]
+    assert answered(fits).verdict == "named"
+    assert answered(fits, contradicted=("a",)).verdict == "unnamed"
 
 
 def test_a_law_outside_the_catalogue_that_predicts_far_better_keeps_names_away() -> None:

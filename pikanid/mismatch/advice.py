@@ -22,10 +22,13 @@ EXPLORE = ("No law in the catalogue holds. Record (1) a free decay over a three-
            "amplitude, (2) a slow sweep through the resonance at two input levels, and (3) two "
            "seconds at rest before each: they tell laws of the state, of the input and of the "
            "sensor apart.")
+STRENGTHEN = ("Record the same again for several times as long, with a larger swing or with less "
+              "noise: what an effect gains in chi-squared grows with the time, and with the square "
+              "of its size over the noise.")
 
 
 def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rate: float,
-           proves: bool, workers: int = 1) -> str:
+           proves: bool, workers: int = 1, weak: bool = False) -> str:
     """The next experiment for a verdict; empty where none is needed.
 
     Args:
@@ -35,6 +38,7 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         rate: Natural frequency [rad/s].
         proves: Whether a held-out recording was there.
         workers: Threads.
+        weak: Whether something given predicts what is held out, but is too weak to be sure of.
     """
     if verdict in ("none", "named"):
         return ""
@@ -42,7 +46,7 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         return _separating(given[:COMPARED], records, rate, workers)
     if not given:
         return EXPLORE
-    return EXPLORE if proves else PROVE
+    return STRENGTHEN if weak else EXPLORE if proves else PROVE
 
 
 def _separating(given: Sequence[Explanation], records: Records, rate: float, workers: int) -> str:

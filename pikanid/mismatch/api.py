@@ -190,8 +190,8 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
         given, rejected, case.before, after, _proof(case, answer, best), tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
-               case.search.workers), shape=shape,
-        force_over_time=force)
+               case.search.workers, bool(answer.doubt)), shape=shape,
+        force_over_time=force, doubt=answer.doubt)
 
 
 def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:

@@ -114,6 +114,8 @@ class Diagnosis:
             without a mismatch, or where it cannot be computed.
         patch: An edge without a name that improves the prediction; None where something is named,
             or where it is no help.
+        doubt: What keeps an explanation that predicts held-out data from being confirmed, if
+            anything does.
     """
 
     verdict: Verdict
@@ -133,6 +135,7 @@ class Diagnosis:
     shape: ForceShape | None = None
     force_over_time: ForceOverTime | None = None
     patch: Patch | None = None
+    doubt: str = ""
 
     @property
     def mismatch(self) -> bool:
@@ -157,7 +160,8 @@ class Diagnosis:
             return head + "one of " + "; or ".join(titles) + ", which these recordings cannot " \
                 "tell apart."
         if self.verdict == "unconfirmed":
-            return head + "perhaps " + "; or ".join(titles) + ", not confirmed on other data."
+            return head + "perhaps " + "; or ".join(titles) + ", not confirmed" + (
+                f": {self.doubt}." if self.doubt else " on other data.")
         return head + "nothing in the catalogue explains it."
 
     def to_dict(self) -> dict[str, Any]:

@@ -35,7 +35,8 @@ Predict = Callable[[Hypothesis], HeldOut | None]
 class Answer:
     """Verdict, hypotheses given (most probable first) and the closest ones not given.
 
-    `twins` lists, for a hypothesis given, the effects that stand for each other in it.
+    `twins` lists, for a hypothesis given, the effects that stand for each other in it; `reasons`
+    why others are not given, and `doubt` what keeps the first one from being confirmed.
     """
 
     verdict: Verdict
@@ -43,6 +44,7 @@ class Answer:
     others: tuple[Hypothesis, ...]
     twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = field(default_factory=dict)
     reasons: dict[frozenset[str], str] = field(default_factory=dict)
+    doubt: str = ""
 
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
@@ -113,10 +115,11 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     # laws outside the catalogue that would do as well are for the reader to know
     least = min(map(total, known))
     merged += [h for h in outside if total(h) - _handicap(h) < least + WITHIN]
-    proves = proves and _proven(known[0], ranked, predict, scale)
-    verdict: Verdict = ("unconfirmed" if not proves else "named" if len(merged) == 1 else "set")
+    doubt = _doubt(known[0], ranked, predict, scale) if proves else ""
+    verdict: Verdict = ("unconfirmed" if doubt or not proves
+                        else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
-    return Answer(verdict, tuple(merged), tuple(others), twins, reasons)
+    return Answer(verdict, tuple(merged), tuple(others), twins, reasons, doubt)
 
 
 def _speaks(one: Hypothesis, other: Hypothesis, predict: Predict, least: float = 0.0) -> bool:
@@ -125,25 +128,29 @@ def _speaks(one: Hypothesis, other: Hypothesis, predict: Predict, least: float =
     return a is not None and b is not None and a.evidence < b.evidence - least
 
 
-def _proven(h: Hypothesis, tried: Sequence[Hypothesis], predict: Predict, scale: float) -> bool:
-    """Whether each effect is strong, and the held-out recording speaks for each of several, too.
+def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale: float) -> str:
+    """Why a hypothesis is not proved on other data; empty where it is.
 
-    What is weak can be a facet of anything: laws that no catalogue holds leave nothing beside it
-    that a test would find.  And of several effects one is easily found that takes up what the
-    others leave, whatever that is.  Of an effect that would hardly show in the held-out recording
-    no proof can be asked.
+    Each effect has to be strong.  What is weak can be a facet of anything: laws that no catalogue
+    holds leave nothing beside it that a test would find.  And the held-out recording has to speak
+    for each of several: one is easily found that takes up what the others leave, whatever that is.
+    Of an effect that would hardly show in the held-out recording no proof can be asked.
     """
-    rest = {h.key - {e.key} for e in h.effects}
-    asked = {h.key - {e.key} for e in h.effects if not e.absent} if len(h.effects) > 1 else ()
-
-    def strong(o: Hypothesis) -> bool:
+    fits = {o.key: o for o in ranked}
+    for e in h.effects:
+        o = fits.get(h.key - {e.key})
+        if o is None:
+            continue
         a, b = predict(h), predict(o)
         later = 0.0 if a is None or b is None else max(b.evidence - a.evidence, 0.0)
-        return o.minimum.chi2 - h.minimum.chi2 + later >= STRONG * scale
-
-    return all(strong(o) for o in tried if o.key in rest) and all(
-        _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
-        for o in tried if o.key in asked)
+        gain = (o.minimum.chi2 - h.minimum.chi2 + later) / scale
+        if gain < STRONG:
+            return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
+                    f"{STRONG:.0f} are asked)")
+        needed = _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
+        if len(h.effects) > 1 and not e.absent and not needed:
+            return f"the held-out recording does not need {e.name}"
+    return ""
 
 
 def _alike(one: Hypothesis, other: Hypothesis, predict: Predict, scale: float) -> bool:

@@ -1,0 +1,68 @@
+"""How held-out recordings are judged: what uncertainty costs, and all recordings together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.api import _opened
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.judge import _room
+from pikanid.mismatch.prior import Prior
+
+
+def prior(root: np.ndarray) -> Prior:
+    n = len(root)
+    return Prior(root, np.zeros(n), np.zeros(n), 0.0, np.zeros(n), np.eye(n), tuple(range(n)))
+
+
+def test_uncertainty_costs_how_much_narrower_a_recording_makes_it() -> None:
+    root, rng = np.diag([2.0, 5.0]), np.random.default_rng(0)
+    later = rng.standard_normal((40, 2))
+    J = np.vstack([later, root])
+    expected = np.log(np.linalg.det(root.T @ root + later.T @ later) / np.linalg.det(root.T @ root))
+    assert _room(J, [0, 1], prior(root)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_a_recording_has_for_itself_costs_the_same_in_any_unit() -> None:
+    root, rng = np.diag([2.0]), np.random.default_rng(1)
+    J = np.vstack([rng.standard_normal((40, 3)), np.zeros((1, 3))])
+    J[-1, 0] = 2.0
+    one = _room(J, [0], prior(root))
+    J[:, 1:] *= [57.3, 1e-3]
+    assert _room(J, [0], prior(root)) == pytest.approx(one, rel=1e-9)
+    # two more parameters of its own cost twice the logarithm of its rows
+    assert one - _room(J[:, :1], [0], prior(root)) == pytest.approx(2 * np.log(41), abs=1.0)
+
+
+def test_a_law_that_tells_nothing_far_from_its_estimates_gains_nothing_there() -> None:
+    J = np.zeros((41, 1))  # as of a limit that is never met
+    assert _room(J, [0], prior(np.array([[3.0]]))) == 0.0
+
+
+def opened(size: float) -> Case:
+    """The nominal pendulum, on two recordings of one with a spring that stiffens."""
+    model = pk.systems.sloshing()
+    truth = model.with_term("theta_dot", "-k3*theta**3", [pk.Parameter("k3", size)])
+    train, later = (pk.simulate(truth, pk.excitation.planar_moves(6, 10.0, seed=seed),
+                                sigma=0.002, seed=seed) for seed in (1, 2))
+    return _opened(model, (train,), (later,), None, lambda text: None)
+
+
+def test_what_is_weak_in_each_recording_adds_up() -> None:
+    case = opened(4.0)
+    predicted = case.predicted(case.base)
+    assert predicted is not None and predicted.together is not None
+    apart = case.test(case.base).p_value, predicted.detection.p_value
+    assert min(apart) > 0.01 and predicted.together.p_value < 0.001
+
+
+def test_nothing_adds_up_where_nothing_is_missing() -> None:
+    case = opened(0.0)
+    predicted = case.predicted(case.base)
+    assert predicted is not None and predicted.together is not None
+    assert predicted.together.p_value > 0.01
+    # all parameters are shared: the joint fit has as many degrees of freedom as each
+    assert predicted.together.power == pytest.approx(
+        case.base.whitened.rows + len(predicted.rest), rel=0.1)
