@@ -33,8 +33,10 @@ def test_the_others_follow_so_that_chi_squared_stays_least(fit: Hypothesis) -> N
     J = fit.minimum.J
     moved = np.linalg.lstsq(J[:, others], -J[:, shared] @ step, rcond=None)[0]
     np.testing.assert_allclose(prior.follow[others] @ step, moved, rtol=1e-9, atol=1e-15)
-    rise = np.sum((J[:, shared] @ step + J[:, others] @ moved) ** 2)
-    assert np.sum(prior.residual(expected) ** 2) == pytest.approx(rise, rel=1e-9)
+    gone = fit.minimum.r + J[:, shared] @ step
+    rise = np.sum((gone + J[:, others] @ np.linalg.lstsq(J[:, others], -gone, rcond=None)[0]) ** 2)
+    rise -= fit.minimum.chi2
+    assert prior.constant + np.sum(prior.residual(expected) ** 2) == pytest.approx(rise, rel=1e-9)
     assert prior.distance(expected) == pytest.approx(np.hypot(0.3, 0.2))
 
 

@@ -12,7 +12,7 @@ from pikanid.mismatch.beginning import own_beginning
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection, detect, frequency_bands, past_inputs, unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis, extended
-from pikanid.mismatch.least_squares import minimise
+from pikanid.mismatch.least_squares import held, minimise
 from pikanid.mismatch.prior import Prior, elsewhere, of_fit
 from pikanid.mismatch.tangent import directions
 from pikanid.mismatch.whitened import Records, Whitened
@@ -172,7 +172,8 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
     rmse = float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
     # where corners stop the fit, as of a wall hardly touched, the tests forgive a last linear step
-    q, _ = np.linalg.qr(found.J)
+    pushed = held(found.theta, found.J.T @ found.r, whitened.problem.lower, whitened.problem.upper)
+    q, _ = np.linalg.qr(found.J[:, ~pushed])
     chi2 = found.chi2 + prior.constant - float(np.sum((q.T @ found.r) ** 2))
     samples = whitened.problem.experiments[0].samples[0]
     return HeldOut(rmse, tests, together, chi2, chi2 + _room(found.J, shared, fit), samples.t,

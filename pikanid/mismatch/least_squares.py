@@ -51,7 +51,7 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
             break
         last = best
         g = J.T @ r
-        moving = ~(((theta <= lower) & (g > 0)) | ((theta >= upper) & (g < 0)))
+        moving = ~held(theta, g, lower, upper)
         A = J[:, moving]
         norms = np.sqrt(np.maximum(np.einsum("ij,ij->j", A, A), 1e-300))
         B, b = (A / norms).T @ (A / norms), -g[moving] / norms
@@ -78,6 +78,11 @@ def minimise(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np
         if not accepted or (hopeless and beyond(best)):
             return Minimum(theta, r, J, False)
     return Minimum(theta, r, J, len(theta) == 0)
+
+
+def held(theta: np.ndarray, slope: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """(n,) whether a bound holds a parameter that χ² with this slope would push further."""
+    return np.asarray(((theta <= lower) & (slope > 0)) | ((theta >= upper) & (slope < 0)))
 
 
 def _boxed_step(A: np.ndarray, b: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

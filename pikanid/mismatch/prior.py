@@ -13,8 +13,8 @@ from pikanid.mismatch.hypothesis import Hypothesis
 class Prior:
     """A fit's information on the parameters with `names`, all of its others estimated too.
 
-    χ² of the fit is |R (θ - θ₁) + z|² and a constant, linearised at θ₁: about its estimates, where
-    z = 0, or elsewhere, where the uncertainty of a law far from linear has another shape.
+    χ² of the fit is |R (θ - θ₁) + z|² and a constant, linearised at θ₁: about its estimates, or
+    elsewhere, where the uncertainty of a law far from linear has another shape.
 
     Attributes:
         root: R (n, n).
@@ -44,11 +44,13 @@ class Prior:
 
 
 def of_fit(hypothesis: Hypothesis, names: list[str]) -> Prior:
-    """The information of a fit, linearised at its estimates."""
+    """The information of a fit, linearised at its estimates: χ² has a slope at those that a bound
+    holds.
+    """
     free = [f.name for f in hypothesis.whitened.problem.free]
     inside = tuple(free.index(n) for n in names)
     found = hypothesis.minimum
-    return _linearised(found.theta, found.J, np.zeros(len(found.r)), inside)
+    return _linearised(found.theta, found.J, found.r, inside, found.chi2)
 
 
 def elsewhere(prior: Prior, hypothesis: Hypothesis, theta: np.ndarray) -> Prior | None:
@@ -63,7 +65,7 @@ def elsewhere(prior: Prior, hypothesis: Hypothesis, theta: np.ndarray) -> Prior 
 
 
 def _linearised(theta: np.ndarray, J: np.ndarray, r: np.ndarray, inside: tuple[int, ...],
-                least: float = 0.0) -> Prior:
+                least: float) -> Prior:
     shared, count = list(inside), len(theta)
     others = [k for k in range(count) if k not in inside]
     follow = np.zeros((count, len(inside)))

@@ -101,13 +101,12 @@ class Search:
             if adequate(best) or self.tired:
                 break
             self.tell(f"{count + 1} effects together")
-            leading = self._leading()[: LEADING if count == 1 else 1]
             rows = best.whitened.rows
             near = rows + FAR * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
-            leading = [h for h in leading if h is best or h.minimum.chi2 < near]
-            for hypothesis in leading:
-                if len(hypothesis.effects) < MOST:
-                    self._extend(hypothesis, MORE if count == 1 else LATER)
+            for h in self._leading()[: LEADING if count == 1 else 1]:
+                if len(h.effects) < MOST and (h is best or h.minimum.chi2 < near):
+                    self._extend(h, MORE if count == 1 else LATER,
+                                 always=law if count == 1 and h is best else nothing)
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
@@ -248,7 +247,8 @@ class Search:
         level = max(1.0, closest.minimum.chi2 / freedom)
         return level * repeated(closest.minimum.r) ** (1 - 1 / level)
 
-    def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0) -> None:
+    def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
+                always: Callable[[Candidate], bool] = nothing) -> None:
         present = {e.key for e in hypothesis.effects}
         groups = {e.twin for e in hypothesis.effects if e.twin}
         others = [c for c in self.candidates if c.fits and c.key not in present
@@ -257,9 +257,10 @@ class Search:
         screen = Screen(hypothesis, others)
         if hypothesis.far:
             least = TELLING * hypothesis.minimum.chi2
-        always = fixed if any(e.channel == "input" for e in hypothesis.effects) else nothing
+        bent = any(e.channel == "input" for e in hypothesis.effects)
         self._fit_all([((*hypothesis.effects, candidate), starts)
-                       for candidate, starts in screen.singles(count, least, always)],
+                       for candidate, starts in screen.singles(
+                           count, least, lambda c: always(c) or (bent and fixed(c)))],
                       settled=frozenset() if hypothesis.far else hypothesis.key)
 
     def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False

@@ -17,7 +17,9 @@ from pikanid.mismatch.whitened import GROSS
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
 PROVEN = 4.0  # of the criterion: what each of several effects must gain on held-out recordings
-STRONG = 50.0  # of χ² in all recordings, that each effect must gain: 5 standard deviations in two
+# of χ² in all recordings, that each of one or two effects must gain: 5 standard deviations in each
+# of two; each of three must gain twice that, of four three times: they can take up most of anything
+STRONG = 50.0
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
@@ -136,7 +138,7 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
     for each of several: one is easily found that takes up what the others leave, whatever that is.
     Of an effect that would hardly show in the held-out recording no proof can be asked.
     """
-    fits = {o.key: o for o in ranked}
+    fits, asked = {o.key: o for o in ranked}, STRONG * max(len(h.effects) - 1, 1)
     for e in h.effects:
         o = fits.get(h.key - {e.key})
         if o is None:
@@ -144,9 +146,9 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
         a, b = predict(h), predict(o)
         later = 0.0 if a is None or b is None else max(b.evidence - a.evidence, 0.0)
         gain = (o.minimum.chi2 - h.minimum.chi2 + later) / scale
-        if gain < STRONG:
+        if gain < asked:
             return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
-                    f"{STRONG:.0f} are asked)")
+                    f"{asked:.0f} are asked)")
         needed = _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
         if len(h.effects) > 1 and not e.absent and not needed:
             return f"the held-out recording does not need {e.name}"
