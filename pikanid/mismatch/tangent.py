@@ -44,22 +44,30 @@ class Directions:
 
 def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candidate]
                ) -> Directions:
-    """The columns of every candidate's signs at θ; recordings below each other."""
+    """The columns of every candidate's signs at θ; recordings below each other.
+
+    A recording in which an effect has fewer signs, or none, shows nothing of the others.
+    """
     blocks: list[np.ndarray] = []
-    kept: list[tuple[int, Sign]] = []
+    places: list[list[tuple[int, int]]] = []
+    known: dict[tuple[int, int], Sign] = {}
     several = len(whitened.simulators) > 1
     chosen = [c for c in candidates if not (several and c.per_recording)]
     for r, response in enumerate(whitened.responses(theta, states=True)):
         line = Tangent(whitened, theta, r, response.states)
         with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
-            listed = [(k, s) for k, c in enumerate(chosen) for s in c.signs(line.view)]
-            if not kept:
-                kept = listed
+            listed = {(k, n): s for k, c in enumerate(chosen) for n, s in enumerate(
+                c.signs(line.view))}
             blocks.append(whitened.whiten(r, line.columns(
-                [(chosen[k], s) for k, s in listed[:len(kept)]])))
-    D = np.concatenate(blocks) if blocks else np.empty((0, 0))
-    return Directions(D, tuple(chosen), np.array([k for k, _ in kept], int),
-                      tuple(s for _, s in kept))
+                [(chosen[k], s) for (k, _), s in listed.items()])))
+        places.append(list(listed))
+        known = {**listed, **known}
+    every = {place: column for column, place in enumerate(sorted(known))}
+    wide = [np.zeros((len(block), len(every))) for block in blocks]
+    for block, whole, own in zip(blocks, wide, places, strict=True):
+        whole[:, [every[place] for place in own]] = block
+    return Directions(np.concatenate(wide) if wide else np.empty((0, 0)), tuple(chosen),
+                      np.array([k for k, _ in every], int), tuple(known[p] for p in every))
 
 
 class Tangent:
