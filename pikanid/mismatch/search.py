@@ -24,7 +24,8 @@ CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explain
 PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
-EFFORT = 1.2e7  # states times steps simulated for combinations, before nothing new is begun
+EFFORT = 1e7  # states times steps simulated for combinations, before nothing new is begun
+EACH = 1.5e5  # that setting up one fit takes as much time as
 WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
@@ -284,11 +285,10 @@ class Search:
 
         def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
             found, _ = result
-            if found is None:
-                return
-            self.spent += found.whitened.work
+            self.spent += EACH + (found.whitened.work if found else 0.0)
             key = frozenset(e.key for e in job[0])
-            if key not in self.fits or found.minimum.chi2 < self.fits[key].minimum.chi2:
+            if found and (key not in self.fits
+                          or found.minimum.chi2 < self.fits[key].minimum.chi2):
                 self.fits[key] = found
 
         in_turn([job for job in jobs if again or frozenset(e.key for e in job[0]) not in self.fits],
