@@ -209,7 +209,8 @@ def _section(one: Set, found: list[tuple[Score, dict[str, Any]]]) -> str:
              if s.outcome == "wrong"]
     lines += ["", f"Wrong answers: {', '.join(wrong) or 'none'}.",
               f"Processor seconds a diagnosis: median {np.median(seconds):.1f}, "
-              f"largest {seconds.max():.1f}."]
+              f"four of five below {np.quantile(seconds, 0.8):.1f}, largest {seconds.max():.1f}; "
+              f"at most 10 s: {Share(int(np.sum(seconds <= 10)), len(seconds))}."]
     return "\n".join(lines) + "\n"
 
 
