@@ -48,9 +48,9 @@ class Set:
 
 
 SETS = (
-    Set("rich", "rich", 0.1 * DEGREE, 20311),
-    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20312),
-    Set("rich_1deg", "rich", 1.0 * DEGREE, 20313),
+    Set("rich", "rich", 0.1 * DEGREE, 20321),
+    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20322),
+    Set("rich_1deg", "rich", 1.0 * DEGREE, 20323),
 )
 
 

@@ -13,6 +13,7 @@ from pikanid.mismatch.beginning import own_beginning
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.catalogue import candidates
 from pikanid.mismatch.detect import detect, frequency_bands, past_inputs, unit_columns
+from pikanid.mismatch.forces import disturbance
 from pikanid.mismatch.hypothesis import extended
 from pikanid.mismatch.least_squares import minimise
 from pikanid.mismatch.noise_level import Level, refined
@@ -254,3 +255,13 @@ def test_the_cubic_spring_of_the_silverbox_is_found(recordings_folder: object) -
     assert row.hypotheses == ("cubic_stiffness + input_hold",)
     # both official tests, the extrapolating one too
     assert all(float(part.split()[1]) <= 1.1 for part in row.remark.split(", "))
+
+
+def test_a_force_that_nothing_follows_is_not_looked_for() -> None:
+    model = systems.sloshing()
+    rec = simulate(model, excitation.two_pulse())
+    site = sites(model, (rec,))[0]
+    (force,) = disturbance(site)
+    quarter = 0.5 * np.pi / site.rate
+    low, high = force.parameters[1].bounds
+    assert (low, high) == pytest.approx((rec.start, rec.stop - quarter))

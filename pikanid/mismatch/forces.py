@@ -223,7 +223,10 @@ def _half_derivative(t: np.ndarray, z: np.ndarray) -> np.ndarray:
 def disturbance(site: Site) -> list[Candidate]:
     """A force that acts once, for a short time."""
     a = Parameter(site.name("peak"), 0.0, f"{site.unit}/s^2")
-    at = Parameter(site.name("t_peak"), sum(site.span) / 2, "s", site.span)
+    first, last = site.span
+    # what nothing follows that it set in motion cannot be told from a few bad samples
+    last -= min(0.5 * np.pi / site.rate, 0.5 * (last - first)) if site.rate else 0.0
+    at = Parameter(site.name("t_peak"), (first + last) / 2, "s", (first, last))
     w = Parameter(site.name("width"), 0.3, "s", (0.01, 10.0))
     text = f"{a.name}/2*(1 + cos(2*pi*clip((t - {at.name})/{w.name}, -0.5, 0.5)))"
 
@@ -239,7 +242,7 @@ def disturbance(site: Site) -> list[Candidate]:
             if site.rate:
                 # forces half a period apart ring alike: those in quadrature must be there too
                 centres = np.sort(np.concatenate([centres, centres + 0.5 * np.pi / site.rate]))
-            for centre in centres:
+            for centre in centres[centres < last]:
                 phase = np.clip((view.t - centre) / (2 * width), -0.5, 0.5)
                 found.append(Sign({a.name: 1.0, at.name: float(centre), w.name: 2 * width},
                                   force=0.5 * (1 + np.cos(2 * np.pi * phase))))
