@@ -7,15 +7,18 @@ AR(1) model by Whittle's likelihood (P. Whittle, Ark. Mat. 2, 1953).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pikanid import noise
 from pikanid.channel import Channel
+from pikanid.noise_quiet import SHORTEST
 from pikanid.recording import Recording
 
 LONGEST = 50  # samples of a gap that a line across it is followed over
+MOVES, JITTER = 0.01, 4.0  # of an input's range, and times its noise: a move
 QUIET = 100  # samples of a quiet stretch that say something about low frequencies
 ABOVE = 6.0  # natural frequencies from which on a residual is noise
 BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
@@ -65,8 +68,9 @@ class Level:
         return np.concatenate([rows[:1], rest]) / self.sigma
 
 
-def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None) -> Level:
-    """What the recording alone says, before any fit.
+def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None,
+                inputs: Sequence[str] = ()) -> Level:
+    """What the recording alone says, before any fit; a stretch is quiet while no input moves.
 
     Raises:
         BadRecording: If nothing varies.
@@ -76,12 +80,38 @@ def first_level(recording: Recording, output: str, quiet: tuple[float, float] | 
         sigma = float(np.median(channel.sigma))
         return Level(sigma, 0.0, 0.0, channel.interval, "given")
     model = noise.estimate(channel, quiet)
+    if quiet is None and model.source == "quiet stretch":
+        drives = [recording[u] for u in inputs if u in recording]
+        still = _still(channel, drives, model.start, model.stop)
+        if still[1] - still[0] < model.stop - model.start:
+            model = noise.estimate(channel, still)
     rho = float(np.clip(model.autocovariance(2)[1] / model.sigma**2, 0.0, 0.98))
     long = model.source == "quiet stretch" and model.n >= QUIET
     return Level(model.sigma, rho if model.n >= QUIET and not model.white else 0.0,
                  2 * model.sigma_std / model.sigma, channel.interval,
                  f"the {model.source} ({model.start:g} s to {model.stop:g} s)",
                  (model.start, model.stop) if long else None)
+
+
+def _still(channel: Channel, drives: Sequence[Channel], start: float, stop: float
+           ) -> tuple[float, float]:
+    """The longest part of a stretch [s] in which no input leaves the value that it has for most of
+    it: what is driven at random can look like coloured noise.  The stretch where that is too short.
+    """
+    t = channel.time[(channel.time >= start) & (channel.time <= stop)]
+    moves = np.zeros(len(t), bool)
+    for drive in drives:
+        u = drive.values[np.isfinite(drive.values)]
+        if len(u) < len(drive.values) or len(u) < 5 or np.ptp(u) == 0:
+            continue
+        here = np.interp(t, drive.time, u)
+        # fourth differences show the noise of what is well sampled, and nothing else
+        noisy = float(np.median(np.abs(np.diff(u, 4)))) / 0.6745 / np.sqrt(70.0)
+        moves |= np.abs(here - np.median(here)) > max(MOVES * np.ptp(u), JITTER * noisy)
+    ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
+    longest = int(np.argmax(np.diff(ends)))
+    first, last = int(ends[longest]), int(ends[longest + 1]) - 2
+    return (float(t[first]), float(t[last])) if last - first + 1 >= SHORTEST else (start, stop)
 
 
 def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,

@@ -42,7 +42,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
             if together > 1:
                 recording = recording.with_channels(averaged(recording[output.name], together))
             found[output.name] = (levels[output.name] if levels is not None else
-                                  first_level(recording, output.name, quiet))
+                                  first_level(recording, output.name, quiet, model.input_names))
         done.append(recording)
         every.append(found)
     return Records(tuple(done), tuple(every))

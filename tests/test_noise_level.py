@@ -1,0 +1,47 @@
+"""Which part of a quiet stretch counts: none in which an input moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pikanid.channel import Channel
+from pikanid.mismatch.noise_level import _still, first_level
+from pikanid.recording import Recording
+
+T = np.arange(1000) * 0.01
+MOVING = np.where(T < 2.0, 0.0, np.sin(9 * (T - 2.0)))
+
+
+def still(u: np.ndarray, start: float, stop: float) -> tuple[float, float]:
+    return _still(Channel("y", T, T), [Channel("u", T, u)], start, stop)
+
+
+def test_a_stretch_ends_where_the_input_begins_to_move() -> None:
+    assert still(MOVING, 0.5, 2.6) == pytest.approx((0.5, 2.0), abs=0.02)
+    assert still(MOVING[::-1], 7.5, 9.5) == pytest.approx((7.99, 9.5), abs=0.02)
+    # a stretch in which it rests stays as it is, also beside a larger move
+    assert still(MOVING, 0.0, 1.98) == pytest.approx((0.0, 1.98))
+
+
+def test_a_noisy_input_at_rest_does_not_move() -> None:
+    noise = 0.03 * np.random.default_rng(0).standard_normal(len(T))
+    start, stop = still(MOVING + noise, 0.0, 1.98)
+    assert stop - start > 1.9
+
+
+def test_where_nothing_rests_the_stretch_is_left_alone() -> None:
+    assert still(np.sin(9 * T), 0.5, 2.6) == (0.5, 2.6)
+
+
+def test_a_random_motion_does_not_count_as_coloured_noise() -> None:
+    rng = np.random.default_rng(3)
+    drive = np.where(T < 2.0, 0.0, np.convolve(rng.standard_normal(len(T)), np.ones(20) / 20,
+                                               "same"))
+    # small for a while, as where a resonance builds up
+    motion = drive * np.clip((T - 2.0) / 8.0, 0.0, 1.0) * 0.05
+    y = motion + 0.001 * rng.standard_normal(len(T))
+    recording = Recording.from_arrays(T, {"u": drive, "y": y}, {"u": "m/s^2", "y": "rad"})
+    blind, seeing = first_level(recording, "y", None), first_level(recording, "y", None, ["u"])
+    assert blind.rho > 0.3
+    assert seeing.rho == 0 and seeing.sigma == pytest.approx(0.001, rel=0.15)
