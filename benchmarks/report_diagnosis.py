@@ -66,6 +66,8 @@ def main() -> None:
     parser.add_argument("--thresholds", type=int, default=8,
                         help="cases of each set that are diagnosed again with every threshold "
                              "changed; 0 for none")
+    parser.add_argument("--thresholds-of", choices=[s.name for s in SETS], nargs="*",
+                        default=[s.name for s in SETS], help="sets that those are taken from")
     parser.add_argument("--only", choices=[s.name for s in SETS], action="append")
     parser.add_argument("--recordings", choices=list(diagnosis_real.RECORDINGS), nargs="*",
                         default=list(diagnosis_real.RECORDINGS), help="real ones to diagnose")
@@ -83,7 +85,8 @@ def main() -> None:
         parts.append(diagnosis_alarms.section(given.alarms, given.work, given.workers))
     if given.thresholds:
         parts.append(diagnosis_thresholds.section(
-            given.thresholds, given.work, given.workers, [s.name for s in chosen]))
+            given.thresholds, given.work, given.workers,
+            [s.name for s in chosen if s.name in given.thresholds_of]))
     if not given.only:
         parts.append(_real(given.work, given.recordings))
     atomically(given.folder / "diagnosis.md", "\n".join(parts).encode())
