@@ -18,6 +18,7 @@ import numpy as np
 import pikanid as pk
 from pikanid import datasets
 from pikanid.mismatch.result import Diagnosis
+from pikanid.study import pendulum
 
 MODELS = {
     "pendulum": {
@@ -86,40 +87,32 @@ def single_pendulum() -> list[Row]:
     """The large free swing: fitted to 36.7 s, held out to 55 s."""
     train, other = (_joined(part) for part in ("train", "held_out"))
     dx, seconds = _diagnosed("pendulum", train, other)
-    return [_row("single pendulum", dx, seconds, _run_on(train, other))]
+    return [_row("single pendulum", dx, seconds, _run_on())]
 
 
 # Laws beside the viscous one, none of which may put energy in.
 DRY, DRAG, AMPLITUDE = "-c*sign(theta_dot)", "-q*abs(theta_dot)*theta_dot", "-a*theta**2*theta_dot"
 
 
-def _run_on(train: pk.Recording, other: pk.Recording) -> str:
-    """What laws can explain when no state is estimated anew: least squares over the train
-    recording, RMSE [rad] there and where the run goes on into the held-out one; and the latter
-    after a fit to both, which a prediction cannot be expected to beat by much.
+def _run_on() -> str:
+    """What laws can explain when no state is estimated anew: RMSE [rad] where a fit to the train
+    part runs on into the held-out one, and after a fit to both, which no prediction can be expected
+    to beat by much.
     """
-    parts = [part.decimate(10) for part in (train, other)]
-    t, y = (np.concatenate([getattr(part["theta"], name) for part in parts])
-            for name in ("time", "values"))
-    whole = pk.Recording.from_arrays(t, {"theta": y}, {"theta": "rad"}, name="whole")
-    later = t > parts[0].stop
-    nominal = pk.NLS(starts=4).fit(pk.Model.from_dict(MODELS["pendulum"]).with_values(d=0.02),
-                                   parts[0]).fitted_model
-
-    def left(model: pk.Model, seen: pk.Recording) -> tuple[float, float]:
-        fit = pk.NLS(starts=1).fit(model, seen).fitted_model
-        gap = pk.simulate(fit, whole)["theta"].values - y
-        return float(np.sqrt(np.mean(gap[~later]**2))), float(np.sqrt(np.mean(gap[later]**2)))
-
+    swing = pendulum.load()
+    whole = pendulum.joined([*datasets.single_pendulum("train"),
+                             *datasets.single_pendulum("held_out")], "whole")
+    nominal = pk.NLS(starts=1).fit(pendulum.guess(swing.train), swing.train).fitted_model
     told = []
     for name, laws in (("nominal", ()), ("Coulomb + quadratic drag", (DRY, DRAG)),
                        ("Coulomb + amplitude damping", (DRY, AMPLITUDE))):
         new = [pk.Parameter(law[1], 0.001, "", (0.0, np.inf)) for law in laws]
         model = nominal.with_term("theta_dot", " ".join(laws), new) if laws else nominal
-        (here, there), (_, best) = left(model, parts[0]), left(model, whole)
-        told.append(f"{name} {here:.4f}, {there:.4f}, {best:.4f}")
-    return ("run on from t = 0 (RMSE of the train part, of the held-out part, and of that after a "
-            f"fit to both): {'; '.join(told)} rad")
+        left = [pendulum.rms(pendulum.run_on(pk.NLS(starts=1).fit(model, seen).fitted_model, swing)
+                             - swing.held_out["theta"].values) for seen in (swing.train, whole)]
+        told.append(f"{name} {left[0]:.4f}, {left[1]:.4f}")
+    return ("run on from t = 0 (RMSE of the held-out part, and that after a fit to both parts): "
+            f"{'; '.join(told)} rad")
 
 
 def free_swing() -> list[Row]:
