@@ -8,7 +8,7 @@ import numpy as np
 
 from pikanid.simulation.tape import GROUPS, Tape
 
-NOTHING = np.zeros((3, len(GROUPS)), np.int64)  # native: all is interpreted
+NOTHING = np.zeros((5, len(GROUPS)), np.int64)  # native: all is interpreted
 
 
 class BoundTape(NamedTuple):
@@ -17,7 +17,7 @@ class BoundTape(NamedTuple):
     `code` (ops, 4) of all groups, `span` (groups, 3) first and last operation and number of results
     of each, `out` (groups, results) their registers; values `r` (R,), derivatives `d` (R, lanes)
     and `ds` (R, switches) by the signs, which of them are not all zero (`live`, `signed`);
-    `native` (3, groups) holds addresses of machine code, zero where there is none;
+    `native` (5, groups) holds addresses of machine code, zero where there is none;
     `matrix`, `again`, `right` and `change` are scratch for signs that are held at zero;
     `sizes` states, inputs, parameters, outputs, switching functions.  `group` and `flag` hold the
     numbers of the groups and (0, 1): a constant in a call would have the callee compiled for it.

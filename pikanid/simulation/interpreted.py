@@ -29,7 +29,8 @@ import math
 import numpy as np
 from numba import njit
 
-from pikanid.simulation.native_call import call_native
+from pikanid.simulation.native_call import call_look, call_native, call_step
+from pikanid.simulation.native_tape import AROUND, AROUND_TANGENTS
 from pikanid.simulation.support import (
     log_abs, positive_power, power_slope, sgn, solve_small)
 from pikanid.simulation.tape import (
@@ -136,5 +137,6 @@ def _kernel(hybrid: bool) -> ModuleType:
 
 
 def _source(kind: str) -> str:
-    return "\n\n".join([_HEADER.rstrip("\n") + "\n", kernel_text("interpreter"),
-                        kernel_text(f"interpreter_{kind}")])
+    parts = ["interpreter", *(["interpreter_signs"] if kind == "hybrid" else []),
+             f"interpreter_{kind}"]
+    return "\n\n".join([_HEADER.rstrip("\n") + "\n", *map(kernel_text, parts)])

@@ -10,17 +10,18 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pikanid.simulation import tape as ops
+from pikanid.simulation.native_step import look, step
+from pikanid.simulation.native_text import Writer, blocks, splat
 from pikanid.simulation.tape import GROUPS, Tape
 
-NATIVE = ("f", "g_rate")  # groups that are run at every stage of a step
-WIDEST = 4  # derivatives that one instruction carries
+NATIVE = ("f", "h", "g", "g_rate")  # groups that are run at every step or stop
+AROUND, AROUND_TANGENTS = 3, 4  # rows of addresses
 _BINARY = {ops.ADD: "fadd", ops.MUL: "fmul", ops.DIV: "fdiv"}
 _CALLED = {ops.SIN: "sin", ops.COS: "cos", ops.TAN: "tan", ops.EXP: "exp", ops.TANH: "tanh",
            ops.SINH: "sinh", ops.COSH: "cosh", ops.ATAN: "atan"}
@@ -34,8 +35,10 @@ _lock = threading.Lock()
 
 @dataclass(frozen=True)
 class Native:
-    """Addresses (3, groups) of functions of (registers, derivatives): values, derivatives by the
-    estimated parameters, derivatives by signs; zero where there is none.  `code` keeps them alive.
+    """Addresses (5, groups) of functions: values, derivatives by the estimated parameters and by
+    signs, of (registers, derivatives); then what is around them, without and with derivatives:
+    steps about the right-hand side, looks at outputs and switching functions (`native_step`).
+    Zero where there is none.  `code` keeps them alive.
     """
 
     addresses: np.ndarray
@@ -66,7 +69,19 @@ def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
         if K and group == "g_rate":
             names[2, number] = f"signs_{group}"
             text.append(_tangents(tape, group, names[2, number], signed, K))
-    addresses = np.zeros((3, len(GROUPS)), np.int64)
+    lanes = len(active)
+    if (0, GROUPS.index("f")) in names:
+        names[AROUND, GROUPS.index("f")] = "step"
+        text.append(step("step", tape, 0, live, False))
+        if active:
+            names[AROUND_TANGENTS, GROUPS.index("f")] = "step_tangents"
+            text.append(step("step_tangents", tape, lanes, live, moving_inputs))
+    names[AROUND_TANGENTS, GROUPS.index("h")] = "look_h"
+    text.append(look("look_h", tape, "h", lanes, moving_inputs and lanes > 0))
+    if K:
+        names[AROUND, GROUPS.index("g")] = "look_g"
+        text.append(look("look_g", tape, "g", 0, False))
+    addresses = np.zeros((5, len(GROUPS)), np.int64)
     code = _compiled("\n".join(text))
     for place, name in names.items():
         addresses[place] = code.get_function_address(name)
@@ -97,42 +112,8 @@ def _reached(tape: Tape, seeds: set[int]) -> set[int]:
     return live
 
 
-class _Writer:
-    """Lines of one function; %n are numbered in the order in which they are needed."""
-
-    def __init__(self, name: str):
-        self.name, self.lines, self.count = name, list[str](), 0
-
-    def put(self, right: str) -> str:
-        self.count += 1
-        self.lines.append(f"  %t{self.count} = {right}")
-        return f"%t{self.count}"
-
-    def load(self, array: str, place: int, kind: str = "double") -> str:
-        at = self.put(f"getelementptr double, ptr %{array}, i64 {place}")
-        return self.put(f"load {kind}, ptr {at}, align 8")
-
-    def store(self, value: str, array: str, place: int, kind: str = "double") -> None:
-        at = self.put(f"getelementptr double, ptr %{array}, i64 {place}")
-        self.lines.append(f"  store {kind} {value}, ptr {at}, align 8")
-
-    def call(self, function: str, *values: str) -> str:
-        return self.put(f"call double @{function}({', '.join(f'double {v}' for v in values)})")
-
-    def op(self, name: str, x: str, y: str, kind: str = "double") -> str:
-        return self.put(f"{name} {kind} {x}, {y}")
-
-    def where(self, x: str, relation: str, bound: str, yes: str, no: str) -> str:
-        test = self.put(f"fcmp {relation} double {x}, {bound}")
-        return self.put(f"select i1 {test}, double {yes}, double {no}")
-
-    def text(self) -> str:
-        return "\n".join([f"define void @{self.name}(ptr %r, ptr %d) {{", *self.lines,
-                          "  ret void", "}"])
-
-
 def _values(tape: Tape, group: str) -> str:
-    w, known = _Writer(f"values_{group}"), dict[int, str]()
+    w, known = Writer(f"values_{group}"), dict[int, str]()
     for op, i, j, o in tape.code[group].tolist():
         for k in (i, j) if op in _TWO else (i,):
             if k not in known:
@@ -142,7 +123,7 @@ def _values(tape: Tape, group: str) -> str:
     return w.text()
 
 
-def _value(w: _Writer, op: int, x: str, y: str) -> str:
+def _value(w: Writer, op: int, x: str, y: str) -> str:
     if op in _BINARY:
         return w.op(_BINARY[op], x, y)
     if op == ops.SQUARE:
@@ -165,7 +146,7 @@ def _value(w: _Writer, op: int, x: str, y: str) -> str:
 
 def _tangents(tape: Tape, group: str, name: str, live: set[int], lanes: int) -> str:
     """Derivatives d (registers, lanes) of the results, by the chain rule."""
-    w, r = _Writer(name), dict[int, str]()
+    w, r = Writer(name), dict[int, str]()
 
     def value(k: int) -> str:
         if k not in r:
@@ -182,7 +163,7 @@ def _tangents(tape: Tape, group: str, name: str, live: set[int], lanes: int) -> 
         else:
             partial.append(_slopes(w, op, value(i), value(j) if op in _TWO else "", value(o)))
     results = set(tape.outputs[group].tolist())
-    for first, width in _blocks(lanes):
+    for first, width in blocks(lanes):
         kind, d, wide = f"<{width} x double>", dict[int, str](), dict[str, str]()
         for (op, i, j, o), (by_x, by_y) in zip(code, partial, strict=True):
             parts = []
@@ -192,7 +173,7 @@ def _tangents(tape: Tape, group: str, name: str, live: set[int], lanes: int) -> 
                 if k not in d:
                     d[k] = w.load("d", k * lanes + first, kind)
                 if slope and slope not in wide:
-                    wide[slope] = _splat(w, slope, width)
+                    wide[slope] = splat(w, slope, width)
                 parts.append(w.op("fmul", d[k], wide[slope], kind) if slope else d[k])
             d[o] = parts[0] if len(parts) == 1 else w.op("fadd", parts[0], parts[1], kind)
             if op == ops.NEGATE:
@@ -202,18 +183,7 @@ def _tangents(tape: Tape, group: str, name: str, live: set[int], lanes: int) -> 
     return w.text()
 
 
-def _blocks(lanes: int) -> Iterator[tuple[int, int]]:
-    for first in range(0, lanes, WIDEST):
-        yield first, min(WIDEST, lanes - first)
-
-
-def _splat(w: _Writer, value: str, width: int) -> str:
-    kind = f"<{width} x double>"
-    one = w.put(f"insertelement {kind} poison, double {value}, i32 0")
-    return w.put(f"shufflevector {kind} {one}, {kind} poison, <{width} x i32> zeroinitializer")
-
-
-def _slopes(w: _Writer, op: int, x: str, y: str, value: str
+def _slopes(w: Writer, op: int, x: str, y: str, value: str
             ) -> tuple[str, str]:
     """The partial derivatives of an operation by its arguments x and y."""
     one = "1.0"
@@ -232,7 +202,7 @@ def _slopes(w: _Writer, op: int, x: str, y: str, value: str
     return _slope(w, op, x, value, square), ""
 
 
-def _slope(w: _Writer, op: int, x: str, value: str, square: str) -> str:
+def _slope(w: Writer, op: int, x: str, value: str, square: str) -> str:
     one = "1.0"
     if op == ops.SQUARE:
         return w.op("fmul", "2.0", x)

@@ -209,11 +209,15 @@ def by_signs(b):
 
 @called
 def show(b, q, x, S, U, V, T, first, output, row, inside, dtau_in, dtau_out, delayed, Y, J):
-    """Write the observations that belong to the q-th stop; states, inputs and signs are put."""
+    """Write the observations that belong to the q-th stop; signs are put."""
     A = S.shape[1]
-    put_tangents(b, S, V[q], dtau_in, delayed)
-    values(b, b.group[H])
-    tangents(b, b.group[H])
+    if b.native[AROUND_TANGENTS, H] != 0:
+        call_look(b.native[AROUND_TANGENTS, H], b.r, b.d, T[q], 0.0, x, S, U[q], V[q], dtau_in)
+    else:
+        put(b, T[q], x, U[q], V[q], 0.0)
+        put_tangents(b, S, V[q], dtau_in, delayed)
+        values(b, b.group[H])
+        tangents(b, b.group[H])
     for k in range(first[q], first[q + 1]):
         o = b.out[H, output[k]]
         Y[row[k]] = b.r[o]
