@@ -1,8 +1,8 @@
 """Models without compiling each of them, which takes about ten seconds a model.
 
 By Python: the kernels' source text with ``njit`` replaced by a decorator that does nothing, so that
-every index is checked; good for small models.  From tapes: by the compiled interpreter that serves
-all models.
+every index is checked; good for small models.  From tapes: by the integrators that serve all
+models.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from pikanid.model import Model
 from pikanid.problem import bind
 from pikanid.recording import Recording
 from pikanid.simulation import compiled as compiler
-from pikanid.simulation import interpreted as interpreter
-from pikanid.simulation import support
+from pikanid.simulation import support, translated
 from pikanid.simulation.compiled import Method
 from pikanid.simulation.simulator import Simulator
 from pikanid.simulation.structure import Structure
@@ -84,5 +83,5 @@ def from_tapes(model: Model, method: Method = "explicit") -> Any:
     """Stands for `compiled`: tapes for all but the slosh pendulum, which many tests share."""
     structure = Structure(model)
     if method == "explicit" and can_run(model) and structure != Structure(systems.sloshing()):
-        return interpreter.Machine(tape(structure))
+        return translated.Machine(tape(structure))
     return compiler.compiled(model, method)

@@ -22,8 +22,8 @@ from pikanid.mismatch.tangent import directions
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model_parts import Hold, Parameter
 from pikanid.problem import bind
-from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.simulator import Simulator
+from pikanid.simulation.translated import Translated
 
 HOLDS: tuple[Hold, ...] = ("zero", "first")
 HALF, RATE = 0.3, 4.0
@@ -70,7 +70,7 @@ def test_what_follows_equals_the_oracle(values: list[float], half: float | None,
 
 
 @pytest.mark.parametrize("hold", HOLDS)
-@pytest.mark.parametrize("kind", [Simulator, Interpreted])
+@pytest.mark.parametrize("kind", [Simulator, Translated])
 def test_sensitivities_are_those_of_differences(kind: type[Simulator], hold: Hold) -> None:
     model = slow(hold)
     simulator = kind(model, bind(model, pk.simulate(model, wandering(hold), sigma=0.0)))

@@ -1,4 +1,4 @@
-"""A hypothesis' fit as an `Estimate`, from the interpreter's run."""
+"""A hypothesis' fit as an `Estimate`, from the search's own run."""
 
 from __future__ import annotations
 

@@ -15,8 +15,8 @@ from pikanid.model import Model
 from pikanid.problem import Problem, Samples
 from pikanid.recording import Recording
 from pikanid.simulation import Steps, VectorField
-from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.synthetic import with_outputs
+from pikanid.simulation.translated import Translated
 
 Sigma = float | Mapping[str, float] | None
 Result = TypeVar("Result")
@@ -71,7 +71,7 @@ class Watched:
                 raise errors.BadSetting(errors.sigma_unknown(output.name))
         self.model, self.name = model, excitation.name
         self.problem = Problem(model, full)
-        self.simulator = Interpreted(model, self.problem.experiments[0])
+        self.simulator = Translated(model, self.problem.experiments[0])
         self.spread = np.concatenate([np.asarray(s.sigma, float) for s in self.samples])
         self.steps: Steps | None = None
         self.kept: dict[bytes, Seen] = {}  # at the model's own values, and the last one

@@ -11,8 +11,8 @@ from pikanid.mismatch.noise_level import Level
 from pikanid.model import Model
 from pikanid.problem import Problem
 from pikanid.recording import Recording
-from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.simulator import Response, Steps
+from pikanid.simulation.translated import Translated
 
 CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
 FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
@@ -70,7 +70,7 @@ class Whitened:
                 for r in records.recordings]
         self.problem = Problem(model, held)
         self.records = records
-        self.simulators = [Interpreted(model, e) for e in self.problem.experiments]
+        self.simulators = [Translated(model, e) for e in self.problem.experiments]
         self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
         self.steps: list[Steps] = []
         # errors of the last choice of steps, and what is allowed of each where nothing is left
@@ -94,7 +94,7 @@ class Whitened:
             steps = self._steps(r, theta, allowed, SHARP if simulator.corners else finest)
             self._weigh(steps, usual)
             if simulator.corners and (steps is None or steps.error > allowed):
-                self.simulators[r] = Interpreted(
+                self.simulators[r] = Translated(
                     simulator.model, simulator.experiment, located=True)
                 steps = self._steps(r, theta, allowed, finest)
                 if steps is None:  # a motion at rest on a corner meets it without end

@@ -15,6 +15,7 @@ import os
 import platform
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Literal
@@ -25,6 +26,7 @@ from pikanid.simulation.structure import Structure
 
 Method = Literal["explicit", "implicit"]
 _HERE = Path(__file__).parent
+_DIGEST = hashlib.sha256().digest_size
 
 
 def compiled(model: Model, method: Method = "explicit") -> ModuleType:
@@ -40,7 +42,7 @@ def _load(structure: Structure, method: Method) -> ModuleType:
     key = _key(structure.model, method)
     path = cache_folder() / f"model_{key}.py"
     if not path.exists():
-        _write(path, _source(structure.model, method))
+        _write(path, _source(structure.model, method).encode())
     name = f"pikanid_model_{key}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
@@ -87,8 +89,21 @@ def written(title: str, source: str) -> Path:
     digest = hashlib.sha256((source + _generator_version()).encode()).hexdigest()[:24]
     path = cache_folder() / f"{title}_{digest}.py"
     if not path.exists():
-        _write(path, source)
+        _write(path, source.encode())
     return path
+
+
+def kept(name: str, make: Callable[[], bytes]) -> bytes:
+    """What a file in the cache folder holds, behind its digest; made where that is not so."""
+    path = cache_folder() / name
+    digest, content = b"", b""
+    if path.exists():
+        found = path.read_bytes()
+        digest, content = found[:_DIGEST], found[_DIGEST:]
+    if digest != hashlib.sha256(content).digest():
+        content = make()
+        _write(path, hashlib.sha256(content).digest() + content)
+    return content
 
 
 def _key(model: Model, method: Method) -> str:
@@ -104,15 +119,15 @@ def _generator_version() -> str:
     import numba
 
     kernels = sorted(k for k in (_HERE / "kernels").glob("*.py")
-                     if not k.name.startswith("interpreter"))
+                     if not k.name.startswith("tape"))
     files = [*kernels,
              *(_HERE / f"{n}.py" for n in ("codegen", "printing", "lowering", "support", "layout"))]
     digest = hashlib.sha256("".join(f.read_text() for f in files).encode()).hexdigest()
     return f"{digest} {numba.__version__} {platform.python_version()} {platform.machine()}"
 
 
-def _write(path: Path, source: str) -> None:
+def _write(path: Path, content: bytes) -> None:
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "w") as file:
-        file.write(source)
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
     os.replace(temporary, path)

@@ -1,7 +1,5 @@
-"""What surrounds a tape, as machine code: a step of the classical Runge-Kutta method, and looks at
-a state.
-
-Interpreted, the bookkeeping costs more than the formulas of a small model do.
+"""What surrounds a tape's formulas, as machine code: steps of the classical Runge-Kutta method, and
+looks at a state.  That bookkeeping costs more than the formulas of a small model do.
 """
 
 from __future__ import annotations
@@ -17,28 +15,27 @@ _SHARES = ("", "%half", "%half", "%h")  # of the step, after which the stages lo
 _WEIGHTS = ("", "2.0", "2.0", "")
 
 
-def look(name: str, tape: Tape, group: str, lanes: int, moving_inputs: bool) -> str:
-    """The function `name`: time t, states x (n,), inputs u + v gap and derivatives S (n, lanes) put
-    into their registers, and `values_<group>` and `tangents_<group>` run where there are any.
+def look(name: str, tape: Tape, lanes: int, moving_inputs: bool, *then: str) -> str:
+    """The function `name`: time t, states x (n,), inputs u + v gap, their rates v and derivatives S
+    (n, lanes) put into their registers; `then` the functions of these names are called.
     """
-    n, m = tape.sizes[:2]
+    n, m, P, _, K = tape.sizes
     w = Writer(name, LOOK)
     w.store("%t", "r", 0)
     for i in range(n):
         w.store(w.load("x", i), "r", 1 + i)
     for j in range(m):
-        moved = w.op("fmul", w.load("v", j), "%gap")
-        w.store(w.op("fadd", w.load("u", j), moved), "r", 1 + n + j)
-    for place in range(n):
+        rate = w.load("v", j)
+        w.store(w.op("fadd", w.load("u", j), w.op("fmul", rate, "%gap")), "r", 1 + n + j)
+        w.store(rate, "r", 1 + n + m + P + K + j)
+    for i in range(n):
         for first, width in blocks(lanes):
-            kind, at = f"<{width} x double>", place * lanes + first
+            kind, at = f"<{width} x double>", i * lanes + first
             w.store(w.load("S", at, kind), "d", lanes + at, kind)
     if moving_inputs:
         _put_inputs(w, n, m, lanes)
-    if len(tape.code[group]):
-        w.run(f"values_{group}")
-        if lanes:
-            w.run(f"tangents_{group}")
+    for function in then:
+        w.run(function)
     return w.text()
 
 
@@ -46,7 +43,7 @@ def step(name: str, tape: Tape, lanes: int, live: set[int], moving_inputs: bool)
     """The function `name`: one step of length h from time t, states x (n,) and derivatives S
     (n, lanes) to xn and Sn; inputs are u + v gap at its start, and have delays dtau (m, lanes).
 
-    Calls `values_f` and, for any lanes, `tangents_f`.  Sums are taken in the interpreter's order.
+    Calls `values_f` and, for any lanes, `tangents_f`.
     """
     n, m = tape.sizes[:2]
     w = Writer(name, STEP)

@@ -1,14 +1,14 @@
-"""Tapes as machine code: what an interpreter would do operation by operation, in one piece.
+"""Tapes as machine code, so that a model need not be compiled to be simulated a few dozen times.
 
-Only tapes that are run often are worth the few milliseconds which that takes.  The text is written
-for LLVM (C. Lattner and V. Adve, Proc. CGO 2004), without its optimisers: a tape is in static
-single assignment form as it stands.  Every operation rounds as in the interpreter, so that both
-give the same numbers, bit by bit.
+The text is written for LLVM (C. Lattner and V. Adve, Proc. CGO 2004), without its optimisers: a
+tape is in static single assignment form as it stands.  What has been translated once is kept beside
+the compiled models.
 """
 
 from __future__ import annotations
 
 import functools
+import hashlib
 import threading
 from dataclasses import dataclass
 from typing import Any
@@ -16,12 +16,14 @@ from typing import Any
 import numpy as np
 
 from pikanid.simulation import tape as ops
+from pikanid.simulation.compiled import kept
 from pikanid.simulation.native_step import look, step
 from pikanid.simulation.native_text import Writer, blocks, splat
 from pikanid.simulation.tape import GROUPS, Tape
 
-NATIVE = ("f", "h", "g", "g_rate")  # groups that are run at every step or stop
-AROUND, AROUND_TANGENTS = 3, 4  # rows of addresses
+FUNCTIONS = ("values_prelude", "tangents_prelude", "put", "put_tangents", "step", "step_tangents",
+             "values_f", "tangents_f", "look_h", "values_h_rate", "look_g", "values_g",
+             "tangents_g", "values_g_rate", "tangents_g_rate", "signs_g_rate")
 _BINARY = {ops.ADD: "fadd", ops.MUL: "fmul", ops.DIV: "fdiv"}
 _CALLED = {ops.SIN: "sin", ops.COS: "cos", ops.TAN: "tan", ops.EXP: "exp", ops.TANH: "tanh",
            ops.SINH: "sinh", ops.COSH: "cosh", ops.ATAN: "atan"}
@@ -35,10 +37,9 @@ _lock = threading.Lock()
 
 @dataclass(frozen=True)
 class Native:
-    """Addresses (5, groups) of functions: values, derivatives by the estimated parameters and by
-    signs, of (registers, derivatives); then what is around them, without and with derivatives:
-    steps about the right-hand side, looks at outputs and switching functions (`native_step`).
-    Zero where there is none.  `code` keeps them alive.
+    """Addresses of `FUNCTIONS`: `values_*` of groups, derivatives by the estimated parameters
+    (`tangents_*`) and by signs, all of (registers, derivatives); and what is around them
+    (`native_step`).  `code` keeps them alive.
     """
 
     addresses: np.ndarray
@@ -52,52 +53,38 @@ def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
     `moving_inputs`: the inputs move with the parameters, too, as where delays are estimated.
     """
     n, m, P, _, K = tape.sizes
+    lanes, moving = len(active), moving_inputs and len(active) > 0
     states, inputs = range(1, 1 + n), range(1 + n, 1 + n + m)
     signs = [1 + n + m + P + k for k in range(K)]
-    seeds = {*states, *(inputs if moving_inputs else ()), *(1 + n + m + a for a in active if a < P),
+    seeds = {*states, *(inputs if moving else ()), *(1 + n + m + a for a in active if a < P),
              *signs}
     live, signed = _reached(tape, seeds), _reached(tape, set(signs))
-    names, text = {}, [_HELPERS]
-    for number, group in enumerate(GROUPS):
-        if group not in NATIVE or not len(tape.code[group]):
-            continue
-        names[0, number] = f"values_{group}"
-        text.append(_values(tape, group))
-        if active:
-            names[1, number] = f"tangents_{group}"
-            text.append(_tangents(tape, group, names[1, number], live, len(active)))
-        if K and group == "g_rate":
-            names[2, number] = f"signs_{group}"
-            text.append(_tangents(tape, group, names[2, number], signed, K))
-    lanes = len(active)
-    if (0, GROUPS.index("f")) in names:
-        names[AROUND, GROUPS.index("f")] = "step"
-        text.append(step("step", tape, 0, live, False))
-        if active:
-            names[AROUND_TANGENTS, GROUPS.index("f")] = "step_tangents"
-            text.append(step("step_tangents", tape, lanes, live, moving_inputs))
-    names[AROUND_TANGENTS, GROUPS.index("h")] = "look_h"
-    text.append(look("look_h", tape, "h", lanes, moving_inputs and lanes > 0))
-    if K:
-        names[AROUND, GROUPS.index("g")] = "look_g"
-        text.append(look("look_g", tape, "g", 0, False))
-    addresses = np.zeros((5, len(GROUPS)), np.int64)
+    text = [_HELPERS, *(_values(tape, group) for group in GROUPS),
+            *(_tangents(tape, group, f"tangents_{group}", live, lanes)
+              for group in ("prelude", "f", "h", "g", "g_rate")),
+            _tangents(tape, "g_rate", "signs_g_rate", signed, K),
+            look("put", tape, 0, False), look("put_tangents", tape, lanes, moving),
+            look("look_h", tape, lanes, moving, "values_h", "tangents_h"),
+            look("look_g", tape, 0, False, "values_g"),
+            step("step", tape, 0, live, False), step("step_tangents", tape, lanes, live, moving)]
     code = _compiled("\n".join(text))
-    for place, name in names.items():
-        addresses[place] = code.get_function_address(name)
-    return Native(addresses, code)
+    return Native(np.array([code.get_function_address(name) for name in FUNCTIONS]), code)
 
 
 def _compiled(text: str) -> Any:
-    from llvmlite import binding
+    """An engine that holds the functions; their object code is kept for other processes."""
+    from llvmlite import __version__, binding
 
     with _lock:
         binding.initialize_native_target()
         binding.initialize_native_asmprinter()
+        host = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+        digest = hashlib.sha256("\n".join([text, __version__, *host]).encode()).hexdigest()[:24]
         machine = binding.Target.from_default_triple().create_target_machine(
-            opt=1, cpu=binding.get_host_cpu_name(),
-            features=binding.get_host_cpu_features().flatten())
-        engine = binding.create_mcjit_compiler(binding.parse_assembly(text), machine)
+            opt=1, cpu=host[0], features=host[1])
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
+        code = kept(f"tape_{digest}.o", lambda: machine.emit_object(binding.parse_assembly(text)))
+        engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
         return engine
 
@@ -153,7 +140,7 @@ def _tangents(tape: Tape, group: str, name: str, live: set[int], lanes: int) -> 
             r[k] = w.load("r", k)
         return r[k]
 
-    code = [line for line in tape.code[group].tolist() if line[3] in live]
+    code = [line for line in tape.code[group].tolist() if line[3] in live] if lanes else []
     partial: list[tuple[str, str]] = []
     for op, i, j, o in code:
         if op in (ops.ADD, ops.NEGATE):
@@ -162,7 +149,8 @@ def _tangents(tape: Tape, group: str, name: str, live: set[int], lanes: int) -> 
             partial.append((value(j) if i in live else "", value(i) if j in live else ""))
         else:
             partial.append(_slopes(w, op, value(i), value(j) if op in _TWO else "", value(o)))
-    results = set(tape.outputs[group].tolist())
+    results = set(tape.outputs[group].tolist() if group in tape.outputs else
+                  tape.code[group][:, 3].tolist())
     for first, width in blocks(lanes):
         kind, d, wide = f"<{width} x double>", dict[int, str](), dict[str, str]()
         for (op, i, j, o), (by_x, by_y) in zip(code, partial, strict=True):

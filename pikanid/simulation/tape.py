@@ -1,9 +1,9 @@
-"""A model as a list of elementary operations that one compiled interpreter runs for every model.
+"""A model as a list of elementary operations that becomes machine code in a few milliseconds.
 
-Compiling a model costs seconds, which pays where it is simulated thousands of times.  A search that
-tries a hundred extended models a few dozen times each runs them from tapes instead: no compilation,
-three to five times slower, the same integrators and events, derivatives exact by forward mode
-(Griewank & Walther, Evaluating Derivatives, 2008, ch. 3).
+Compiling a model by numba costs seconds, which pays where it is simulated many thousands of times.
+A search that tries a hundred extended models a few dozen times each runs them from tapes instead:
+the same integrators and events, derivatives exact by forward mode (Griewank & Walther, Evaluating
+Derivatives, 2008, ch. 3).
 
 A formula that is continuous where a sign in it changes (|v|v, clip) is run through like any other;
 only where the right-hand side jumps (dry friction) does a sign become a switching function that the
@@ -29,7 +29,6 @@ from pikanid.model import Model
 from pikanid.simulation.lowering import LoweredModel, lower_model, positive_power, switch_symbol
 from pikanid.simulation.structure import Structure
 
-# The interpreter's opcodes, by the same numbers as in kernels/interpreter.py.
 (ADD, MUL, DIV, SQUARE, POWER, POSITIVE_POWER, SIN, COS, TAN, EXP, LOG, SQRT, TANH, SINH, COSH,
  ATAN, ASIN, ACOS, ATAN2, LOG_ABS, SGN, NEGATE) = range(22)
 _UNARY = {sp.sin: SIN, sp.cos: COS, sp.tan: TAN, sp.exp: EXP, sp.log: LOG, sp.tanh: TANH,
@@ -62,7 +61,7 @@ def tape(structure: Structure, located: bool = False) -> Tape:
 
 
 def can_run(model: Model) -> bool:
-    """Whether the interpreter knows everything in the model: it has no spline functions."""
+    """Whether tapes can hold everything in the model: it has no spline functions."""
     return not model.splines
 
 

@@ -1,7 +1,7 @@
-"""`Interpreted`: a simulator that runs a model from its tape, without compiling the model.
+"""`Translated`: a simulator that runs a model from its tape, without compiling the model.
 
 Two kernels, one for models whose right-hand side jumps and one for all others, are compiled once
-and serve every model.
+and serve every model; its formulas become machine code in a few milliseconds.
 """
 
 from __future__ import annotations
@@ -15,42 +15,36 @@ from typing import Any
 
 import numpy as np
 
-from pikanid.simulation.bound_tape import NOTHING, BoundTape, bound
+from pikanid.simulation.bound_tape import BoundTape, bound
 from pikanid.simulation.compiled import Method, kernel_text, written
-from pikanid.simulation.native_tape import Native, native
+from pikanid.simulation.native_tape import FUNCTIONS, Native, native
 from pikanid.simulation.simulator import Simulator
 from pikanid.simulation.structure import Structure
-from pikanid.simulation.tape import Tape, can_run, tape
+from pikanid.simulation.tape import GROUPS, Tape, can_run, tape
 
-OFTEN = 8000  # steps of a tape after which translating it takes less than interpreting it has
-_HEADER = '''"""The interpreter of tapes; generated from the kernels."""
-import math
-
+_NAMES = [name.upper() for name in FUNCTIONS]
+_HEADER = f'''"""Integrators of tapes; generated from the kernels."""
 import numpy as np
 from numba import njit
 
 from pikanid.simulation.native_call import call_look, call_native, call_step
-from pikanid.simulation.native_tape import AROUND, AROUND_TANGENTS
-from pikanid.simulation.support import (
-    log_abs, positive_power, power_slope, sgn, solve_small)
-from pikanid.simulation.tape import (
-    ACOS, ADD, ASIN, ATAN, ATAN2, COS, COSH, DIV, EXP, LOG, LOG_ABS, MUL, NEGATE, POSITIVE_POWER,
-    POWER, SGN, SIN, SINH, SQRT, SQUARE, TAN, TANH)
+from pikanid.simulation.support import solve_small
 
 
 def called(function):
     return njit(cache=True, error_model="numpy", _nrt=False)(function)
 
 
-PRELUDE, F, H, H_RATE, G, G_RATE = range(6)
+{", ".join(name.upper() for name in GROUPS)} = range({len(GROUPS)})
+({", ".join(_NAMES)}) = range({len(FUNCTIONS)})
 
 
 '''
 
 
 @dataclass(frozen=True)
-class Interpreted(Simulator):
-    """A `Simulator` that interprets: for models that are simulated a few dozen times only.
+class Translated(Simulator):
+    """A `Simulator` of tapes: for models that are simulated a few dozen times only.
 
     Models with spline functions are compiled as usual.  `located`: the integrator stops at the
     corners of the right-hand side, which pays where they are sharp.
@@ -59,7 +53,7 @@ class Interpreted(Simulator):
     >>> from pikanid import excitation, systems
     >>> from pikanid.problem import bind
     >>> model = systems.sloshing()
-    >>> simulator = Interpreted(model, bind(model, excitation.two_pulse(), need_outputs=False))
+    >>> simulator = Translated(model, bind(model, excitation.two_pulse(), need_outputs=False))
     >>> simulator.run(np.array([0.045, 0.15, 0.3, 9.81]), states=True).states.shape[1]
     2
     """
@@ -72,7 +66,7 @@ class Interpreted(Simulator):
         return can_run(self.acting) and tape(Structure(self.acting), self.located).corners > 0
 
     def module(self, method: Method) -> Any:
-        """The interpreter, bound to the model's tape."""
+        """The integrator, bound to the model's tape."""
         if method != "explicit" or not can_run(self.acting):
             return super().module(method)
         if method not in self._kept:
@@ -82,42 +76,37 @@ class Interpreted(Simulator):
 
 class Machine:
     """What `Simulator` asks of a compiled module: `integrate`; each thread has its own registers.
-
-    What has been interpreted for as long as a translation takes is translated to machine code.
     """
 
     def __init__(self, program: Tape):
         self.program = program
         self.kernel = _kernel(program.sizes[4] > 0)
         self.own = threading.local()
-        self.steps = 0
 
     def integrate(self, T: np.ndarray, pieces: np.ndarray, U: np.ndarray, V: np.ndarray,
                   jumps: np.ndarray, dtau_in: np.ndarray, dtau_out: np.ndarray, delayed: bool,
                   x0: np.ndarray, S0: np.ndarray, p: np.ndarray, act: np.ndarray,
                   *rest: np.ndarray) -> tuple[int, int]:
         """As that of a compiled model."""
-        self.steps += int(pieces.sum())
         status, stop = self.kernel.integrate_tape(
             self._bound(tuple(act.tolist()), delayed), T, pieces, U, V, jumps, dtau_in, dtau_out,
-            delayed, x0, S0, p, act, *rest)
+            delayed, x0, S0, p, *rest)
         return int(status), int(stop)
 
     def _bound(self, active: tuple[int, ...], delayed: bool) -> BoundTape:
         """The tape with registers for these derivatives."""
-        kept: dict[tuple[tuple[int, ...], bool, bool], tuple[BoundTape, Native | None]]
+        kept: dict[tuple[tuple[int, ...], bool], tuple[BoundTape, Native]]
         kept = self.own.__dict__.setdefault("kept", {})
-        often = self.steps > OFTEN
-        key = (active, delayed, often)
+        key = (active, delayed)
         if key not in kept:
-            code = native(self.program, active, delayed) if often else None
-            kept[key] = bound(self.program, len(active), code.addresses if code else NOTHING), code
+            code = native(self.program, active, delayed)
+            kept[key] = bound(self.program, active, code.addresses), code
         return kept[key][0]
 
 
 @functools.lru_cache(maxsize=512)
 def machine(program: Tape) -> Machine:
-    """The one machine of a tape: simulators of the same equations count their steps together."""
+    """The one machine of a tape."""
     return Machine(program)
 
 
@@ -126,9 +115,8 @@ def _kernel(hybrid: bool) -> ModuleType:
     import importlib.util
 
     kind = "hybrid" if hybrid else "smooth"
-    name = f"pikanid_interpreter_{kind}"
-    spec = importlib.util.spec_from_file_location(name, written(f"interpreter_{kind}",
-                                                                _source(kind)))
+    name = f"pikanid_tape_{kind}"
+    spec = importlib.util.spec_from_file_location(name, written(f"tape_{kind}", _source(kind)))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
@@ -137,6 +125,5 @@ def _kernel(hybrid: bool) -> ModuleType:
 
 
 def _source(kind: str) -> str:
-    parts = ["interpreter", *(["interpreter_signs"] if kind == "hybrid" else []),
-             f"interpreter_{kind}"]
+    parts = ["tape", *(["tape_signs"] if kind == "hybrid" else []), f"tape_{kind}"]
     return "\n\n".join([_HEADER.rstrip("\n") + "\n", *map(kernel_text, parts)])

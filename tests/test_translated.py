@@ -9,10 +9,10 @@ from pikanid import excitation, systems
 from pikanid.model import Model, Parameter
 from pikanid.problem import bind
 from pikanid.recording import Recording
-from pikanid.simulation.interpreted import Interpreted
 from pikanid.simulation.simulator import Simulator, Steps
 from pikanid.simulation.structure import Structure
 from pikanid.simulation.tape import tape
+from pikanid.simulation.translated import Translated
 
 pytestmark = pytest.mark.compiled
 
@@ -33,7 +33,7 @@ def test_smooth_model_agrees_with_its_compiled_self() -> None:
     model = systems.sloshing()
     experiment = bind(model, recorded(model))
     p, active = values(model), np.arange(4)
-    tape_run = Interpreted(model, experiment).run(p, active, FINE)
+    tape_run = Translated(model, experiment).run(p, active, FINE)
     compiled = Simulator(model, experiment).run(p, active, FINE)
     np.testing.assert_allclose(tape_run.y, compiled.y, atol=1e-14)
     np.testing.assert_allclose(tape_run.sensitivity, compiled.sensitivity, atol=1e-11)
@@ -49,7 +49,7 @@ def test_smooth_model_agrees_with_its_compiled_self() -> None:
 def test_sensitivities_are_derivatives(term: str, parameters: dict[str, float]) -> None:
     model = systems.sloshing().with_term(
         "theta_dot", term, [Parameter(n, v) for n, v in parameters.items()])
-    simulator = Interpreted(model, bind(model, recorded(model)))
+    simulator = Translated(model, bind(model, recorded(model)))
     p = values(model)
     active = np.array([0, 1, *range(4, len(p))])
     steps = Steps("explicit", 0.00125)
@@ -76,7 +76,7 @@ def sliding_block() -> tuple[Model, Recording]:
 
 def test_dry_friction_stops_exactly_and_stays() -> None:
     model, recording = sliding_block()
-    response = Interpreted(model, bind(model, recording)).run(
+    response = Translated(model, bind(model, recording)).run(
         np.array([2.0, 1.0]), np.array([0, 1]), Steps("explicit", 0.01))
     t = recording.t
     moving = np.minimum(t, 0.5)
@@ -99,8 +99,8 @@ def test_delay_of_an_output_moves_it_and_is_differentiated() -> None:
     plain = systems.sloshing()
     model = plain.map_output("theta", [Parameter("tau", 0.03)], delay="tau")
     recording = recorded(plain)
-    late = Interpreted(model, bind(model, recording)).run(values(model), np.array([4]), FINE)
-    now = Interpreted(plain, bind(plain, recording)).run(values(plain), steps=FINE)
+    late = Translated(model, bind(model, recording)).run(values(model), np.array([4]), FINE)
+    now = Translated(plain, bind(plain, recording)).run(values(plain), steps=FINE)
     np.testing.assert_allclose(late.y[100:], now.y[97:-3], atol=1e-9)
     slope = np.gradient(now.y, recording.t)[97:-3]
     np.testing.assert_allclose(late.sensitivity[100:, 0], -slope, atol=0.05 * np.abs(slope).max())
@@ -114,8 +114,8 @@ def test_stopping_at_a_stiff_wall_needs_no_fine_steps() -> None:
         Parameter("k", 1e4), Parameter("w", 0.03)])
     experiment = bind(model, recorded(model))
     p = values(model)
-    through = Interpreted(model, experiment)
-    stopping = Interpreted(model, experiment, located=True)
+    through = Translated(model, experiment)
+    stopping = Translated(model, experiment, located=True)
     exact = stopping.run(p, steps=Steps("explicit", 2e-5)).y
     coarse, fine = (float(np.abs(s.run(p, steps=Steps("explicit", h)).y - exact).max())
                     for s, h in ((stopping, 0.00125), (through, 0.00125)))

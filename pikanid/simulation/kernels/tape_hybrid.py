@@ -1,34 +1,33 @@
 @called
-def take_step(b, t, h, x, S, u, v, gap, dtau, delayed, mode, slopes_on, kx, kS, xs, Ss, xn, Sn):
+def take_step(b, t, h, x, S, u, v, gap, dtau, mode, slopes_on, kx, kS, xs, Ss, xn, Sn):
     """One Runge-Kutta step of length h in the present modes; `gap` after the stop of u, v."""
     n, A = b.sizes[0], S.shape[1]
-    r, d, live, out = b.r, b.d, b.live, b.out[F]
-    if b.native[AROUND, F] != 0 and fixed(mode):
+    r, d, out, code = b.r, b.d, b.out, b.code
+    if fixed(mode):
         put_signs(b, mode, slopes_on)
-        call_step(b.native[AROUND_TANGENTS if slopes_on and A > 0 else AROUND, F], r, d, t, gap, x,
-                  S, u, v, dtau, h, xn, Sn)
+        call_step(code[STEP_TANGENTS if slopes_on else STEP], r, d, t, gap, x, S, u, v, dtau, h,
+                  xn, Sn)
         return
-    put_rates(b, v)
+    # signs that are held at zero change from stage to stage
     for stage in range(4):
         c = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
         for i in range(n):
             xs[i] = x[i] if stage == 0 else x[i] + c * kx[stage - 1, i]
-        put(b, t + c, xs, u, v, gap + c)
         if slopes_on:
             for i in range(n):
                 for a in range(A):
                     Ss[i, a] = S[i, a] if stage == 0 else S[i, a] + c * kS[stage - 1, i, a]
-            put_tangents(b, Ss, v, dtau, delayed)
+        call_look(code[PUT_TANGENTS if slopes_on else PUT], r, d, t + c, gap + c, xs, Ss, u, v,
+                  dtau)
         put_signs(b, mode, slopes_on)
-        values(b, b.group[F])
+        call_native(code[VALUES_F], r, d)
         if slopes_on:
-            tangents(b, b.group[F])
+            call_native(code[TANGENTS_F], r, d)
         for i in range(n):
-            o = out[i]
-            kx[stage, i] = r[o]
+            kx[stage, i] = r[out[F, i]]
             if slopes_on:
                 for a in range(A):
-                    kS[stage, i, a] = d[o, a] if live[o] else 0.0
+                    kS[stage, i, a] = d[out[F, i], a]
     for i in range(n):
         xn[i] = x[i] + h / 6.0 * (kx[0, i] + 2.0 * kx[1, i] + 2.0 * kx[2, i] + kx[3, i])
         if slopes_on:
@@ -40,18 +39,13 @@ def take_step(b, t, h, x, S, u, v, gap, dtau, delayed, mode, slopes_on, kx, kS, 
 @called
 def margin(b, t, x, S, u, v, gap, dtau, mode):
     """How far the modes are from their ends (>= 0 while they hold), and which is the closest."""
-    K = b.sizes[4]
     first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
-    if b.native[AROUND, G] != 0 and fixed(mode):
-        put_signs(b, mode, b.flag[0])
-        call_look(b.native[AROUND, G], b.r, b.d, t, gap, x, S, u, v, dtau)
-    else:
-        put(b, t, x, u, v, gap)
-        put_rates(b, v)
-        put_signs(b, mode, b.flag[0])
-        values(b, b.group[G])
+    if not fixed(mode):
+        call_look(b.code[PUT], b.r, b.d, t, gap, x, S, u, v, dtau)
+    put_signs(b, mode, b.flag[0])
+    call_look(b.code[LOOK_G], b.r, b.d, t, gap, x, S, u, v, dtau)
     least, which = np.inf, -1
-    for k in range(K):
+    for k in range(len(mode)):
         room = (1.0 - abs(b.r[first + k]) if mode[k] == 0.0
                 else mode[k] * b.r[b.out[G, k]])
         if room < least:
@@ -76,7 +70,7 @@ def next_share(a, at_a, b, at_b, c, at_c):
 
 
 @called
-def cross(b, stop, part, x, S, u, v, done, dtau, delayed, mode, end, which, kx, kS, xs, Ss, xn, Sn):
+def cross(b, stop, part, x, S, u, v, done, dtau, mode, end, which, kx, kS, xs, Ss, xn, Sn):
     """The step, of at most `part` after `done`, to where the first mode ends; and which that is.
 
     `end` and `which` are the margin behind the whole step, below zero.
@@ -92,7 +86,7 @@ def cross(b, stop, part, x, S, u, v, done, dtau, delayed, mode, end, which, kx, 
         if least > 0.5:
             break
         middle = latest + min(max(share, least), 1.0 - least) * (other - latest)
-        take_step(b, stop + done, middle, x, S, u, v, done, dtau, delayed, mode, b.flag[0],
+        take_step(b, stop + done, middle, x, S, u, v, done, dtau, mode, b.flag[0],
                   kx, kS, xs, Ss, xn, Sn)
         room, k = margin(b, stop + done + middle, xn, S, u, v, done + middle, dtau, mode)
         third, at_third = latest, at_latest
@@ -104,52 +98,48 @@ def cross(b, stop, part, x, S, u, v, done, dtau, delayed, mode, end, which, kx, 
         else:
             low = middle
         share = next_share(latest, at_latest, other, at_other, third, at_third)
-    take_step(b, stop + done, high, x, S, u, v, done, dtau, delayed, mode, b.flag[1],
+    take_step(b, stop + done, high, x, S, u, v, done, dtau, mode, b.flag[1],
               kx, kS, xs, Ss, xn, Sn)
     return high, which
 
 
 @called
-def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, first, output, row,
-             inside, X, Y, J, x, S, xs, Ss, xn, Sn, kx, kS, before, mode):
+def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, output, row, inside,
+             X, Y, J, x, S, xs, Ss, xn, Sn, kx, kS, before, mode):
     """The classical Runge-Kutta method, stopping where the right-hand side jumps; see `run`."""
-    n, A, L, K, out = b.sizes[0], len(act), len(T), b.sizes[4], b.out[F]
-    sign, all_events = 1 + n + b.sizes[1] + b.sizes[2], 0
-    step, look = b.native[AROUND_TANGENTS if A > 0 else AROUND, F], b.native[AROUND, G]
-    r, d, switch = b.r, b.d, b.out[G]
-    prepare(b, p, act, delayed)
+    n, m, A, L, K = b.sizes[0], b.sizes[1], S.shape[1], len(T), b.sizes[4]
+    r, d, out, code = b.r, b.d, b.out, b.code
+    sign, all_events = 1 + n + m + b.sizes[2], 0
+    prepare(b, p)
     for q in range(L):
         u, v = U[q], V[q]
         if jumps[q]:
             if delayed and q > 0 and A > 0:
-                put(b, T[q], x, U[q - 1], V[q - 1], T[q] - T[q - 1])
-                put_rates(b, V[q - 1])
+                call_look(code[PUT], r, d, T[q], T[q] - T[q - 1], x, S, U[q - 1], V[q - 1], dtau_in)
                 put_signs(b, mode, b.flag[0])
-                for j in range(b.sizes[1]):
-                    values(b, b.group[F])
+                for j in range(m):
+                    call_native(code[VALUES_F], r, d)
                     for i in range(n):
-                        before[i] = b.r[out[i]]
-                    b.r[1 + n + j] = U[q, j]
+                        before[i] = r[out[F, i]]
+                    r[1 + n + j] = U[q, j]
                     put_signs(b, mode, b.flag[0])
-                    values(b, b.group[F])
+                    call_native(code[VALUES_F], r, d)
                     for i in range(n):
                         for a in range(A):
-                            S[i, a] += (before[i] - b.r[out[i]]) * dtau_in[j, a]
-            clear = look != 0 and fixed(mode)
+                            S[i, a] += (before[i] - r[out[F, i]]) * dtau_in[j, a]
+            clear = fixed(mode)
             if clear:
-                call_look(look, r, d, T[q], 0.0, x, S, u, v, dtau_in)
+                call_look(code[LOOK_G], r, d, T[q], 0.0, x, S, u, v, dtau_in)
                 for k in range(K):
-                    clear = clear and abs(r[switch[k]]) > 1e-9
+                    clear = clear and abs(r[out[G, k]]) > 1e-9
             if clear:
                 for k in range(K):
-                    mode[k] = 1.0 if r[switch[k]] > 0.0 else -1.0
+                    mode[k] = 1.0 if r[out[G, k]] > 0.0 else -1.0
             else:
-                begin(b, T[q], x, u, v, mode)
+                begin(b, T[q], x, S, u, v, dtau_in, mode)
         if first[q] < first[q + 1]:
             if not fixed(mode):
-                put(b, T[q], x, u, v, 0.0)
-                put_rates(b, v)
-                put_tangents(b, S, v, dtau_in, delayed)
+                call_look(code[PUT_TANGENTS], r, d, T[q], 0.0, x, S, u, v, dtau_in)
             put_signs(b, mode, b.flag[1])
             show(b, q, x, S, U, V, T, first, output, row, inside, dtau_in, dtau_out, delayed, Y, J)
         if X.shape[0] > 0:
@@ -163,27 +153,28 @@ def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, firs
             goal = (piece + 1) * h
             while done < goal:
                 part = goal - done
-                if step != 0 and fixed(mode):
+                if fixed(mode):
                     # as below, without calls that hand over the whole tape
                     for k in range(K):
                         r[sign + k] = mode[k]
                         for a in range(A):
                             d[sign + k, a] = 0.0
-                    call_step(step, r, d, T[q] + done, done, x, S, u, v, dtau_in, part, xn, Sn)
-                    call_look(look, r, d, T[q] + goal, goal, xn, S, u, v, dtau_in)
+                    call_step(code[STEP_TANGENTS], r, d, T[q] + done, done, x, S, u, v, dtau_in,
+                              part, xn, Sn)
+                    call_look(code[LOOK_G], r, d, T[q] + goal, goal, xn, S, u, v, dtau_in)
                     end, which = np.inf, -1
                     for k in range(K):
-                        room = mode[k] * r[switch[k]]
+                        room = mode[k] * r[out[G, k]]
                         if room < end:
                             end, which = room, k
                 else:
-                    take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, delayed, mode,
-                              b.flag[1], kx, kS, xs, Ss, xn, Sn)
+                    take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, mode, b.flag[1],
+                              kx, kS, xs, Ss, xn, Sn)
                     end, which = margin(b, T[q] + goal, xn, S, u, v, goal, dtau_in, mode)
                 crossing = end < -1e-13
                 if crossing:
-                    part, which = cross(b, T[q], part, x, S, u, v, done, dtau_in, delayed, mode,
-                                        end, which, kx, kS, xs, Ss, xn, Sn)
+                    part, which = cross(b, T[q], part, x, S, u, v, done, dtau_in, mode, end, which,
+                                        kx, kS, xs, Ss, xn, Sn)
                 for i in range(n):
                     x[i] = xn[i]
                     if not abs(x[i]) < 1e120:
@@ -192,7 +183,7 @@ def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, firs
                         S[i, a] = Sn[i, a]
                 if crossing:
                     done += part
-                    passed(b, which, T[q] + done, x, S, u, v, done, dtau_in, delayed, mode, before)
+                    passed(b, which, T[q] + done, x, S, u, v, done, dtau_in, mode, before)
                     events += 1
                     all_events += 1
                     if events > 1000 or all_events > L + 200:
@@ -203,11 +194,11 @@ def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, firs
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first,
-                   output, row, inside, X, Y, J):
+def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, first, output,
+                   row, inside, X, Y, J):
     """`run_tape` with its scratch; the only function that Python calls."""
-    n, A, x, S = b.sizes[0], len(act), x0.copy(), S0.T.copy()
+    n, x, S = b.sizes[0], x0.copy(), S0.T.copy()
     return run_tape(
-        b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, act, first, output, row, inside,
+        b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, output, row, inside,
         X, Y, J, x, S, x.copy(), S.copy(), x.copy(), S.copy(), np.empty((4, n)),
-        np.empty((4, n, A)), np.empty(n), np.ones(b.sizes[4]))
+        np.empty((4, *S.shape)), np.empty(n), np.ones(b.sizes[4]))

@@ -1,63 +1,4 @@
 @called
-def put_signs(b, mode, slide):
-    """Signs into their registers; those held at zero by d g/dt = G(s) = 0, which is linear in s.
-
-    Returns whether any is; then d s/dθ is put as well, if `slide` says that derivatives are wanted.
-    """
-    K = b.sizes[4]
-    first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
-    held = 0
-    for k in range(K):
-        b.r[first + k] = mode[k]
-        if mode[k] == 0.0:
-            held += 1
-        if slide:
-            for a in range(b.d.shape[1]):
-                b.d[first + k, a] = 0.0
-    if held == 0:
-        return False
-    values(b, b.group[G_RATE])
-    by_signs(b)
-    matrix, right, again, change = b.matrix, b.right, b.again, b.change
-    for k in range(K):
-        right[k, 0] = 0.0
-        for j in range(K):
-            matrix[k, j] = 0.0
-        matrix[k, k] = 1.0
-        o = b.out[G_RATE, k]
-        if mode[k] == 0.0:
-            right[k, 0] = -b.r[o]
-            for j in range(K):
-                if mode[j] == 0.0:
-                    matrix[k, j] = b.ds[o, j] if b.signed[o] else 0.0
-    for k in range(K):
-        for j in range(K):
-            again[k, j] = matrix[k, j]
-    solve_small(matrix, right)
-    for k in range(K):
-        if mode[k] == 0.0:
-            b.r[first + k] = right[k, 0]
-    if not slide:
-        return True
-    # now that the signs are known: dG = 0 holds them as parameters vary
-    values(b, b.group[G_RATE])
-    tangents(b, b.group[G_RATE])
-    for k in range(K):
-        o = b.out[G_RATE, k]
-        for a in range(b.d.shape[1]):
-            change[k, a] = 0.0
-        if mode[k] == 0.0 and b.live[o]:
-            for a in range(b.d.shape[1]):
-                change[k, a] = -b.d[o, a]
-    solve_small(again, change)
-    for k in range(K):
-        if mode[k] == 0.0:
-            for a in range(b.d.shape[1]):
-                b.d[first + k, a] = change[k, a]
-    return True
-
-
-@called
 def fixed(mode):
     """Whether no sign is held at zero: then all stay what they are during a step."""
     held = 0
@@ -68,10 +9,63 @@ def fixed(mode):
 
 
 @called
+def put_signs(b, mode, slide):
+    """Signs into their registers; those held at zero by d g/dt = G(s) = 0, which is linear in s.
+
+    Then, if `slide` says that derivatives are wanted, d s/dθ is put as well.
+    """
+    r, d, ds, out = b.r, b.d, b.ds, b.out
+    K, lanes = len(mode), d.shape[1]
+    first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
+    for k in range(K):
+        r[first + k] = mode[k]
+        if slide:
+            for a in range(lanes):
+                d[first + k, a] = 0.0
+    if fixed(mode):
+        return
+    call_native(b.code[VALUES_G_RATE], r, d)
+    call_native(b.code[SIGNS_G_RATE], r, ds)
+    matrix, right, again, change = b.matrix, b.right, b.again, b.change
+    for k in range(K):
+        right[k, 0] = 0.0
+        for j in range(K):
+            matrix[k, j] = 0.0
+        matrix[k, k] = 1.0
+        o = out[G_RATE, k]
+        if mode[k] == 0.0:
+            right[k, 0] = -r[o]
+            for j in range(K):
+                if mode[j] == 0.0:
+                    matrix[k, j] = ds[o, j]
+    for k in range(K):
+        for j in range(K):
+            again[k, j] = matrix[k, j]
+    solve_small(matrix, right)
+    for k in range(K):
+        if mode[k] == 0.0:
+            r[first + k] = right[k, 0]
+    if not slide:
+        return
+    # now that the signs are known: dG = 0 holds them as parameters vary
+    call_native(b.code[VALUES_G_RATE], r, d)
+    call_native(b.code[TANGENTS_G_RATE], r, d)
+    for k in range(K):
+        o = out[G_RATE, k]
+        for a in range(lanes):
+            change[k, a] = -d[o, a] if mode[k] == 0.0 else 0.0
+    solve_small(again, change)
+    for k in range(K):
+        if mode[k] == 0.0:
+            for a in range(lanes):
+                d[first + k, a] = change[k, a]
+
+
+@called
 def rate_of(b, k, mode):
     """d g_k/dt at what is put, in the given modes."""
     put_signs(b, mode, b.flag[0])
-    values(b, b.group[G_RATE])
+    call_native(b.code[VALUES_G_RATE], b.r, b.d)
     return b.r[b.out[G_RATE, k]]
 
 
@@ -92,12 +86,11 @@ def settled(b, k, mode):
 
 
 @called
-def begin(b, t, x, u, v, mode):
+def begin(b, t, x, S, u, v, dtau, mode):
     """Choose the modes after inputs have changed."""
-    put(b, t, x, u, v, 0.0)
-    put_rates(b, v)
-    for k in range(b.sizes[4]):
-        values(b, b.group[G])
+    call_look(b.code[PUT], b.r, b.d, t, 0.0, x, S, u, v, dtau)
+    for k in range(len(mode)):
+        call_native(b.code[VALUES_G], b.r, b.d)
         g = b.r[b.out[G, k]]
         if abs(g) > 1e-9 and mode[k] != 0.0:
             mode[k] = 1.0 if g > 0.0 else -1.0
@@ -106,34 +99,32 @@ def begin(b, t, x, u, v, mode):
 
 
 @called
-def passed(b, k, t, x, S, u, v, gap, dtau, delayed, mode, before):
+def passed(b, k, t, x, S, u, v, gap, dtau, mode, before):
     """End mode k at the point reached: pass, stick, or come loose; derivatives jump.
 
     S+ = S- + (f- - f+) dt_e with dt_e = -(∂g)/(dg/dt)- (Di Bernardo et al., 2008, sec. 2.5).
     """
-    n, A, out = b.sizes[0], S.shape[1], b.out[F]
-    put(b, t, x, u, v, gap)
-    put_rates(b, v)
+    n, A, r, d, code = b.sizes[0], S.shape[1], b.r, b.d, b.code
+    call_look(code[PUT_TANGENTS], r, d, t, gap, x, S, u, v, dtau)
     if mode[k] == 0.0:
         put_signs(b, mode, b.flag[0])
         first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
-        mode[k] = 1.0 if b.r[first + k] > 0.0 else -1.0
+        mode[k] = 1.0 if r[first + k] > 0.0 else -1.0
         return
     rate = rate_of(b, k, mode)
-    values(b, b.group[F])
+    call_native(code[VALUES_F], r, d)
     for i in range(n):
-        before[i] = b.r[out[i]]
+        before[i] = r[b.out[F, i]]
     new = settled(b, k, mode)
     mode[k] = -mode[k] if new == mode[k] else new
     if A == 0 or rate == 0.0:
         return
-    put_tangents(b, S, v, dtau, delayed)
     put_signs(b, mode, b.flag[1])
-    values(b, b.group[G])
-    tangents(b, b.group[G])
-    values(b, b.group[F])
+    call_native(code[VALUES_G], r, d)
+    call_native(code[TANGENTS_G], r, d)
+    call_native(code[VALUES_F], r, d)
     o = b.out[G, k]
     for a in range(A):
-        when = -(b.d[o, a] if b.live[o] else 0.0) / rate
+        when = -d[o, a] / rate
         for i in range(n):
-            S[i, a] += (before[i] - b.r[out[i]]) * when
+            S[i, a] += (before[i] - r[b.out[F, i]]) * when
