@@ -31,7 +31,7 @@ def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.n
 def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
     """∂delay/∂p (channels, P)."""
     table = dict(zip(model.parameter_names, p, strict=True))
-    return np.array([[_number(item.delay.diff(symbol(n)), table) for n in model.parameter_names]
+    return np.array([[_number(slope, table) for slope in _slopes(item.delay, model.parameter_names)]
                      for item in items]).reshape(len(items), len(p))
 
 
@@ -46,7 +46,14 @@ def paths(model: Model, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
                       for i in model.inputs]))
 
 
+@functools.lru_cache(maxsize=256)
+def _slopes(expr: sp.Expr, names: tuple[str, ...]) -> tuple[sp.Expr, ...]:
+    return tuple(expr.diff(symbol(n)) for n in names)
+
+
 def _number(expr: sp.Expr, table: dict[str, float]) -> float:
+    if expr.is_Symbol:  # most delays are one parameter
+        return float(table[expr.name])
     if expr.is_number:
         return float(expr)
     return float(expr.xreplace({symbol(n): sp.Float(v) for n, v in table.items()}))

@@ -11,6 +11,7 @@ import functools
 import hashlib
 import threading
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,24 @@ def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
 
     `moving_inputs`: the inputs move with the parameters, too, as where delays are estimated.
     """
+    from llvmlite import binding
+
+    parts = [_version(), tape.sizes, active, moving_inputs, *(
+        (name, found.tolist()) for table in (tape.code, tape.outputs)
+        for name, found in table.items())]
+    digest = hashlib.sha256(repr(parts).encode()).hexdigest()[:24]
+    with _lock:
+        binding.initialize_native_target()
+        binding.initialize_native_asmprinter()
+        code = kept(f"tape_{digest}.o", lambda: _compiled(_text(tape, active, moving_inputs)))
+        machine = binding.Target.from_default_triple().create_target_machine()
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
+        engine.add_object_file(binding.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+    return Native(np.array([engine.get_function_address(name) for name in FUNCTIONS]), engine)
+
+
+def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:
     n, m, P, _, K = tape.sizes
     lanes, moving = len(active), moving_inputs and len(active) > 0
     states, inputs = range(1, 1 + n), range(1 + n, 1 + n + m)
@@ -59,34 +78,36 @@ def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
     seeds = {*states, *(inputs if moving else ()), *(1 + n + m + a for a in active if a < P),
              *signs}
     live, signed = _reached(tape, seeds), _reached(tape, set(signs))
-    text = [_HELPERS, *(_values(tape, group) for group in GROUPS),
-            *(_tangents(tape, group, f"tangents_{group}", live, lanes)
-              for group in ("prelude", "f", "h", "g", "g_rate")),
-            _tangents(tape, "g_rate", "signs_g_rate", signed, K),
-            look("put", tape, 0, False), look("put_tangents", tape, lanes, moving),
-            look("look_h", tape, lanes, moving, "values_h", "tangents_h"),
-            look("look_g", tape, 0, False, "values_g"),
-            step("step", tape, 0, live, False), step("step_tangents", tape, lanes, live, moving)]
-    code = _compiled("\n".join(text))
-    return Native(np.array([code.get_function_address(name) for name in FUNCTIONS]), code)
+    return "\n".join([
+        _HELPERS, *(_values(tape, group) for group in GROUPS),
+        *(_tangents(tape, group, f"tangents_{group}", live, lanes)
+          for group in GROUPS if group != "h_rate"),
+        _tangents(tape, "g_rate", "signs_g_rate", signed, K),
+        look("put", tape, 0, False), look("put_tangents", tape, lanes, moving),
+        look("look_h", tape, lanes, moving, "values_h", "tangents_h"),
+        look("look_g", tape, 0, False, "values_g"),
+        step("step", tape, 0, live, False), step("step_tangents", tape, lanes, live, moving)])
 
 
-def _compiled(text: str) -> Any:
-    """An engine that holds the functions; their object code is kept for other processes."""
+def _compiled(text: str) -> bytes:
+    """Object code for this machine."""
+    from llvmlite import binding
+
+    machine = binding.Target.from_default_triple().create_target_machine(
+        opt=1, cpu=binding.get_host_cpu_name(),
+        features=binding.get_host_cpu_features().flatten())
+    return bytes(machine.emit_object(binding.parse_assembly(text)))
+
+
+@functools.cache
+def _version() -> str:
+    """What object code depends on beside the tape: the writers, LLVM and the processor."""
     from llvmlite import __version__, binding
 
-    with _lock:
-        binding.initialize_native_target()
-        binding.initialize_native_asmprinter()
-        host = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
-        digest = hashlib.sha256("\n".join([text, __version__, *host]).encode()).hexdigest()[:24]
-        machine = binding.Target.from_default_triple().create_target_machine(
-            opt=1, cpu=host[0], features=host[1])
-        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
-        code = kept(f"tape_{digest}.o", lambda: machine.emit_object(binding.parse_assembly(text)))
-        engine.add_object_file(binding.ObjectFileRef.from_data(code))
-        engine.finalize_object()
-        return engine
+    here = Path(__file__).parent
+    written_by = "".join((here / f"native_{n}.py").read_text() for n in ("tape", "step", "text"))
+    return "\n".join([written_by, __version__, binding.get_host_cpu_name(),
+                      binding.get_host_cpu_features().flatten()])
 
 
 def _reached(tape: Tape, seeds: set[int]) -> set[int]:

@@ -128,6 +128,11 @@ class Simulator:
         p = np.ascontiguousarray(p, dtype=float)
         active = _NOTHING if active is None else active
         steps = steps or self.choose_steps(p)
+        if not len(active) and not states:
+            for at, of, found in self._kept.get("tried", ()):
+                if (of.method, of.longest) == (steps.method, steps.longest) and np.array_equal(
+                        at, p):
+                    return found  # it was run when the steps were chosen
         module = self.module(steps.method)
         grid = self.grid(p)
         X = np.empty((len(grid.T) if states else 0, len(self.model.states)))
@@ -227,6 +232,7 @@ class Simulator:
         """The outputs, or the states where there are none, as one vector."""
         response = self.run(p, steps=steps, states=not self.experiment.samples)
         if self.experiment.samples:
+            self._kept["tried"] = ((p.copy(), steps, response), *self._kept.get("tried", ())[:1])
             return response
         finite = response.finished and bool(np.isfinite(response.states).all())
         return Response(response.states.ravel(), response.sensitivity, response.t,
