@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -111,6 +112,15 @@ def test_a_weak_effect_is_not_named() -> None:
     assert answered(pair, {"": 99.0, "a": 20.0, "b": 99.0}).verdict == "named"
 
 
+def test_what_is_sure_is_given_whatever_weak_effect_may_be_there_besides() -> None:
+    given = answered([BASE, hypothesis(1000.0, A), hypothesis(1900.0, B), hypothesis(984.0, A, B)])
+    assert given.verdict == "set" and not given.doubt
+    assert [sorted(h.key) for h in given.given] == [["a", "b"], ["a"]]
+    weak = [hypothesis(1040.0), hypothesis(1000.0, A), hypothesis(1030.0, B),
+            hypothesis(984.0, A, B)]
+    assert answered(weak).verdict == "unconfirmed"
+
+
 def test_what_all_recordings_together_refute_is_not_given() -> None:
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1100.0, B)]
     assert answered(fits).verdict == "named"
@@ -139,6 +149,14 @@ def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:
     # a formula that explains far less than the law outside the catalogue is none
     poor = [*fits[:3], hypothesis(1012.0, LAW)]
     assert answered(poor, refused=("a",)).verdict == "unnamed"
+
+
+def test_a_formula_that_is_the_sum_of_two_entries_needs_both() -> None:
+    both = replace(effect(f"{SYMBOLIC}k*sign(v) + f"), covers=("a", "b"))
+    fits = [BASE, hypothesis(1900.0, B), hypothesis(1001.0, GUARD), hypothesis(1000.0, both)]
+    assert answered([*fits, hypothesis(1100.0, A)], refused=("a",)).verdict == "named"
+    weak = answered([*fits, hypothesis(1040.0, A)], refused=("a",))
+    assert weak.verdict == "unconfirmed" and weak.given[0].symbolic and "weak" in weak.doubt
 
 
 def test_a_law_outside_the_catalogue_that_does_better_than_a_formula_stands_beside_it() -> None:

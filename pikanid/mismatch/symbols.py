@@ -25,7 +25,9 @@ from pikanid.symbolic.search import shortlist
 FORMS = 3  # of an edge
 MOST, ALMOST = 0.6, 0.9  # of what all edges explain, or the best one alone: less is not read
 LINEAR = "linear"  # what free parameters do already, as a rule
-CATALOGUED = {"q": ("cubic",), "v": ("sign", "signed square", "signed power")}
+CATALOGUED = {"q": {"cubic": "cubic_stiffness"},
+              "v": {"sign": "coulomb_friction", "signed square": "quadratic_drag",
+                    "signed power": "power_drag"}}
 
 
 def symbolic_candidates(shape: ForceShape, site: Site) -> list[Candidate]:
@@ -41,9 +43,11 @@ def _forms(edge: Edge) -> list[FormFit]:
     return [f for f in fits if f.form is not NOTHING and f.form.family != LINEAR][:FORMS]
 
 
-def _catalogued(edge: Edge, fit: FormFit, site: Site) -> bool:
+def _catalogued(edge: Edge, fit: FormFit, site: Site) -> str:
+    """The key of the entry that a form alone would be; empty where there is none."""
     kind = {site.q: "q", site.v: "v"}.get(edge.argument, "")
-    return fit.form.name in CATALOGUED.get(kind, ())
+    found = CATALOGUED.get(kind, {}).get(fit.form.name)
+    return found + site.suffix if found else ""
 
 
 def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool) -> Candidate:
@@ -56,8 +60,10 @@ def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool) -> Candidat
         parameters = (*parameters, force)
         expression = expression + symbol(force.name)
     text = str(expression)
+    alone = _catalogued(edge, fit, site)
     return Candidate((SYMBOLIC + text,), f"a law {text}", text, "dynamics", site, parameters,
-                     lambda m: m.with_term(site.v, expression), lambda view: ())
+                     lambda m: m.with_term(site.v, expression), lambda view: (),
+                     covers=(alone, "static_bias" + site.suffix) if alone else ())
 
 
 def _with_units(law: Laws, site: Site, edge: Edge, fit: FormFit) -> Iterator[Parameter]:

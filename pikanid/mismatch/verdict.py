@@ -118,6 +118,11 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     least = min(map(total, known))
     merged += [h for h in outside if total(h) - _handicap(h) < least + WITHIN]
     doubt = _doubt(known[0], ranked, predict, scale) if proves else ""
+    if doubt and not outside:
+        # what all of them hold is sure where it is given by itself, whatever may be there besides
+        core = min(known, key=lambda h: len(h.effects))
+        if all(core.key <= h.key for h in known) and not _doubt(core, ranked, predict, scale):
+            doubt = ""
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
@@ -140,18 +145,21 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
     """
     fits, asked = {o.key: o for o in ranked}, STRONG * max(len(h.effects) - 1, 1)
     for e in h.effects:
-        o = fits.get(h.key - {e.key})
-        if o is None:
-            continue
-        a, b = predict(h), predict(o)
-        later = 0.0 if a is None or b is None else max(b.evidence - a.evidence, 0.0)
-        gain = (o.minimum.chi2 - h.minimum.chi2 + later) / scale
-        if gain < asked:
-            return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
-                    f"{asked:.0f} are asked)")
-        needed = _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
-        if len(h.effects) > 1 and not e.absent and not needed:
-            return f"the held-out recording does not need {e.name}"
+        rest = h.key - {e.key}
+        # a formula that is the sum of two entries must need both
+        for fewer in (rest, *(rest | {part} for part in e.covers if h.symbolic)):
+            o = fits.get(fewer)
+            if o is None:
+                continue
+            a, b = predict(h), predict(o)
+            later = 0.0 if a is None or b is None else max(b.evidence - a.evidence, 0.0)
+            gain = (o.minimum.chi2 - h.minimum.chi2 + later) / scale
+            if gain < asked:
+                return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
+                        f"{asked:.0f} are asked)")
+            needed = _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
+            if len(h.effects) > 1 and not e.absent and not needed:
+                return f"the held-out recording does not need {e.name}"
     return ""
 
 
