@@ -138,6 +138,9 @@ def test_a_law_outside_the_catalogue_that_would_do_as_well_stands_beside_the_nam
     given = answered(fits)
     assert given.verdict == "set" and [sorted(h.key) for h in given.given] == [["a"], ["outside"]]
     assert answered([BASE, hypothesis(1000.0, A), hypothesis(1007.0, GUARD)]).verdict == "named"
+    # one that does better keeps the name from being sure
+    better = answered([BASE, hypothesis(1000.0, A), hypothesis(994.0, GUARD)])
+    assert better.verdict == "unconfirmed" and "outside" in better.doubt
     # where only the law outside the catalogue is left, nothing has a name
     assert answered(fits, refused=("a",)).verdict == "unnamed"
 

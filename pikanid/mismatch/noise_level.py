@@ -188,7 +188,9 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
              ) -> tuple[float, float, float]:
     """(σ, ρ, relative standard error of the power at low frequencies); σ may be `given`."""
     costs, scales = [], []
-    total = sum(w * len(p) for _, p, w in spectra)
+    omega = np.concatenate([o for o, _, _ in spectra])
+    weights = np.concatenate([np.full(len(o), w) for o, _, w in spectra])
+    total = float(np.sum(weights))
     for rho in GRID:
         shapes = [1.0 / (1 - 2 * rho * np.cos(o) + rho**2) for o, _, _ in spectra]
         power = sum(w * np.sum(_calm(p / s)) for (_, p, w), s in zip(spectra, shapes, strict=True))
@@ -196,30 +198,25 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
         costs.append(total * np.log(scale) + power / scale + sum(
             w * np.sum(np.log(s)) for (_, _, w), s in zip(spectra, shapes, strict=True)))
         scales.append(scale)
-    return likeliest(GRID, np.array(costs), np.array(scales), total)
+    best = likeliest(np.array(costs), total)
+    rho, scale = float(GRID[best]), float(scales[best])
+    spread = 1.0 / np.sqrt(total)
+    if rho:
+        # the power at the lowest frequencies is q/(1 - ρ)², and q and ρ are wrong together; their
+        # errors are the expected ones: the curvature as found jumps where ordinates are limited
+        by_rho = float(np.gradient(np.log(scales), GRID)[best])
+        slopes = 2 * (np.cos(omega) - rho) / (1 - 2 * rho * np.cos(omega) + rho**2)
+        rho_std = 1.0 / np.sqrt(np.sum(weights * (slopes + by_rho) ** 2))
+        spread = float(np.hypot(spread, (2 / (1 - rho) + by_rho) * rho_std))
+    return float(np.sqrt(scale / (1 - rho**2))), rho, spread
 
 
-def likeliest(grid: np.ndarray, costs: np.ndarray, scales: np.ndarray, total: float
-              ) -> tuple[float, float, float]:
-    """(σ, ρ, relative standard error of the power at low frequencies) of the likeliest AR(1).
-
-    Args:
-        grid: (m,) evenly spaced ρ, from 0 on.
-        costs: (m,) -2 ln of the likelihood of each.
-        scales: (m,) Power of e_t with each.
-        total: Number of ordinates that count.
+def likeliest(costs: np.ndarray, total: float) -> int:
+    """Which ρ of `GRID` has the least cost (-ln of the likelihood, of `total` ordinates): zero unless
+    another one is clearly better.
     """
     best = int(np.argmin(costs))
-    if costs[0] - costs[best] < BELIEVED * np.log(total):
-        best = 0
-    rho, scale = float(grid[best]), float(scales[best])
-    curve = 0.0
-    if 0 < best < len(grid) - 1:
-        step = grid[1] - grid[0]
-        curve = (costs[best + 1] - 2 * costs[best] + costs[best - 1]) / step**2
-    rho_std = 1.0 / np.sqrt(curve) if curve > 0 else 0.0
-    spread = float(np.hypot(1.0 / np.sqrt(total), 2 * rho_std / (1 - rho) if rho else 0.0))
-    return float(np.sqrt(scale / (1 - rho**2))), rho, spread
+    return 0 if costs[0] - costs[best] < BELIEVED * np.log(total) else best
 
 
 def _calm(ratio: np.ndarray) -> np.ndarray:

@@ -261,8 +261,15 @@ class Spectra:
         shapes = 1 - 2 * np.outer(GRID, np.cos(self.omega)) + GRID[:, None] ** 2
         scales = shapes @ (weights * self.power) / total
         costs = total * (np.log(scales) + 1) - np.log(shapes) @ weights
-        sigma, rho, spread = likeliest(GRID, costs, scales, total)
-        return Level(sigma, rho, spread, old.interval, "what differs between repeats", old.stretch)
+        best = likeliest(costs, total)
+        rho, curve = float(GRID[best]), 0.0
+        if 0 < best < len(GRID) - 1:
+            step = GRID[1] - GRID[0]
+            curve = (costs[best + 1] - 2 * costs[best] + costs[best - 1]) / step**2
+        rho_std = 1.0 / np.sqrt(curve) if curve > 0 else 0.0
+        spread = float(np.hypot(1.0 / np.sqrt(total), 2 * rho_std / (1 - rho) if rho else 0.0))
+        return Level(float(np.sqrt(scales[best] / (1 - rho**2))), rho, spread, old.interval,
+                     "what differs between repeats", old.stretch)
 
     def _by_block(self, weights: Array) -> tuple[Array, Array, Array]:
         """Of each block, its number of modes and its sums of both weighted powers."""
