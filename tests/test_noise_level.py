@@ -1,12 +1,13 @@
-"""Which part of a quiet stretch counts: none in which an input moves."""
+"""Which part of a quiet stretch counts, and how well the noise is known then."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from pikanid.channel import Channel
-from pikanid.mismatch.noise_level import _still, first_level
+from pikanid.mismatch.noise_level import Level, _still, first_level, refined
 from pikanid.recording import Recording
 
 T = np.arange(1000) * 0.01
@@ -45,3 +46,26 @@ def test_a_random_motion_does_not_count_as_coloured_noise() -> None:
     blind, seeing = first_level(recording, "y", None), first_level(recording, "y", None, ["u"])
     assert blind.rho > 0.3
     assert seeing.rho == 0 and seeing.sigma == pytest.approx(0.001, rel=0.15)
+
+
+def coloured(rho: float, seed: int) -> np.ndarray:
+    """(2001,) of an AR(1) process of unit variance."""
+    e = np.random.default_rng(seed).standard_normal(2101) * np.sqrt(1 - rho**2)
+    return np.asarray(lfilter([1.0], [1.0, -rho], e)[100:])
+
+
+@pytest.mark.parametrize("rho", [0.3, 0.52, 0.7])
+def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None:
+    """From two quiet seconds and the high frequencies of 120 residuals of pure noise."""
+    t, powers, stated = np.arange(2001) * 0.01, [], []
+    for seed in range(120):
+        y = coloured(rho, seed)
+        level = refined(Level(1.0, 0.0, 0.0, 0.01, "", (0.0, 2.16)), Channel("y", t, y), t, y, 8.0,
+                        None)
+        powers.append(np.log(level.sigma**2 * (1 + level.rho) / (1 - level.rho)))
+        stated.append(level.spread)
+    error = np.std(powers)
+    # the standard deviation of 120 has a standard error of 6.5 %
+    assert error == pytest.approx(np.median(stated), rel=0.2)
+    assert np.quantile(stated, 0.05) > 0.7 * error
+    assert np.mean(powers) == pytest.approx(np.log((1 + rho) / (1 - rho)), abs=0.25 * error)

@@ -212,7 +212,7 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
 
 
 def likeliest(costs: np.ndarray, total: float) -> int:
-    """Which ρ of `GRID` has the least cost (-ln of the likelihood, of `total` ordinates): zero unless
+    """Which ρ of `GRID` has the least cost, -ln of the likelihood of `total` ordinates; zero unless
     another one is clearly better.
     """
     best = int(np.argmin(costs))
