@@ -101,13 +101,13 @@ def _compiled(text: str) -> bytes:
 
 @functools.cache
 def _version() -> str:
-    """What object code depends on beside the tape: the writers, LLVM and the processor."""
+    """What object code depends on beside a tape: the writers, LLVM and the processor."""
     from llvmlite import __version__, binding
 
     here = Path(__file__).parent
-    written_by = "".join((here / f"native_{n}.py").read_text() for n in ("tape", "step", "text"))
-    return "\n".join([written_by, __version__, binding.get_host_cpu_name(),
-                      binding.get_host_cpu_features().flatten()])
+    writers = ("tape", "native_tape", "native_step", "native_text")
+    return "\n".join([*((here / f"{n}.py").read_text() for n in writers), __version__,
+                      binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
 
 
 def _reached(tape: Tape, seeds: set[int]) -> set[int]:
