@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -34,6 +35,7 @@ from pikanid.plots import new_figure, save_figure
 from pikanid.writing import atomically
 
 DEGREE = math.pi / 180
+LONGEST = 5  # diagnoses of a set that are timed again by themselves
 
 
 @dataclass(frozen=True)
@@ -48,9 +50,9 @@ class Set:
 
 
 SETS = (
-    Set("rich", "rich", 0.1 * DEGREE, 20321),
-    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20322),
-    Set("rich_1deg", "rich", 1.0 * DEGREE, 20323),
+    Set("rich", "rich", 0.1 * DEGREE, 20331),
+    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20332),
+    Set("rich_1deg", "rich", 1.0 * DEGREE, 20333),
 )
 
 
@@ -78,6 +80,8 @@ def main() -> None:
     for one in chosen:
         found = list(_diagnosed(one, given.work, given.cases, given.workers))
         parts.append(_section(one, found))
+        longest = sorted(found, key=lambda each: -each[1]["cpu"])[:LONGEST]
+        parts.append(_alone(given.work / one.name, [score.case for score, _ in longest]))
         every += [score for score, _ in found]
     if len(chosen) > 1:
         parts.append(_together(every, given.folder))
@@ -190,6 +194,32 @@ def _answer(job: tuple[str, str, str]) -> str:
     text = json.dumps(answer)
     kept.write_text(text)
     return text
+
+
+def _alone(folder: Path, cases: Sequence[str]) -> str:
+    """How long the diagnoses take that took longest, made again one after the other, with as many
+    threads as a diagnosis takes by itself.
+    """
+    kept = folder / "alone.json"
+    seconds: dict[str, float] = json.loads(kept.read_text()) if kept.exists() else {}
+    for case in cases:
+        if case not in seconds:
+            # once to have everything compiled and read, then for the time
+            seconds[case] = [_timed(folder / "recordings", case) for _ in range(2)][1]
+            kept.write_text(json.dumps(seconds))
+    found = ", ".join(f"{seconds[case]:.1f}" for case in cases)
+    return (f"The {len(cases)} that took longest, again by themselves on {os.cpu_count()} cores: "
+            f"{found} s by the clock.\n")
+
+
+def _timed(folder: Path, case: str) -> float:
+    import pikanid as pk
+
+    train, other = (pk.Recording.read(folder / f"{case}_{part}.csv")
+                    for part in ("train", "held_out"))
+    begun = time.perf_counter()
+    pk.diagnose(pk.systems.sloshing(), train, other)
+    return time.perf_counter() - begun
 
 
 def _section(one: Set, found: list[tuple[Score, dict[str, Any]]]) -> str:

@@ -24,6 +24,7 @@ ABOVE = 6.0  # natural frequencies from which on a residual is noise
 BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
 BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
 GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
+UNKNOWN = 1.0  # relative standard error of a power, at most: then it is known by its order only
 CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
@@ -201,14 +202,14 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
     best = likeliest(np.array(costs), total)
     rho, scale = float(GRID[best]), float(scales[best])
     spread = 1.0 / np.sqrt(total)
-    if rho:
+    if 0 < best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
         # the power at the lowest frequencies is q/(1 - ρ)², and q and ρ are wrong together; their
         # errors are the expected ones: the curvature as found jumps where ordinates are limited
         by_rho = float(np.gradient(np.log(scales), GRID)[best])
         slopes = 2 * (np.cos(omega) - rho) / (1 - 2 * rho * np.cos(omega) + rho**2)
         rho_std = 1.0 / np.sqrt(np.sum(weights * (slopes + by_rho) ** 2))
         spread = float(np.hypot(spread, (2 / (1 - rho) + by_rho) * rho_std))
-    return float(np.sqrt(scale / (1 - rho**2))), rho, spread
+    return float(np.sqrt(scale / (1 - rho**2))), rho, min(spread, UNKNOWN)
 
 
 def likeliest(costs: np.ndarray, total: float) -> int:

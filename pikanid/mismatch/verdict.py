@@ -123,7 +123,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         core = min(known, key=lambda h: len(h.effects))
         if all(core.key <= h.key for h in known) and not _doubt(core, ranked, predict, scale):
             doubt = ""
-    if proves and not known[0].symbolic and any(total(h) < least for h in outside):
+    if proves and not known[0].symbolic and any(
+            total(h) - _handicap(h) < least for h in outside):
         doubt = "a law outside the catalogue explains it better"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
