@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.candidate import SYMBOLIC
 from pikanid.mismatch.experiments import TELLS_APART, NextExperiment, next_experiment
 from pikanid.mismatch.profiles import profiles
 from pikanid.mismatch.result import Explanation, Verdict
@@ -42,7 +43,8 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
     """
     if verdict in ("none", "named"):
         return ""
-    if verdict == "set":
+    outside = any(e.ids[0].startswith(SYMBOLIC) for h in given for e in h.effects)
+    if verdict == "set" or (weak and outside and len(given) > 1):
         return _separating(given[:COMPARED], records, rate, workers)
     if not given:
         return EXPLORE
