@@ -24,7 +24,7 @@ ABOVE = 6.0  # natural frequencies from which on a residual is noise
 BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
 BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
 GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
-UNKNOWN = 1.0  # relative standard error of a power, at most: then it is known by its order only
+UNKNOWN = 0.6  # relative standard error of a power, at most: then it is known by its order only
 CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
