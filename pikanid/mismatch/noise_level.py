@@ -35,7 +35,7 @@ class Level:
     Attributes:
         sigma: Standard deviation of ε.
         rho: Correlation of neighbours.
-        spread: Relative standard error of its power at low frequencies.
+        spread: Relative standard error of its power at low frequencies, on average.
         interval: Between samples [s].
         source: In words.
         stretch: Start and stop [s] of a quiet stretch long enough to tell low frequencies.
@@ -187,7 +187,7 @@ def bridged(grid: np.ndarray) -> np.ndarray:
 
 def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float | None
              ) -> tuple[float, float, float]:
-    """(σ, ρ, relative standard error of the power at low frequencies); σ may be `given`."""
+    """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`."""
     costs, scales = [], []
     omega = np.concatenate([o for o, _, _ in spectra])
     weights = np.concatenate([np.full(len(o), w) for o, _, w in spectra])
@@ -203,13 +203,18 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
     rho, scale = float(GRID[best]), float(scales[best])
     spread = 1.0 / np.sqrt(total)
     if 0 < best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
-        # the power at the lowest frequencies is q/(1 - ρ)², and q and ρ are wrong together; their
-        # errors are the expected ones: the curvature as found jumps where ordinates are limited
+        # q and ρ are wrong together, by what the likelihood is expected to leave: its curvature as
+        # found jumps where ordinates are limited
         by_rho = float(np.gradient(np.log(scales), GRID)[best])
-        slopes = 2 * (np.cos(omega) - rho) / (1 - 2 * rho * np.cos(omega) + rho**2)
-        rho_std = 1.0 / np.sqrt(np.sum(weights * (slopes + by_rho) ** 2))
-        spread = float(np.hypot(spread, (2 / (1 - rho) + by_rho) * rho_std))
+        rho_std = 1.0 / np.sqrt(np.sum(weights * (_slope(rho, omega) + by_rho) ** 2))
+        low = np.linspace(0.0, spectra[0][0][0], 50)
+        spread = float(np.hypot(spread, np.mean(_slope(rho, low) + by_rho) * rho_std))
     return float(np.sqrt(scale / (1 - rho**2))), rho, min(spread, UNKNOWN)
+
+
+def _slope(rho: float, omega: np.ndarray) -> np.ndarray:
+    """∂/∂ρ of ln 1/|1 - ρ exp(-iω)|²."""
+    return np.asarray(2 * (np.cos(omega) - rho) / (1 - 2 * rho * np.cos(omega) + rho**2))
 
 
 def likeliest(costs: np.ndarray, total: float) -> int:
