@@ -265,3 +265,16 @@ def test_a_force_that_nothing_follows_is_not_looked_for() -> None:
     quarter = 0.5 * np.pi / site.rate
     low, high = force.parameters[1].bounds
     assert (low, high) == pytest.approx((rec.start, rec.stop - quarter))
+
+
+def test_a_late_input_is_no_late_output_where_another_one_acts(
+        recording: Recording, listed: dict[str, Candidate]) -> None:
+    late, cross = listed["input_delay[u_x]"], listed["cross_axis[u_y]"]
+    assert not late.suits() and not late.suits([listed["coulomb_friction"]])
+    assert late.suits([cross])
+    truth = extended(systems.sloshing(), [cross, late]).with_values(kappa_u_y=0.3, tau_in=0.012)
+    one, other = (simulate(truth, excitation.planar_moves(
+        5, 8.0, channels=("u_x", "u_y"), seed=seed), sigma=0.0005, seed=seed) for seed in (1, 2))
+    dx = diagnose(systems.sloshing(), one, other, workers=1)
+    assert dx.verdict in ("named", "set")
+    assert {i for e in dx.hypotheses[0].effects for i in e.ids} == {"cross_axis", "input_delay"}

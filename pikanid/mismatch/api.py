@@ -171,7 +171,8 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     search = Search(nominal, records, listed, tell,
                     guess={n: model.parameter(n).value for n in model.free_names})
     base = search.base()
-    case = Case(nominal, records, held, proves, found, listed, search, base, before, notes, {}, {},
+    alone = tuple(c for c in listed if c.suits())
+    case = Case(nominal, records, held, proves, found, alone, search, base, before, notes, {}, {},
                 again)
     search.predicts = case.predicts
     return case

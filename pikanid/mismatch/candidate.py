@@ -77,6 +77,8 @@ class Candidate:
             comes to rest between two samples.
         levels: Values of its parameters, from the best of which a fit begins where the model is far
             off: no first step leads to them.
+        beside: Ids of effects, one of which has to be there: without them it is a twin of another
+            entry.
     """
 
     ids: tuple[str, ...]
@@ -96,6 +98,11 @@ class Candidate:
     covers: tuple[str, ...] = ()
     hills: tuple[float, ...] = ()
     levels: tuple[Mapping[str, float], ...] = ()
+    beside: tuple[str, ...] = ()
+
+    def suits(self, others: Sequence[Candidate] = ()) -> bool:
+        """Whether it is an explanation of its own beside these."""
+        return not self.beside or any(i in self.beside for e in others for i in e.ids)
 
     @property
     def key(self) -> str:

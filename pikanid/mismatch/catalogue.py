@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pikanid.mismatch import channels, forces, guards
+from pikanid.mismatch import channels, forces, guards, late_inputs
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.site import Site
 
@@ -12,8 +12,8 @@ ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
     forces.coulomb_friction, forces.quadratic_drag, forces.power_drag, forces.amplitude_damping,
     forces.cubic_stiffness, forces.static_bias, forces.parameter_drift, channels.second_mode,
     forces.wall_impact, channels.cross_axis, forces.disturbance, forces.boundary_layer,
-    forces.hysteresis, channels.delay, channels.lags, channels.input_gain, channels.sensor_gain,
-    channels.input_limits, channels.input_backlash, channels.sensor_offset,
+    forces.hysteresis, channels.delay, late_inputs.input_delay, channels.lags, channels.input_gain,
+    channels.sensor_gain, channels.input_limits, channels.input_backlash, channels.sensor_offset,
     channels.sensor_drift, channels.sensor_saturation, channels.sensor_nonlinearity,
     forces.initial_state, channels.input_hold)
 GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
@@ -23,13 +23,14 @@ GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
 
 
 def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
-    """Everything that can be missing in a model, entries first; equal keys once.
+    """Everything that can be missing in a model, entries first; equal keys once.  What is an
+    explanation of its own `beside` others only is there as well.
 
     >>> from pikanid import excitation, systems
     >>> from pikanid.mismatch.site import sites
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
-    >>> sum(c.known for c in found), found[0].key
+    >>> sum(c.known and c.suits() for c in found), found[0].key
     (28, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}

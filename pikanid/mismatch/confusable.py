@@ -153,7 +153,7 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
         raise errors.BadSetting(errors.bad_value("strength", strength, f"above {SEPARATED:g}"))
     nothing = recorded(model, excitation, sigma)
     catalogue = tuple(c for c in catalogue_of(sites(model, nothing.recordings))
-                      if c.known and c.fits)
+                      if c.known and c.fits and c.suits())
     base = fitted(model, (), nothing, [{}], len(catalogue))
     if base is None:
         raise errors.SimulationFailed(errors.too_rough_to_plan(model.name, excitation.name))

@@ -66,7 +66,7 @@ class Search:
     @property
     def choices(self) -> int:
         """Number of entries to choose from."""
-        return sum(c.known for c in self.candidates)
+        return sum(c.known and c.suits() for c in self.candidates)
 
     def base(self) -> Hypothesis:
         """The nominal model without effects, refitted."""
@@ -74,7 +74,7 @@ class Search:
 
     def run(self, adequate: Adequate) -> list[Hypothesis]:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
-        every = [c for c in self.candidates if c.fits]
+        every = [c for c in self.candidates if c.fits and c.suits()]
         screen = Screen(self.base(), every, self.guess)
         self.tell("single effects")
         always = entry if self.base().far else law
@@ -115,7 +115,7 @@ class Search:
         self._simplify()
         best = self.ranked()[0]
         if any(e.hills for e in best.effects) and not adequate(best):
-            best = self._fit(best.effects, [best.point], again=True)  # beyond hills left for later
+            best = self._fit(best.effects, [best.point], again=True)  # hills left for later
         if adequate(best):
             # what a test of everything misses may still be worth its penalty, or nearly
             price = float(np.log(best.whitened.rows) + 2 * np.log(self.choices))
@@ -123,7 +123,7 @@ class Search:
             for h in self._contenders():
                 self._exchange(h)
             for h in self.ranked()[:NEAR]:
-                # fewer effects that explain almost as much: with another one they may do
+                # fewer effects that explain almost as much may do with another one
                 if 0 < len(h.effects) < len(best.effects) and not self.tired and not adequate(h) \
                         and h.score(self.scale()) < best.score(self.scale()) + 2 * CLOSE:
                     self._extend(h, MORE)
@@ -250,10 +250,9 @@ class Search:
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing) -> None:
-        present = {e.key for e in hypothesis.effects}
         groups = {e.twin for e in hypothesis.effects if e.twin}
-        others = [c for c in self.candidates if c.fits and c.key not in present
-                  and (not c.twin or c.twin not in groups)
+        others = [c for c in self.candidates if c.fits and c.suits(hypothesis.effects)
+                  and c.key not in hypothesis.key and (not c.twin or c.twin not in groups)
                   and not (c.absent and hypothesis.far)]
         screen = Screen(hypothesis, others)
         if hypothesis.far:
@@ -291,7 +290,8 @@ class Search:
                           or found.minimum.chi2 < self.fits[key].minimum.chi2):
                 self.fits[key] = found
 
-        in_turn([job for job in jobs if again or frozenset(e.key for e in job[0]) not in self.fits],
+        in_turn([job for job in jobs if all(e.suits(job[0]) for e in job[0])
+                 and (again or frozenset(e.key for e in job[0]) not in self.fits)],
                 lambda: max(self._closest_chi2(), beside), work, take,
                 lambda: always or not self.tired, self.workers,
                 lambda result, chi2: result[1].stands(chi2))

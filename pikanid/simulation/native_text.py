@@ -16,19 +16,23 @@ class Writer:
         self.lines, self.count = list[str](), 0
 
     def put(self, right: str) -> str:
+        """Give a value a name, and note it."""
         self.count += 1
         self.lines.append(f"  %t{self.count} = {right}")
         return f"%t{self.count}"
 
     def load(self, array: str, place: int, kind: str = "double") -> str:
+        """What an array holds from a place on."""
         at = self.put(f"getelementptr double, ptr %{array}, i64 {place}")
         return self.put(f"load {kind}, ptr {at}, align 8")
 
     def store(self, value: str, array: str, place: int, kind: str = "double") -> None:
+        """Write a value to an array, from a place on."""
         at = self.put(f"getelementptr double, ptr %{array}, i64 {place}")
         self.lines.append(f"  store {kind} {value}, ptr {at}, align 8")
 
     def call(self, function: str, *values: str) -> str:
+        """A function of numbers."""
         return self.put(f"call double @{function}({', '.join(f'double {v}' for v in values)})")
 
     def run(self, function: str) -> None:
@@ -36,13 +40,16 @@ class Writer:
         self.lines.append(f"  call void @{function}({REGISTERS})")
 
     def op(self, name: str, x: str, y: str, kind: str = "double") -> str:
+        """An operation on two values."""
         return self.put(f"{name} {kind} {x}, {y}")
 
     def where(self, x: str, relation: str, bound: str, yes: str, no: str) -> str:
+        """One value or another, by a comparison."""
         test = self.put(f"fcmp {relation} double {x}, {bound}")
         return self.put(f"select i1 {test}, double {yes}, double {no}")
 
     def text(self) -> str:
+        """The function."""
         return "\n".join([f"define void @{self.name}({self.signature}) {{", *self.lines,
                           "  ret void", "}"])
 
