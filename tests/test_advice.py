@@ -17,9 +17,10 @@ from pikanid.mismatch.whitened import Records
 RATE = float(np.sqrt(9.81 / 0.045))
 
 
-def explanation(title: str, term: str) -> Explanation:
+def explanation(title: str, term: str, identifier: str = "law") -> Explanation:
     model = pk.systems.sloshing().with_term("theta_dot", term, [pk.Parameter("a", 0.5)])
-    return cast(Explanation, SimpleNamespace(title=title, model=model))
+    effects = (SimpleNamespace(ids=(identifier,)),)
+    return cast(Explanation, SimpleNamespace(title=title, model=model, effects=effects))
 
 
 @pytest.fixture(scope="module")
@@ -51,3 +52,9 @@ def test_other_verdicts_have_sentences_of_their_own(records: Records) -> None:
     assert advice("unnamed", (), records, RATE, True) == EXPLORE
     assert advice("unconfirmed", (FRICTION,), records, RATE, False) == PROVE
     assert advice("unconfirmed", (FRICTION,), records, RATE, True, weak=True) == STRENGTHEN
+
+
+def test_a_likelier_law_outside_the_catalogue_is_to_be_told_apart(records: Records) -> None:
+    outside = explanation("the same again", "-a*sign(theta_dot)", "symbolic:-a*sign(theta_dot)")
+    text = advice("unconfirmed", (FRICTION, outside), records, RATE, True, weak=True)
+    assert text.startswith("No usual profile tells dry friction from the same again")
