@@ -109,9 +109,10 @@ def _together(scores: list[Score], folder: Path) -> str:
     reach = np.clip([np.array(true) - bars[0], bars[1] - np.array(true)], 0.0, None)
     axis.errorbar(stated, true, yerr=reach, fmt="o", color="#1d4ed8", capsize=3,
                   label="answers, 95 %")
-    for p, t, (_, share) in zip(stated, true, rows, strict=True):
+    for k, (p, t, (_, share)) in enumerate(zip(stated, true, rows, strict=True)):
+        # neighbours in turn above and below
         axis.annotate(f"{share.count}/{share.n}", (p, t), textcoords="offset points",
-                      xytext=(5, 5), fontsize=8)
+                      xytext=(5, 5 - 15 * (k % 2)), fontsize=8)
     axis.set(xlabel="probability stated of the first hypothesis", ylabel="share that was true",
              xlim=(0, 1.2), ylim=(-0.05, 1.12))
     axis.legend(loc="upper left", fontsize=8)
