@@ -31,7 +31,7 @@ def input_delay(site: Site) -> list[Candidate]:
 
         found.append(Candidate(
             ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
-            lambda m, u=u, tau=tau: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # bound now
+            lambda m, u=u, tau=tau: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # defaults
             signs, variant=u, twin="delay",
             beside=() if len(site.inputs) > 1 else ("cross_axis",)))
     return found
