@@ -56,12 +56,13 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
                  "sizing": "*"},
     LONGER: {"case": "SEARCHED", "judge": "MOST_ROWS", "preparation": "LONG FINE"},
     REPEATED: {"repeats": "*"},
-    STEPS: {"hypothesis": "LIMIT HURRIED HILLS COARSE", "judge": "AGAIN",
+    STEPS: {"api": "RELEVELLED", "growing": "SHARES",
+            "hypothesis": "LIMIT HURRIED HILLS COARSE", "judge": "AGAIN",
             "least_squares": "PATIENCE", "tangent": "*", "whitened": "FINEST"},
     "number of threads": {"in_turn": "*"},
     "number of draws, points or knots": {
         "detect": "DRAWS BATCH", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
-    "where fits begin": {"beginning": "SHARE", "channels": "LAGS"},
+    "where fits begin": {"beginning": "SHARE", "channels": "LAGS", "late_inputs": "SHIFTS"},
     "acts without a held-out recording only": {"preparation": "ASIDE LEAST"}}
 
 

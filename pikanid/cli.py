@@ -14,6 +14,7 @@ from typing import Annotated, Any, TextIO
 import typer
 
 from pikanid import errors
+from pikanid.commands import interrupts
 from pikanid.commands.conceal import EXAMPLES as CONCEAL
 from pikanid.commands.conceal import conceal
 from pikanid.commands.confusable import EXAMPLES as CONFUSABLE
@@ -91,7 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _never_fail_to_print(stream)
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = app(args=words, prog_name="pikanid", standalone_mode=False)
+        with interrupts.none_lost():
+            code = app(args=words, prog_name="pikanid", standalone_mode=False)
         sys.stdout.flush()
     except errors.PikanidError as problem:
         return _complain(str(problem), problem.exit_code)
@@ -109,6 +111,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _complain(errors.out_of_memory(), 2)
     except (KeyboardInterrupt, typer.Abort):
+        code = EXIT_INTERRUPTED
+    except Exception as failure:
+        if not interrupts.became(failure):
+            raise
         code = EXIT_INTERRUPTED
     if code == EXIT_INTERRUPTED:
         print("Interrupted.", file=sys.stderr)

@@ -57,7 +57,7 @@ def coloured(rho: float, seed: int) -> np.ndarray:
 @pytest.mark.parametrize("rho", [0.3, 0.52, 0.7])
 def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None:
     """From two quiet seconds and the high frequencies of 120 residuals of pure noise."""
-    t, powers, stated = np.arange(2001) * 0.01, [], []
+    t, powers, stated, refuted = np.arange(2001) * 0.01, [], [], []
     low = np.linspace(0.0, 0.25 * np.pi, 50)
     for seed in range(120):
         y = coloured(rho, seed)
@@ -66,8 +66,43 @@ def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None
         gain = 1 - 2 * level.rho * np.cos(low) + level.rho**2
         powers.append(np.mean(np.log(level.sigma**2 * (1 - level.rho**2) / gain)))
         stated.append(level.spread)
+        refuted.append("all frequencies" in level.source)
     error = np.std(powers)  # of 120 it is known to 7 %
     assert np.median(stated) == pytest.approx(error, rel=0.2)
-    assert np.quantile(stated, 0.05) > 0.75 * error
     true = np.mean(np.log((1 - rho**2) / (1 - 2 * rho * np.cos(low) + rho**2)))
     assert np.mean(powers) == pytest.approx(true, abs=0.4 * error)
+    # where the whole residual refutes a power by chance, it is known better than otherwise
+    assert np.mean(refuted) < 0.1
+    assert np.quantile(np.array(stated)[~np.array(refuted)], 0.05) > 0.75 * error
+    scores = (np.array(powers) - true) / stated
+    assert np.std(scores) == pytest.approx(1.0, abs=0.2)
+    assert np.sqrt(np.mean(scores[refuted] ** 2)) < 1.2
+
+
+def rung(amplitude: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times, and a motion (2001,) that dies out during four seconds."""
+    t = np.arange(2001) * 0.01
+    return t, amplitude * np.exp(-t) * np.cos(8.0 * t)
+
+
+def test_a_stretch_in_which_a_motion_dies_out_is_no_quiet_one() -> None:
+    t, motion = rung(300.0)
+    noise = coloured(0.0, 5)
+    before = Level(1.0, 0.0, 0.0, 0.01, "", (3.0, 6.0))
+    level = refined(before, Channel("y", t, motion + noise), t, noise, 8.0, None)
+    assert (level.sigma, level.rho) == (pytest.approx(1.0, abs=0.06), 0.0)
+    assert level.source == "the residual at all frequencies"
+    # not even before the motion is explained: it is a line among the frequencies
+    left = refined(before, Channel("y", t, motion + noise), t, motion + noise, 8.0, None)
+    assert (left.sigma, left.rho) == (pytest.approx(1.0, abs=0.15), 0.0)
+
+
+def test_the_shape_of_high_frequencies_does_not_mislead() -> None:
+    """Half a thousand samples of coloured noise, as an impact's edges may bend their spectrum."""
+    t = np.arange(501) * 0.01
+    noise = coloured(0.6, 7)[:501]
+    steep = np.fft.irfft(np.fft.rfft(noise) * np.interp(
+        np.linspace(0, 1, 251), [0, 0.2, 1], [1.0, 1.0, 0.25]), 501)
+    level = refined(Level(1.0, 0.0, 0.0, 0.01, ""), Channel("y", t, steep), t, steep, 20.0, None)
+    power = level.sigma**2 * (1 + level.rho) / (1 - level.rho)
+    assert power < 2 * 1.6 / 0.4

@@ -38,6 +38,8 @@ from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
+RELEVELLED = 3  # times that the noise is read from what the best explanation leaves, at most
+
 Recordings = Recording | Sequence[Recording]
 
 
@@ -105,15 +107,18 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
             search = case.resumed(search)
             # what nothing explained in part is not explained in whole
             ranked = search.grow(case.adequate) if explained else search.ranked()
-        if case.relevelled(ranked[0], quiet):
-            # the first level was read through the mismatch itself: now it is out of the way
+        for _ in range(RELEVELLED):
+            if not case.relevelled(ranked[0], quiet):
+                break
+            # the level was read through the mismatch itself: now it is out of the way
             tell("noise again")
             search = case.search
             ranked = search.grow(case.adequate)
         tell("confirmation")
         case.clear_later(ranked[0])
-        answer = settle(ranked, search.scale(), case.test, case.predicted,
-                        case.later is not None, case.proves, case.ahead)
+        answer = _settled(case, ranked)
+        if search.closer(answer.given):
+            answer = _settled(case, search.ranked())
     shape = None
     if answer.verdict != "none":
         shape = force_shape(case.base, case.sites[0], case.candidates)
@@ -129,6 +134,11 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
                      case.predicted)
     return replace(_diagnosis(case, detection, answer, shape, alpha), patch=mend,
                    seconds=time.perf_counter() - begun)
+
+
+def _settled(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
+    return settle(ranked, case.search.scale(), case.test, case.predicted, case.later is not None,
+                  case.proves, case.ahead)
 
 
 def _several(recordings: Recordings) -> tuple[Recording, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pikanid.mismatch.candidate import SYMBOLIC, Candidate, Sign
 from pikanid.mismatch.closest import Closest
+from pikanid.mismatch.growing import grown, rough
 from pikanid.mismatch.least_squares import Minimum, minimise
 from pikanid.mismatch.whitened import CERTAIN, GROSS, Records, Whitened
 from pikanid.model import Model
@@ -21,6 +22,7 @@ FAR = 2.0  # times the closest χ², and that of the noise: fits above both toge
 WILD = 1000.0  # times both, for a start
 GLANCE = 1e4  # χ² per row that is good enough to see that
 HILLS = 4  # times that a minimum is left over a hill, if that leads lower
+NEARLY = 0.1  # of the closest χ² that a fit must leave to be worth following from impact to impact
 COARSE = 5  # iterations that each of several starts gets before the best one goes on
 
 
@@ -184,6 +186,11 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     if hilly and not beyond(best.chi2):
         for effect in hilly:
             best = _over_hills(whitened, best, effect, limit)
+        close = best.chi2
+        if rough(close, rows, hilly) and closest.ask(lambda chi2: close < NEARLY * chi2):
+            nothing = np.empty(0), np.empty((0, len(best.theta)))
+            other = grown(whitened, hilly, best.theta, lambda theta: nothing, limit)
+            best = min(best, other or best, key=lambda m: m.chi2)
     penalty = _penalty(effects, whitened.rows, choices)
     return Hypothesis(tuple(effects), model, whitened, best, penalty)
 

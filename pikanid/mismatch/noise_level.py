@@ -25,6 +25,7 @@ BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any
 BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
 GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
 UNKNOWN = 0.6  # relative standard error of a power, at most: then it is known by its order only
+REFUTED = 2.0  # standard errors that a power must exceed what a fit leaves by, to be given up
 CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
@@ -154,6 +155,13 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
             source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
     given = level.sigma if level.source == "given" else None
     sigma, rho, spread = _whittle(spectra, given)
+    # what a fit leaves at low frequencies may be more than noise, never less: a stretch in which a
+    # motion dies out is no quiet one, and the shape of high frequencies can mislead
+    every = (omega > 0) & (omega < 0.97 * np.pi)
+    most = _whittle([(omega[every], power[every], 0.9 * share)], given)
+    if _power(*most[:2], low) < _power(sigma, rho, low) * np.exp(-REFUTED * spread):
+        sigma, rho, spread = most
+        source = "the residual at all frequencies"
     if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)
     return Level(sigma, rho, spread, h, source, level.stretch)
@@ -210,6 +218,12 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
         low = np.linspace(0.0, spectra[0][0][0], 50)
         spread = float(np.hypot(spread, np.mean(_slope(rho, low) + by_rho) * rho_std))
     return float(np.sqrt(scale / (1 - rho**2))), rho, min(spread, UNKNOWN)
+
+
+def _power(sigma: float, rho: float, top: float) -> float:
+    """Mean power of ε between frequency zero and `top` [rad]."""
+    omega = np.linspace(0.0, top, 50)
+    return float(np.mean(sigma**2 * (1 - rho**2) / (1 - 2 * rho * np.cos(omega) + rho**2)))
 
 
 def _slope(rho: float, omega: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from pikanid.recording import Recording
 
 SPIKE = 5.0  # σ by which a sample must leave its neighbours before there is a fit
 LONE = 9.0  # median gaps by which it must once a fit is taken away: of white noise 1 in 4000 does
+HUMP = 3  # neighbours that are alone together
 MOST = 0.1  # of the samples: where more are alone, nothing is
 CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
 # straight on from three neighbours on the left
@@ -66,6 +67,20 @@ def lone(residual: np.ndarray) -> np.ndarray:
     return np.asarray(found if 0 < found.sum() <= MOST * len(found) else np.zeros_like(found))
 
 
+def with_humps(residual: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Which samples are kept (increasing), with those put back that leave the others together.
+
+    `HUMP` neighbours on one side are no errors one by one: a sensor may have been at its end.
+
+    >>> with_humps(np.array([0.0, 9, 8, 9, 0, 9, 8, 0]), np.array([0, 4, 7]))
+    array([0, 1, 2, 3, 4, 7])
+    """
+    gone = np.setdiff1d(np.arange(len(residual)), kept)
+    side = np.sign(residual[gone] - np.interp(gone, kept, residual[kept]))
+    runs = np.split(gone, np.flatnonzero((np.diff(gone) > 1) | (np.diff(side) != 0)) + 1)
+    return np.union1d(kept, np.concatenate([run for run in runs if len(run) >= HUMP] or [kept]))
+
+
 def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np.ndarray]]
                  ) -> tuple[Records, int]:
     """Records without the samples that are alone in residuals, and how many.
@@ -80,6 +95,7 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
         # two that are neighbours hide each other: the second shows when the first has gone
         while (bad := lone(residual[kept])).any() and len(kept) > (1 - MOST) * len(t):
             kept = kept[~bad]
+        kept = with_humps(residual, kept)
         if len(kept) < len(t):
             channel = recordings[r][name]
             gone = np.isin(channel.time, np.delete(t, kept))

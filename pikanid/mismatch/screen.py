@@ -107,6 +107,11 @@ class Screen:
                 break
         return chosen
 
+    def promised(self, candidate: Candidate) -> float:
+        """By how much χ² falls with a candidate, to first order."""
+        own = self.found.owner == self.found.candidates.index(candidate)
+        return float(self.gain[own].max(initial=0.0))
+
     def singles(self, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing
                 ) -> list[tuple[Candidate, list[Start]]]:

@@ -13,7 +13,14 @@ from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
 from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.least_squares import repeated
-from pikanid.mismatch.screen import Screen, as_strong, entry, fixed, law, nothing
+from pikanid.mismatch.neighbours import (
+    Job,
+    with_simpler,
+    with_twins,
+    with_wider,
+    without_one,
+)
+from pikanid.mismatch.screen import Screen, entry, fixed, law, nothing
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
@@ -22,15 +29,14 @@ MORE, LATER = 6, 4  # of one more beside one, beside two or three
 LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
 PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
+KEPT = 0.5  # of what an effect promises, to first order, that a fit of it must gain
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
 EFFORT = 1e7  # states times steps simulated for combinations, before nothing new is begun
 EACH = 1.5e5  # that setting up one fit takes as much time as
-WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
 Starts = Sequence[Start | Mapping[str, float]]
-Job = tuple[Sequence[Candidate], Starts]
 
 
 @dataclass
@@ -119,7 +125,7 @@ class Search:
         if adequate(best):
             # what a test of everything misses may still be worth its penalty, or nearly
             price = float(np.log(best.whitened.rows) + 2 * np.log(self.choices))
-            self._extend(best, LATER, self.scale() * (price - CLOSE))
+            self._extend(best, LATER, self.scale() * (price - CLOSE), anyway=True)
             for h in self._contenders():
                 self._exchange(h)
             for h in self.ranked()[:NEAR]:
@@ -129,7 +135,8 @@ class Search:
                     self._extend(h, MORE)
             self._simplify()
         for h in self._contenders():
-            self._with_wider_laws(h)
+            for job in with_wider(h, self.candidates):
+                self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
 
     def _leading(self) -> list[Hypothesis]:
@@ -154,23 +161,11 @@ class Search:
         """
         if self.ranked()[0].far:
             for closest in self._closest():
-                self._fit_all([(tuple(e for e in closest.effects if e is not effect),
-                                [closest.point]) for effect in closest.effects],
-                              again=True, always=True)
+                self._fit_all([*without_one(closest)], again=True, always=True)
         for _ in range(MOST):
             best = self.ranked()[0]
-            jobs: list[Job] = []
-            for effect in best.effects:
-                rest = tuple(e for e in best.effects if e is not effect)
-                if rest:
-                    jobs.append((rest, [best.point]))
-                for simple in self.candidates:
-                    if simple.key in effect.covers and simple.key not in best.key:
-                        size = as_strong(best, effect, simple)
-                        jobs.append(((*rest, simple), [
-                            {**best.point, simple.parameters[0].name: size * share}
-                            for share in (1.0, 2.0)]))
-            self._fit_all(jobs, again=True, always=True)
+            self._fit_all([*without_one(best), *with_simpler(best, self.candidates)], again=True,
+                          always=True)
             if self.ranked()[0] is best:
                 break
 
@@ -194,6 +189,16 @@ class Search:
                 gap = without.minimum.chi2 - best.minimum.chi2
                 self._extend(without, MORE, PROMISING * gap)
 
+    def closer(self, hypotheses: Sequence[Hypothesis]) -> bool:
+        """Fit hypotheses with one effect less, and with twins of their effects, on from where they
+        stand; whether that found anything.
+        """
+        before = {h.fit for h in self.fits.values()}
+        for h in hypotheses:
+            self._fit_all([*without_one(h), *with_twins(h, self.candidates)], again=True,
+                          always=True)
+        return {h.fit for h in self.fits.values()} != before
+
     def offer(self, formulas: Sequence[Candidate]) -> None:
         """Fit laws that no catalogue holds, each alone."""
         self.candidates += tuple(formulas)
@@ -208,26 +213,6 @@ class Search:
         new._fit_all([(h.effects, [h.point]) for h in ranked[: FEW if ranked[0].far else CARRIED]
                       if h.effects and h.minimum.chi2 < near], always=True)
         return new
-
-    def _with_wider_laws(self, best: Hypothesis) -> None:
-        """Fit what contains a law of a hypothesis as a special case in its place: the law of free
-        exponent, and laws outside the catalogue.
-        """
-        for effect in best.effects:
-            for other in self.candidates:
-                if effect.key not in other.covers:
-                    continue
-                rest = [e for e in best.effects if e is not effect and e is not other]
-                size, *more = other.parameters
-                if other.known:
-                    n = {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8)
-                    starts = [{size.name: as_strong(best, effect, other, n), more[0].name: n}]
-                else:
-                    starts = [{size.name: as_strong(best, effect, other),
-                               **{p.name: p.value for p in more if p.name not in best.point},
-                               more[-1].name: share * more[-1].value} for share in WIDER]
-                self._fit((*rest, other), [{**best.point, **start} for start in starts],
-                          again=not other.known)
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
@@ -249,7 +234,7 @@ class Search:
         return level * repeated(closest.minimum.r) ** (1 - 1 / level)
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
-                always: Callable[[Candidate], bool] = nothing) -> None:
+                always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
         groups = {e.twin for e in hypothesis.effects if e.twin}
         others = [c for c in self.candidates if c.fits and c.suits(hypothesis.effects)
                   and c.key not in hypothesis.key and (not c.twin or c.twin not in groups)
@@ -258,10 +243,16 @@ class Search:
         if hypothesis.far:
             least = TELLING * hypothesis.minimum.chi2
         bent = any(e.channel == "input" for e in hypothesis.effects)
-        self._fit_all([((*hypothesis.effects, candidate), starts)
-                       for candidate, starts in screen.singles(
-                           count, least, lambda c: always(c) or (bent and fixed(c)))],
-                      settled=frozenset() if hypothesis.far else hypothesis.key)
+        jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
+                           for candidate, starts in screen.singles(
+                               count, least, lambda c: always(c) or (bent and fixed(c)))]
+        # from far off a fit of the same effects may have lost its way
+        lost = [] if hypothesis.far else [
+            job for job in jobs if (known := self.fits.get(frozenset(e.key for e in job[0])))
+            and known.minimum.chi2 > hypothesis.minimum.chi2 - KEPT * screen.promised(job[0][-1])]
+        settled = frozenset() if hypothesis.far else hypothesis.key
+        self._fit_all(jobs, always=anyway, settled=settled)
+        self._fit_all(lost, again=True, settled=settled)
 
     def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False
              ) -> Hypothesis:

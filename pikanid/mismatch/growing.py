@@ -1,0 +1,69 @@
+"""Fits over longer and longer beginnings of records.
+
+What hits a wall again and again depends on every earlier impact: over a whole record χ² is rough
+wherever the parameters are not those that are sought.  The first impact alone is smooth in them,
+and what it tells leads to the next one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.least_squares import Minimum, minimise
+from pikanid.mismatch.whitened import Whitened
+
+SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of the records
+PLENTY = 3.0  # standard deviations of χ² beyond its mean that make a misfit
+
+Known = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def rough(chi2: float, rows: int, effects: Sequence[Candidate]) -> bool:
+    """Whether a fit that leaves χ² of so many rows may have lost its way between hills."""
+    return any(e.hills for e in effects) and chi2 > rows + PLENTY * float(np.sqrt(2 * rows))
+
+
+def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray, known: Known,
+          limit: int) -> Minimum | None:
+    """Minimise χ² of longer and longer beginnings, and of the whole in the end.
+
+    Args:
+        whitened: Of the whole records.
+        effects: That it holds.
+        theta: (n,) where the first fit begins.
+        known: Rows (k,) with their Jacobian (k, n) that count besides, whatever the records.
+        limit: Iterations of each fit.
+
+    Returns:
+        The fit of the whole, None where something cannot be simulated on the way.
+    """
+    problem = whitened.problem
+    names = [f.name for f in problem.free]
+    hills = [(names.index(e.parameters[0].name), share) for e in effects for share in e.hills]
+
+    def fit(of: Whitened, start: np.ndarray) -> Minimum | None:
+        def evaluate(at: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+            seen, besides = of.residual(at), known(at)
+            return seen and (np.concatenate([seen[0], besides[0]]),
+                             np.vstack([seen[1], besides[1]]))
+
+        return minimise(evaluate, start, problem.lower, problem.upper, limit)
+
+    found: Minimum | None = None
+    for share in (*SHARES, 1.0):
+        part = Whitened(problem.model, whitened.records.beginning(int(share * whitened.rows))
+                        ) if share < 1 else whitened
+        found = fit(part, theta) if part.choose_steps(theta) else None
+        if found is None:
+            return None
+        for at, factor in hills:
+            if not rough(found.chi2, part.rows, effects):
+                break
+            beside = theta.copy()
+            beside[at] *= factor
+            found = min(found, fit(part, beside) or found, key=lambda m: m.chi2)
+        theta = found.theta
+    return found

@@ -1,0 +1,63 @@
+"""Hypotheses next to one: an effect left out, or another one in its place.
+
+Each comes with the starts of its fit, on from where the hypothesis stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.hypothesis import Hypothesis, Start
+from pikanid.mismatch.screen import as_strong
+
+WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
+Job = tuple[Sequence[Candidate], Sequence[Start | Mapping[str, float]]]
+
+
+def without_one(h: Hypothesis) -> Iterator[Job]:
+    """The hypothesis without each of its effects, where it has several."""
+    for effect in h.effects if len(h.effects) > 1 else ():
+        yield _rest(h, effect), [h.point]
+
+
+def with_simpler(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With a law that one of its effects contains in that one's place."""
+    for effect in h.effects:
+        for simple in candidates:
+            if simple.key in effect.covers and simple.key not in h.key:
+                size = as_strong(h, effect, simple)
+                yield (*_rest(h, effect), simple), [
+                    {**h.point, simple.parameters[0].name: size * share} for share in (1.0, 2.0)]
+
+
+def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With what contains one of its effects as a special case in that one's place: the law of free
+    exponent, and laws outside the catalogue.
+    """
+    for effect in h.effects:
+        for other in candidates:
+            if effect.key not in other.covers:
+                continue
+            rest = [e for e in h.effects if e is not effect and e is not other]
+            size, *more = other.parameters
+            if other.known:
+                n = {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8)
+                starts = [{size.name: as_strong(h, effect, other, n), more[0].name: n}]
+            else:
+                starts = [{size.name: as_strong(h, effect, other),
+                           **{p.name: p.value for p in more if p.name not in h.point},
+                           more[-1].name: share * more[-1].value} for share in WIDER]
+            yield (*rest, other), [{**h.point, **start} for start in starts]
+
+
+def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With what small motions cannot tell from one of its effects in that one's place."""
+    for effect in h.effects:
+        for other in candidates:
+            if effect.twin and other.twin == effect.twin and other.fits and other is not effect:
+                yield (*_rest(h, effect), other), [h.point]
+
+
+def _rest(h: Hypothesis, effect: Candidate) -> tuple[Candidate, ...]:
+    return tuple(e for e in h.effects if e is not effect)
