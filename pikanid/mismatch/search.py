@@ -104,7 +104,7 @@ class Search:
     def grow(self, adequate: Adequate) -> list[Hypothesis]:
         """Add effects to the best hypotheses as long as something is left and that helps."""
         for count in range(1, MOST):
-            best = self.ranked()[0]
+            best = self._afresh(self.ranked()[0], adequate)
             if adequate(best) or self.tired:
                 break
             self.tell(f"{count + 1} effects together")
@@ -138,6 +138,14 @@ class Search:
             for job in with_wider(h, self.candidates):
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
+
+    def _afresh(self, best: Hypothesis, adequate: Adequate) -> Hypothesis:
+        """The best hypothesis, its effects begun where what it leaves shows them as well."""
+        for effect in best.effects if not adequate(best) else ():
+            if len(effect.parameters) > 2:  # a mode, or a moment, may have been a wrong one
+                self._fit_all([(best.effects, starts) for _, starts in
+                               Screen(best, [effect]).singles(1)], again=True)
+        return self.ranked()[0]
 
     def _leading(self) -> list[Hypothesis]:
         """Hypotheses to extend, best first: none that only adds effects to a better one."""
