@@ -55,7 +55,7 @@ def quadratic_drag(site: Site) -> list[Candidate]:
 def power_drag(site: Site) -> list[Candidate]:
     """Drag with an exponent of its own, other than 0, 1 and 2."""
     c = Parameter(site.name("c_n"), 0.0, f"({site.unit})/s^2", (0.0, INF))
-    n = Parameter(site.name("n"), 1.5, "", (0.1, 4.0))
+    n = Parameter(site.name("n"), 1.5, "", (0.2, 4.0))
     text = f"-{c.name}*signed_power({site.v}, {n.name})"
 
     def signs(view: View) -> list[Sign]:

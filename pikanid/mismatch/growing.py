@@ -16,6 +16,8 @@ from pikanid.mismatch.least_squares import Minimum, minimise
 from pikanid.mismatch.whitened import Whitened
 
 SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of the records
+LOST = 3.0  # χ² per row from which on a beginning counts as unexplained
+COARSELY = 1e4  # χ² per row that steps may be chosen for where the noise would need too fine ones
 PLENTY = 3.0  # standard deviations of χ² beyond its mean that make a misfit
 
 Known = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -26,8 +28,13 @@ def rough(chi2: float, rows: int, effects: Sequence[Candidate]) -> bool:
     return any(e.hills for e in effects) and chi2 > rows + PLENTY * float(np.sqrt(2 * rows))
 
 
-def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray, known: Known,
-          limit: int) -> Minimum | None:
+def nothing(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """No rows besides those of the records."""
+    return np.empty(0), np.empty((0, len(theta)))
+
+
+def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
+          known: Known = nothing) -> Minimum | None:
     """Minimise χ² of longer and longer beginnings, and of the whole in the end.
 
     Args:
@@ -35,10 +42,9 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray, k
         effects: That it holds.
         theta: (n,) where the first fit begins.
         known: Rows (k,) with their Jacobian (k, n) that count besides, whatever the records.
-        limit: Iterations of each fit.
 
     Returns:
-        The fit of the whole, None where something cannot be simulated on the way.
+        The fit of the whole; None where a beginning cannot be simulated, or not be explained.
     """
     problem = whitened.problem
     names = [f.name for f in problem.free]
@@ -50,13 +56,15 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray, k
             return seen and (np.concatenate([seen[0], besides[0]]),
                              np.vstack([seen[1], besides[1]]))
 
-        return minimise(evaluate, start, problem.lower, problem.upper, limit)
+        return minimise(evaluate, start, problem.lower, problem.upper)
 
     found: Minimum | None = None
     for share in (*SHARES, 1.0):
         part = Whitened(problem.model, whitened.records.beginning(int(share * whitened.rows))
                         ) if share < 1 else whitened
-        found = fit(part, theta) if part.choose_steps(theta) else None
+        # far off, every step of an impact that comes too early would have to be followed
+        exact = part.choose_steps(theta) or part.choose_steps(theta, misfit=COARSELY)
+        found = fit(part, theta) if exact else None
         if found is None:
             return None
         for at, factor in hills:
@@ -65,5 +73,7 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray, k
             beside = theta.copy()
             beside[at] *= factor
             found = min(found, fit(part, beside) or found, key=lambda m: m.chi2)
+        if found.chi2 > LOST * part.rows:
+            return None
         theta = found.theta
     return found

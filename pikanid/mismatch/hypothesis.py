@@ -22,7 +22,6 @@ FAR = 2.0  # times the closest χ², and that of the noise: fits above both toge
 WILD = 1000.0  # times both, for a start
 GLANCE = 1e4  # χ² per row that is good enough to see that
 HILLS = 4  # times that a minimum is left over a hill, if that leads lower
-NEARLY = 0.1  # of the closest χ² that a fit must leave to be worth following from impact to impact
 COARSE = 5  # iterations that each of several starts gets before the best one goes on
 
 
@@ -150,17 +149,37 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     """
     model = extended(nominal, effects)
     whitened = Whitened(model, records)
-    problem = whitened.problem
     rows = max(whitened.rows, 1)
     closest = closest or Closest()
-
-    def misfit(chi2: float) -> float:
-        return chi2 / rows if np.isfinite(chi2) else 1.0
+    limit = closest.ask(lambda chi2: LIMIT if _misfit(chi2, rows) < GROSS else HURRIED)
 
     def beyond(size: float) -> bool:
         return closest.ask(lambda chi2: size > FAR * (chi2 + rows))
 
-    limit = closest.ask(lambda chi2: LIMIT if misfit(chi2) < GROSS else HURRIED)
+    best = _descended(whitened, starts, closest, limit, beyond)
+    hilly = [e for e in effects if e.hills and e.key not in settled]
+    lost = bool(starts) and (best is None or rough(best.chi2, rows, hilly))
+    whole = grown(whitened, hilly, _place(whitened, starts[0])) if hilly and lost else None
+    if whole is not None:
+        best = whole
+    elif best is not None and not beyond(best.chi2):
+        for effect in hilly:
+            best = _over_hills(whitened, best, effect, limit)
+    if best is None:
+        return None
+    penalty = _penalty(effects, whitened.rows, choices)
+    return Hypothesis(tuple(effects), model, whitened, best, penalty)
+
+
+def _misfit(chi2: float, rows: int) -> float:
+    return chi2 / rows if np.isfinite(chi2) else 1.0
+
+
+def _descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
+               closest: Closest, limit: int, beyond: Callable[[float], bool]) -> Minimum | None:
+    """The lowest of the minima that the starts lead to."""
+    problem, rows = whitened.problem, max(whitened.rows, 1)
+    misfit = partial(_misfit, rows=rows)
     best: Minimum | None = None
     for start in starts:
         guess = _begun(whitened, start, misfit, closest)
@@ -180,19 +199,7 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
             return None
         best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
                         beyond=beyond)
-        if best is None:
-            return None
-    hilly = [e for e in effects if e.hills and e.key not in settled]
-    if hilly and not beyond(best.chi2):
-        for effect in hilly:
-            best = _over_hills(whitened, best, effect, limit)
-        close = best.chi2
-        if rough(close, rows, hilly) and closest.ask(lambda chi2: close < NEARLY * chi2):
-            nothing = np.empty(0), np.empty((0, len(best.theta)))
-            other = grown(whitened, hilly, best.theta, lambda theta: nothing, limit)
-            best = min(best, other or best, key=lambda m: m.chi2)
-    penalty = _penalty(effects, whitened.rows, choices)
-    return Hypothesis(tuple(effects), model, whitened, best, penalty)
+    return best
 
 
 def _over_hills(whitened: Whitened, best: Minimum, effect: Candidate, limit: int) -> Minimum:
@@ -223,14 +230,8 @@ def _begun(whitened: Whitened, start: Start | Mapping[str, float],
     A linear step out of a large misfit goes too far: the phase of an oscillation bends.  A start
     that has no origin and a χ² far beyond the closest, seen at a glance, is not worth finer steps.
     """
-    problem = whitened.problem
-    values, origin = (start.values, start.origin) if isinstance(start, Start) else (start, start)
-
-    def at(named: Mapping[str, float]) -> np.ndarray:
-        return np.clip([named.get(f.label, named.get(f.name, f.guess)) for f in problem.free],
-                       problem.lower, problem.upper)
-
-    goal, home = at(values), at(origin)
+    goal = _place(whitened, start)
+    home = _place(whitened, start.origin) if isinstance(start, Start) else goal
     if not np.any(goal != home):
         if isinstance(start, Start):
             if not closest.choose_steps(whitened, goal, lambda chi2: max(misfit(chi2), GLANCE)):
@@ -250,6 +251,13 @@ def _begun(whitened: Whitened, start: Start | Mapping[str, float],
         if size < least:
             best, least = theta, size
     return best
+
+
+def _place(whitened: Whitened, start: Start | Mapping[str, float]) -> np.ndarray:
+    """θ (n,) of a start, within the bounds."""
+    named, problem = start.values if isinstance(start, Start) else start, whitened.problem
+    return np.clip([named.get(f.label, named.get(f.name, f.guess)) for f in problem.free],
+                   problem.lower, problem.upper)
 
 
 def _penalty(effects: Sequence[Candidate], rows: int, choices: int) -> float:

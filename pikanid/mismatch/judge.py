@@ -157,7 +157,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     found = minimise(evaluate, guess, whitened.problem.lower, whitened.problem.upper, 25)
     if found is not None and rough(found.chi2, whitened.rows, effects) and not rough(
             hypothesis.minimum.chi2, hypothesis.whitened.rows, effects):
-        found = min(found, grown(whitened, effects, guess, known_before, 25) or found,
+        found = min(found, grown(whitened, effects, guess, known_before) or found,
                     key=lambda m: m.chi2)
     for _ in range(AGAIN):
         if found is None or prior.distance(found.theta[shared]) < NEAR:
