@@ -18,7 +18,7 @@ from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.preparation import with_refined_noise
 from pikanid.mismatch.repeats import Repeats
 from pikanid.mismatch.search import Search
-from pikanid.mismatch.site import Site
+from pikanid.mismatch.site import Site, sites
 from pikanid.mismatch.verdict import WORTH
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
@@ -73,7 +73,10 @@ class Case:
         if best.far or self.repeats is not None:
             return False
         fit = as_estimate(best, self.before)
-        new, count = with_refined_noise(self.records, fit, self.rate, quiet)
+        # a large misfit may have led the nominal model's natural frequency far away
+        here = self.model.with_values({n: best.values[n] for n in self.model.free_names})
+        rate = sites(here, self.records.recordings)[0].rate
+        new, count = with_refined_noise(self.records, fit, rate, quiet)
         note_outliers(count, "the recording", self.notes)
         same = all(
             abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO
