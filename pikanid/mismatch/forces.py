@@ -276,9 +276,10 @@ def initial_state(site: Site) -> list[Candidate]:
             site.v: model.state(site.v).initial + symbol(v.name)})
 
     def signs(view: View) -> Sequence[Sign]:
-        still = np.zeros(len(view.t))
-        return [Sign({q.name: 1.0}, force=still, initial={site.q: 1.0}),
-                Sign({v.name: 1.0}, force=still, initial={site.v: 1.0})]
+        # what either of them promises alone may be little: a swing begins at any phase
+        still, rate = np.zeros(len(view.t)), site.rate or 1.0
+        sides = [(float(np.cos(a)), rate * float(np.sin(a))) for a in np.arange(8) * np.pi / 8]
+        return [Sign({q.name: x}, force=still, initial={site.q: x, site.v: y}) for x, y in sides]
 
     return [Candidate(("initial_state",), "another initial state",
                       f"{site.q}(0) + {q.name}, {site.v}(0) + {v.name}", "dynamics", site, (q, v),

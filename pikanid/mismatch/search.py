@@ -12,7 +12,6 @@ from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
 from pikanid.mismatch.in_turn import in_turn
-from pikanid.mismatch.least_squares import repeated
 from pikanid.mismatch.neighbours import (
     Job,
     with_simpler,
@@ -21,6 +20,7 @@ from pikanid.mismatch.neighbours import (
     without_one,
 )
 from pikanid.mismatch.screen import Screen, entry, fixed, law, nothing
+from pikanid.mismatch.what_counts import what_counts
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
@@ -32,8 +32,8 @@ PROMISING = 0.5  # of what an effect gained, to first order, that another in its
 KEPT = 0.5  # of what an effect promises, to first order, that a fit of it must gain
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
-EFFORT = 1e7  # states times steps simulated for combinations, before nothing new is begun
-EACH = 1.5e5  # that setting up one fit takes as much time as
+EFFORT = 8e6  # states times steps simulated for combinations, before nothing new is begun
+EACH = 6e4  # that setting up one fit takes as much time as, as measured
 NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
 Starts = Sequence[Start | Mapping[str, float]]
@@ -120,6 +120,11 @@ class Search:
             self._simplify()  # what led out of a dead end may have done its part
         self._simplify()
         best = self.ranked()[0]
+        if not adequate(best):
+            for h in self._leading()[:LEADING]:
+                self._fit_all([job for job in with_wider(h, self.candidates)
+                               if all(e.known for e in job[0])], always=True)
+            best = self.ranked()[0]
         if any(e.hills for e in best.effects) and not adequate(best):
             best = self._fit(best.effects, [best.point], again=True)  # hills left for later
         if adequate(best):
@@ -229,17 +234,8 @@ class Search:
         return sorted(every, key=lambda h: h.score(scale))
 
     def scale(self) -> float:
-        """What χ² counts for: that of the closest fit per degree of freedom, at least one.
-
-        What a misfit leaves is no white noise: neighbouring rows say the same, and an effect that
-        follows it gains more than its share.  The more of the residual is misfit, the more it is
-        counted by the number of independent rows instead, N / Σ ρ_k² (G. V. Bayley and J. M.
-        Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
-        """
-        closest = min(self.fits.values(), key=lambda h: h.minimum.chi2)
-        freedom = max(closest.whitened.rows - len(closest.minimum.theta), 1)
-        level = max(1.0, closest.minimum.chi2 / freedom)
-        return level * repeated(closest.minimum.r) ** (1 - 1 / level)
+        """What χ² counts for."""
+        return what_counts(self.fits.values())
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:

@@ -17,9 +17,12 @@ from pikanid.mismatch.whitened import GROSS
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
 BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
 PROVEN = 4.0  # of the criterion: what each of several effects must gain on held-out recordings
-# of χ² in all recordings, that each of one or two effects must gain: 5 standard deviations in each
-# of two; each of three must gain twice that, of four three times: they can take up most of anything
-STRONG = 50.0
+# of χ² in all recordings, that each of one or two effects must gain: 4.7 standard deviations in
+# each of two; each of three must gain twice that, of four three times: they can take up most of
+# anything
+STRONG = 45.0
+AT_MOST = 1.64  # standard errors by which the noise may be larger than it seems
+FOUND = 12.0  # of χ² that it must gain in the recording it was found in: the other one is the proof
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
@@ -146,7 +149,9 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
     for each of several: one is easily found that takes up what the others leave, whatever that is.
     Of an effect that would hardly show in the held-out recording no proof can be asked.
     """
-    fits, asked = {o.key: o for o in ranked}, STRONG * max(len(h.effects) - 1, 1)
+    fits = {o.key: o for o in ranked}
+    unsure = max(level.spread for found in h.whitened.records.levels for level in found.values())
+    asked = STRONG * max(len(h.effects) - 1, 1) * float(np.exp(AT_MOST * unsure))
     for e in h.effects:
         rest = h.key - {e.key}
         # a formula that is the sum of two entries must need both
@@ -156,7 +161,10 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
                 continue
             a, b = predict(h), predict(o)
             later = 0.0 if a is None or b is None else max(b.evidence - a.evidence, 0.0)
-            gain = (o.minimum.chi2 - h.minimum.chi2 + later) / scale
+            first = (o.minimum.chi2 - h.minimum.chi2) / scale
+            if first < FOUND:
+                return f"the recording itself hardly shows {e.name}"
+            gain = first + later / scale
             if gain < asked:
                 return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
                         f"{asked:.0f} are asked)")

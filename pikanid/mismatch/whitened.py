@@ -16,7 +16,6 @@ from pikanid.simulation.translated import Translated
 
 CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
 FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
-CORNERED = 4.0  # times the cost of a step where the right-hand side has corners, as measured
 SHARP = 8  # steps a sample from which on it is better to stop at corners than to run through them
 GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
 
@@ -136,12 +135,11 @@ class Whitened:
 
     @property
     def cost(self) -> float:
-        """Of a simulation with derivatives: states times steps; those about corners cost more."""
+        """Of a simulation with derivatives: states times steps."""
         spans = [e.samples[0].t[-1] - e.samples[0].t[0] for e in self.problem.experiments]
         steps = [max(span / s.longest, len(e.samples[0].t)) for span, s, e in zip(
             spans, self.steps, self.problem.experiments, strict=True)]
-        dear = [CORNERED if s.located or s.corners else 1.0 for s in self.simulators]
-        return float(len(self.problem.model.states) * np.dot(dear, steps))
+        return float(len(self.problem.model.states) * sum(steps))
 
     def residual(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run."""
