@@ -8,8 +8,11 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.judge import _room
+from pikanid.mismatch.hypothesis import extended, fitted
+from pikanid.mismatch.judge import _elsewhere, _room
+from pikanid.mismatch.least_squares import minimise
 from pikanid.mismatch.prior import Prior
+from pikanid.mismatch.whitened import Whitened
 
 
 def prior(root: np.ndarray) -> Prior:
@@ -56,6 +59,30 @@ def test_what_is_weak_in_each_recording_adds_up() -> None:
     assert predicted is not None and predicted.together is not None
     apart = case.test(case.base).p_value, predicted.detection.p_value
     assert min(apart) > 0.01 and predicted.together.p_value < 0.001
+
+
+def test_a_wall_that_a_fit_to_all_recordings_has_lost_is_found_again() -> None:
+    """Met once in one recording, never in the other: where it does not act, nothing leads back."""
+    model, t = pk.systems.sloshing(), np.arange(1001) * 0.01
+    truth = model.with_term("theta_dot", "-5000*max(theta - 0.238, 0)")
+
+    def pushed(size: float) -> pk.Recording:
+        u = np.where((t > 1) & (t < 1.1), size, 0.0)
+        driven = pk.Recording.from_arrays(t, {"u_x": u}, {"u_x": "m/s^2"})
+        return pk.simulate(truth, driven, sigma=0.0005, seed=int(100 * size))
+
+    case = _opened(model, (pushed(2.0), pushed(1.9)), None, None, lambda text: None)
+    wall = next(c for c in case.candidates if c.key == "wall_impact")
+    whitened = Whitened(extended(case.model, [wall]), case.records)
+    far = np.array([{"wall": 0.4, "k_wall": 30.0}.get(f.name, f.guess)
+                    for f in whitened.problem.free])
+    assert whitened.choose_steps(far)
+    lost = minimise(whitened.residual, far, whitened.problem.lower, whitened.problem.upper)
+    assert lost is not None and lost.chi2 > 2 * whitened.rows
+    one = fitted(case.model, [wall], case.records, [{"wall": 0.23, "k_wall": 3000.0}], 40)
+    assert one is not None
+    found = _elsewhere(whitened, one, lost)
+    assert found.chi2 == pytest.approx(whitened.rows, abs=4 * np.sqrt(2 * whitened.rows))
 
 
 def test_nothing_adds_up_where_nothing_is_missing() -> None:

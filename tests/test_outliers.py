@@ -129,3 +129,19 @@ def test_two_neighbours_do_not_hide_each_other() -> None:
     records, count = without_lone(Records((whole,), ({},)), [(0, "y", t, residual)])
     gone = np.flatnonzero(np.isnan(records.recordings[0]["y"].values))
     assert {219, 220} <= set(gone.tolist()) and count == len(gone) <= 3
+
+
+def test_a_clipped_peak_is_no_run_of_outliers() -> None:
+    """Five neighbours on one side, as where a sensor has met its limit once."""
+    t = np.arange(2001) * 0.01
+    r = SIGMA * noise(2001, 0.4, seed=2)
+    hump = np.arange(1314, 1319)
+    r[hump] += SIGMA * np.array([7.0, 13.0, 16.0, 13.0, 7.0])
+    alone = np.array([200, 700, 701, 1500])
+    r[alone] += SIGMA * np.array([30.0, 30.0, -40.0, 25.0])
+    recording = Recording.from_arrays(t, {"y": r}, {"y": "rad"})
+    records = Records((recording,), ({"y": Level(SIGMA, 0.4, 0.0, 0.01, "")},))
+    kept, count = without_lone(records, [(0, "y", t, r)])
+    gone = np.flatnonzero(np.isnan(kept.recordings[0]["y"].values))
+    assert set(alone) <= set(gone) and not set(hump) & set(gone)
+    assert count == len(gone) <= 6

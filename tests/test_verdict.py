@@ -31,11 +31,12 @@ A, B, GUARD = effect("a"), effect("b"), effect("outside", known=False)
 LAW = effect(f"{SYMBOLIC}k*q**2")
 
 
-def hypothesis(chi2: float, *effects: Candidate) -> Hypothesis:
-    """A fit that leaves χ², at a price of 14 for each effect."""
+def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothesis:
+    """A fit that leaves χ², at a price of 14 for each effect; how little its noise is known."""
     count = 2 + len(effects)
     r = np.full(ROWS, np.sqrt(chi2 / ROWS))
-    whitened = cast(Whitened, SimpleNamespace(rows=ROWS, problem=SimpleNamespace(free=())))
+    whitened = cast(Whitened, SimpleNamespace(rows=ROWS, problem=SimpleNamespace(free=()),
+                                              records=SimpleNamespace(spread=spread)))
     return Hypothesis(tuple(effects), sloshing(), whitened,
                       Minimum(np.zeros(count), r, np.zeros((ROWS, count)), True),
                       14.0 * len(effects))
@@ -110,6 +111,24 @@ def test_a_weak_effect_is_not_named() -> None:
     pair = [BASE, hypothesis(1000.0, A), hypothesis(1900.0, B), hypothesis(960.0, A, B)]
     assert answered(pair, {"": 99.0, "a": 5.0, "b": 99.0}).verdict == "unconfirmed"
     assert answered(pair, {"": 99.0, "a": 20.0, "b": 99.0}).verdict == "named"
+
+
+def test_more_is_asked_where_the_noise_is_little_known() -> None:
+    def fits(spread: float) -> list[Hypothesis]:
+        return [hypothesis(1080.0), hypothesis(1000.0, A, spread=spread)]
+
+    assert answered(fits(0.1)).verdict == "named"
+    unsure = answered(fits(0.5))
+    assert unsure.verdict == "unconfirmed" and "102 are asked" in unsure.doubt
+
+
+def test_an_effect_must_show_where_it_was_found() -> None:
+    """The held-out recording is a proof, not where explanations are chosen."""
+    fits = [hypothesis(2000.0), hypothesis(1000.0, A), hypothesis(995.0, A, B)]
+    evidence = {"": 500.0, "a": 200.0, "a+b": 0.0}
+    given = answered(fits, evidence)
+    assert given.verdict == "unconfirmed" and "hardly shows b" in given.doubt
+    assert answered([*fits[:2], hypothesis(980.0, A, B)], evidence).verdict == "named"
 
 
 def test_what_is_sure_is_given_whatever_weak_effect_may_be_there_besides() -> None:

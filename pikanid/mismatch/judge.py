@@ -76,8 +76,7 @@ def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.n
         r, J, D, inputs, *bands = (
             condensed(part, whitened.rows, count) for part in (r, J, D, inputs, *bands))
     units, _ = unit_columns(D, J)
-    spread = max(level.spread for levels in whitened.records.levels for level in levels.values())
-    return detect(-r, J, units, found.one_sided, bands, inputs, spread, seed)
+    return detect(-r, J, units, found.one_sided, bands, inputs, whitened.records.spread, seed)
 
 
 def condensed(rows: np.ndarray, samples: int, count: int) -> np.ndarray:

@@ -150,8 +150,8 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
     Of an effect that would hardly show in the held-out recording no proof can be asked.
     """
     fits = {o.key: o for o in ranked}
-    unsure = max(level.spread for found in h.whitened.records.levels for level in found.values())
-    asked = STRONG * max(len(h.effects) - 1, 1) * float(np.exp(AT_MOST * unsure))
+    louder = float(np.exp(AT_MOST * h.whitened.records.spread))
+    asked = STRONG * max(len(h.effects) - 1, 1) * louder
     for e in h.effects:
         rest = h.key - {e.key}
         # a formula that is the sum of two entries must need both

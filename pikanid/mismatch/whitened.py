@@ -27,6 +27,11 @@ class Records:
     recordings: tuple[Recording, ...]
     levels: tuple[dict[str, Level], ...]
 
+    @property
+    def spread(self) -> float:
+        """Relative standard error of the noise's power, where it is known least."""
+        return max(level.spread for found in self.levels for level in found.values())
+
     def beginning(self, rows: int) -> Records:
         """The same with about so many rows in all, each recording cut alike, from its start."""
         total = sum(len(r[o].time) for r, found in zip(self.recordings, self.levels, strict=True)
