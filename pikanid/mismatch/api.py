@@ -118,7 +118,9 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         case.clear_later(ranked[0])
         answer = _settled(case, ranked)
         if search.closer(answer.given):
-            answer = _settled(case, search.ranked())
+            # one that is better has rivals of its own
+            known = search.ranked()[0].fit in {h.fit for h in ranked}
+            answer = _settled(case, search.ranked() if known else search.grow(case.adequate))
     shape = None
     if answer.verdict != "none":
         shape = force_shape(case.base, case.sites[0], case.candidates)

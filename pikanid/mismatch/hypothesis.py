@@ -160,7 +160,7 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     hilly = [e for e in effects if e.hills and e.key not in settled]
     lost = bool(starts) and (best is None or rough(best.chi2, rows, hilly))
     whole = grown(whitened, hilly, _place(whitened, starts[0])) if hilly and lost else None
-    if whole is not None:
+    if whole is not None and (best is None or whole.chi2 < best.chi2):
         best = whole
     elif best is not None and not beyond(best.chi2):
         for effect in hilly:

@@ -29,6 +29,7 @@ MORE, LATER = 6, 4  # of one more beside one, beside two or three
 LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
 PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
+EQUAL = 0.05  # of χ²: another fit of the same is no better, and what was tested stands
 KEPT = 0.5  # of what an effect promises, to first order, that a fit of it must gain
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
 MOST = 4  # effects in a hypothesis
@@ -193,23 +194,24 @@ class Search:
         return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
                 for n in counts]
 
-    def _exchange(self, best: Hypothesis) -> None:
+    def _exchange(self, best: Hypothesis, anyway: bool = False) -> None:
         """Put others in the place of each effect of a hypothesis: rivals that no path led to."""
         for effect in best.effects if len(best.effects) > 1 else ():
             rest = tuple(e for e in best.effects if e is not effect)
             without = self._fit(rest, [best.point])
             if without.key == frozenset(e.key for e in rest):
                 gap = without.minimum.chi2 - best.minimum.chi2
-                self._extend(without, MORE, PROMISING * gap)
+                self._extend(without, MORE, PROMISING * gap, anyway=anyway)
 
     def closer(self, hypotheses: Sequence[Hypothesis]) -> bool:
-        """Fit hypotheses with one effect less, and with twins of their effects, on from where they
+        """Fit hypotheses with one effect less, or another one in its place, on from where they
         stand; whether that found anything.
         """
         before = {h.fit for h in self.fits.values()}
         for h in hypotheses:
             self._fit_all([*without_one(h), *with_twins(h, self.candidates)], again=True,
                           always=True)
+            self._exchange(h, anyway=True)
         return {h.fit for h in self.fits.values()} != before
 
     def offer(self, formulas: Sequence[Candidate]) -> None:
@@ -282,7 +284,7 @@ class Search:
             self.spent += EACH + (found.whitened.work if found else 0.0)
             key = frozenset(e.key for e in job[0])
             if found and (key not in self.fits
-                          or found.minimum.chi2 < self.fits[key].minimum.chi2):
+                          or found.minimum.chi2 < self.fits[key].minimum.chi2 - EQUAL):
                 self.fits[key] = found
 
         in_turn([job for job in jobs if all(e.suits(job[0]) for e in job[0])

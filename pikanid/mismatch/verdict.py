@@ -15,6 +15,7 @@ from pikanid.mismatch.same_law import integer_laws, merged_twins
 from pikanid.mismatch.whitened import GROSS
 
 WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
+MANY = 12  # of them that are tested: no reader wants more
 BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
 PROVEN = 4.0  # of the criterion: what each of several effects must gain on held-out recordings
 # of χ² in all recordings, that each of one or two effects must gain: 4.7 standard deviations in
@@ -71,7 +72,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if not tried or tried[0].score(scale) >= base.score(scale):
         return Answer("unnamed", (), tuple(tried[:3]))
     lowest = min(_handicapped(h, scale) for h in tried)
-    near = [h for h in tried if h.score(scale) < lowest + WITHIN]
+    near = [h for h in tried if h.score(scale) < lowest + WITHIN][:MANY]
     near = integer_laws(near)
     ahead(near)
 
