@@ -16,6 +16,7 @@ from pikanid.model_parts import Parameter, State
 
 INF = float("inf")
 SIDE = "negative side"
+STICKING = (0.6, 0.8, 1.25, 1.6)  # of the size of dry friction: a motion comes to rest elsewhere
 
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
@@ -41,7 +42,7 @@ def coulomb_friction(site: Site) -> list[Candidate]:
     """Dry friction: the same force at every speed, against the motion."""
     c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
     return [term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-                 lambda w: -sense(w, site.v), one_sided=True, hills=(0.6, 0.8, 1.25, 1.6))]
+                 lambda w: -sense(w, site.v), one_sided=True, hills=STICKING)]
 
 
 def quadratic_drag(site: Site) -> list[Candidate]:
@@ -276,10 +277,9 @@ def initial_state(site: Site) -> list[Candidate]:
             site.v: model.state(site.v).initial + symbol(v.name)})
 
     def signs(view: View) -> Sequence[Sign]:
-        # what either of them promises alone may be little: a swing begins at any phase
-        still, rate = np.zeros(len(view.t)), site.rate or 1.0
-        sides = [(float(np.cos(a)), rate * float(np.sin(a))) for a in np.arange(8) * np.pi / 8]
-        return [Sign({q.name: x}, force=still, initial={site.q: x, site.v: y}) for x, y in sides]
+        still = np.zeros(len(view.t))
+        return [Sign({q.name: 1.0}, force=still, initial={site.q: 1.0}),
+                Sign({v.name: 1.0}, force=still, initial={site.v: 1.0})]
 
     return [Candidate(("initial_state",), "another initial state",
                       f"{site.q}(0) + {q.name}, {site.v}(0) + {v.name}", "dynamics", site, (q, v),

@@ -13,7 +13,7 @@ import numpy as np
 
 from pikanid.held import HeldInput, acting
 from pikanid.mismatch.candidate import Candidate, Sign, View
-from pikanid.mismatch.forces import INF, sense, term, wall_impact
+from pikanid.mismatch.forces import INF, STICKING, sense, term, wall_impact
 from pikanid.mismatch.site import Site
 from pikanid.model import Model
 from pikanid.model_parts import Parameter
@@ -66,7 +66,7 @@ def one_way_friction(site: Site) -> list[Candidate]:
             site, "one_way_friction", "friction in one direction",
             f"-{c.name}*(sign({site.v}) + {sign})/2", c,
             _half_sign(site.v, sign), one_sided=True,
-            variant="forth" if sign > 0 else "back", known=False))
+            variant="forth" if sign > 0 else "back", known=False, hills=STICKING))
     return found
 
 
