@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Iterator
 
 import pytest
 
@@ -19,6 +20,15 @@ class Dropping:
         time.sleep(0.001)  # where Python looks for signals
 
 
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Interrupts count, also where the tests run in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard")
 def test_an_interrupt_in_a_finaliser_ends_the_block() -> None:
     with pytest.raises(KeyboardInterrupt), interrupts.none_lost():
         Dropping()

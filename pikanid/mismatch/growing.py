@@ -16,6 +16,7 @@ from pikanid.mismatch.least_squares import Minimum, minimise
 from pikanid.mismatch.whitened import Whitened
 
 SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of the records
+FEWEST = 10  # rows a parameter that are worth a fit
 LOST = 3.0  # χ² per row from which on a beginning counts as unexplained
 COARSELY = 1e4  # χ² per row that steps may be chosen for where the noise would need too fine ones
 PLENTY = 3.0  # standard deviations of χ² beyond its mean that make a misfit
@@ -24,8 +25,18 @@ Known = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def rough(chi2: float, rows: int, effects: Sequence[Candidate]) -> bool:
-    """Whether a fit that leaves χ² of so many rows may have lost its way between hills."""
-    return any(e.hills for e in effects) and chi2 > rows + PLENTY * float(np.sqrt(2 * rows))
+    """Whether a fit that leaves χ² of so many rows may have missed impacts."""
+    return hits(effects) and chi2 > rows + PLENTY * float(np.sqrt(2 * rows))
+
+
+def hits(effects: Sequence[Candidate]) -> bool:
+    """Whether a motion may hit something: such laws begin at levels, no first step leads there."""
+    return any(e.levels for e in effects)
+
+
+def lost(chi2: float, rows: int) -> bool:
+    """Whether a fit that leaves χ² of so many rows explains nothing."""
+    return chi2 > LOST * rows
 
 
 def nothing(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -58,8 +69,9 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
 
         return minimise(evaluate, start, problem.lower, problem.upper)
 
-    found: Minimum | None = None
-    for share in (*SHARES, 1.0):
+    found, level = None, 1.0
+    enough = FEWEST * len(theta) / max(whitened.rows, 1)
+    for share in (*(share for share in SHARES if share > enough), 1.0):
         part = Whitened(problem.model, whitened.records.beginning(int(share * whitened.rows))
                         ) if share < 1 else whitened
         # far off, every step of an impact that comes too early would have to be followed
@@ -68,12 +80,13 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
         if found is None:
             return None
         for at, factor in hills:
-            if not rough(found.chi2, part.rows, effects):
+            if not rough(found.chi2 / (level if share < 1 else 1.0), part.rows, effects):
                 break
             beside = theta.copy()
             beside[at] *= factor
             found = min(found, fit(part, beside) or found, key=lambda m: m.chi2)
-        if found.chi2 > LOST * part.rows:
+        if lost(found.chi2, part.rows):
             return None
-        theta = found.theta
+        # noise that was taken for too little is no reason to look again
+        theta, level = found.theta, max(1.0, found.chi2 / part.rows)
     return found

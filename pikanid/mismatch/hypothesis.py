@@ -11,7 +11,7 @@ import numpy as np
 
 from pikanid.mismatch.candidate import SYMBOLIC, Candidate, Sign
 from pikanid.mismatch.closest import Closest
-from pikanid.mismatch.growing import grown, rough
+from pikanid.mismatch.growing import grown, hits, lost
 from pikanid.mismatch.least_squares import Minimum, minimise
 from pikanid.mismatch.whitened import CERTAIN, GROSS, Records, Whitened
 from pikanid.model import Model
@@ -158,8 +158,9 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
 
     best = _descended(whitened, starts, closest, limit, beyond)
     hilly = [e for e in effects if e.hills and e.key not in settled]
-    lost = bool(starts) and (best is None or rough(best.chi2, rows, hilly))
-    whole = grown(whitened, hilly, _place(whitened, starts[0])) if hilly and lost else None
+    astray = hits(hilly) and bool(starts) and (
+        best is None or (lost(best.chi2, rows) and not beyond(best.chi2)))
+    whole = grown(whitened, hilly, _place(whitened, starts[0])) if astray else None
     if whole is not None and (best is None or whole.chi2 < best.chi2):
         best = whole
     elif best is not None and not beyond(best.chi2):

@@ -123,10 +123,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     merged += [h for h in outside if total(h) - _handicap(h) < least + WITHIN]
     doubt = _doubt(known[0], ranked, predict, scale) if proves else ""
     if doubt and not outside:
-        # what all of them hold is sure where it is given by itself, whatever may be there besides
-        core = min(known, key=lambda h: len(h.effects))
-        if all(core.key <= h.key for h in known) and not _doubt(core, ranked, predict, scale):
-            doubt = ""
+        # the simplest one is sure by itself where it is, whatever may be there besides or instead
+        simplest = min(known, key=lambda h: len(h.effects))
+        doubt = _doubt(simplest, ranked, predict, scale) and doubt
     if proves and not known[0].symbolic and any(
             total(h) - _handicap(h) < least for h in outside):
         doubt = "a law outside the catalogue explains it better"
