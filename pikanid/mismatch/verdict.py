@@ -123,8 +123,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     merged += [h for h in outside if total(h) - _handicap(h) < least + WITHIN]
     doubt = _doubt(known[0], ranked, predict, scale) if proves else ""
     if doubt and not outside:
-        # the simplest one is sure by itself where it is, whatever may be there besides or instead
-        simplest = min(known, key=lambda h: len(h.effects))
+        # what it holds may be sure by itself, whatever may be there besides
+        simplest = min((h for h in known if h.key <= known[0].key), key=lambda h: len(h.effects))
         doubt = _doubt(simplest, ranked, predict, scale) and doubt
     if proves and not known[0].symbolic and any(
             total(h) - _handicap(h) < least for h in outside):
