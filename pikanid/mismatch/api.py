@@ -214,6 +214,6 @@ def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
     # all that a named model leaves is noise, not its highest frequencies alone
     share = best.noise if answer.verdict in ("named", "set") else 1.0
     sigma = next(iter(case.later.levels[0].values())).sigma * share
-    return Proof(before.rmse, after.rmse, sigma, case.model.outputs[0].unit,
+    return Proof(before.rmse, after.rmse, after.rmse_moved, sigma, case.model.outputs[0].unit,
                  after.detection.p_value, after.t, after.measured, before.predicted,
-                 after.predicted)
+                 after.predicted, after.moved)

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from pikanid.mismatch.patch import Patch
     from pikanid.mismatch.result import Diagnosis
 
-BEFORE, AFTER, DATA, LOUD = "#c2410c", "#1d4ed8", "#9ca3af", "#fde68a"
+BEFORE, AFTER, MOVED = "#c2410c", "#1d4ed8", "#15803d"
+DATA, LOUD = "#9ca3af", "#fde68a"
 
 
 def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
@@ -55,6 +56,10 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
             below[0].plot(proof.t, proof.after, color=AFTER, lw=1, label="extended model")
             below[1].plot(proof.t, proof.measured - proof.after, color=AFTER, lw=0.8,
                          label=f"extended, RMSE {proof.rmse_after:.3g}")
+        if dx.hypotheses and proof.sensitive:
+            below[0].plot(proof.t, proof.moved, color=MOVED, lw=1, label="within its errors")
+            below[1].plot(proof.t, proof.measured - proof.moved, color=MOVED, lw=0.8,
+                          label=f"within its errors, RMSE {proof.rmse_moved:.3g}")
         below[1].axhspan(-2 * proof.noise, 2 * proof.noise, color=DATA, alpha=0.3, lw=0,
                         label="±2σ of the noise")
         below[1].set(ylabel=proof.unit or "residual", title="Held-out recording: what is left")

@@ -35,6 +35,8 @@ class HeldOut:
         evidence: -2 ln of the probability density of the recording, given the fit (up to a
             constant that all hypotheses share).
         predicted, measured, t: First output.
+        moved, rmse_moved: The same prediction, and its RMSE, with the parameters moved within their
+            errors to where they suit this recording best.
         rest: (N,) whitened residual with that forgiveness.
         residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
     """
@@ -47,6 +49,8 @@ class HeldOut:
     t: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
+    moved: np.ndarray
+    rmse_moved: float
     residuals: tuple[tuple[int, str, np.ndarray, np.ndarray], ...]
     rest: np.ndarray
 
@@ -171,18 +175,27 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     tests = functools.partial(residual_tests, whitened, found.theta, found.r, found.J, candidates,
                               rate)
     together = functools.partial(_tested_together, hypothesis, whitened, found, candidates, rate)
-    plain = guess
-    responses = whitened.responses(plain)
-    gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
-    rmse = float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
+    predicted, gaps = _shown(whitened, guess)
+    moved, closer = _shown(whitened, found.theta)
     # where corners stop the fit, as of a wall hardly touched, the tests forgive a last linear step
     pushed = held(found.theta, found.J.T @ found.r, whitened.problem.lower, whitened.problem.upper)
     q, _ = np.linalg.qr(found.J[:, ~pushed])
     chi2 = found.chi2 + prior.constant - float(np.sum((q.T @ found.r) ** 2))
     samples = whitened.problem.experiments[0].samples[0]
-    return HeldOut(rmse, tests, together, chi2, chi2 + _room(found.J, shared, fit), samples.t,
-                   samples.y, responses[0].y[: len(samples.t)], tuple(_residuals(whitened, gaps)),
-                   found.r[: whitened.rows])
+    return HeldOut(_rmse(gaps), tests, together, chi2, chi2 + _room(found.J, shared, fit),
+                   samples.t, samples.y, predicted, moved, _rmse(closer),
+                   tuple(_residuals(whitened, gaps)), found.r[: whitened.rows])
+
+
+def _shown(whitened: Whitened, theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The first output as predicted (N,), and what is left of every recording."""
+    responses = whitened.responses(theta)
+    gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
+    return responses[0].y[: len(whitened.problem.experiments[0].samples[0].t)], gaps
+
+
+def _rmse(gaps: Sequence[np.ndarray]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
 
 
 def _residuals(whitened: Whitened, gaps: list[np.ndarray]

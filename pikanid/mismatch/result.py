@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from pikanid.mismatch.latent_force import ForceOverTime
     from pikanid.mismatch.patch import Patch
 
+# times the held-out RMSE with parameters moved within their errors: more is theirs, not a law's
+SENSITIVE = 1.2
 Verdict = Literal["none", "named", "set", "unconfirmed", "unnamed"]
 
 
@@ -75,10 +77,13 @@ class Where:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """Held-out record: RMSE before, after, noise, p-value; and the first output's curves."""
+    """Held-out record: RMSE before, after, and after with the parameters `moved` within their
+    errors, noise, p-value; and the first output's curves.
+    """
 
     rmse_before: float
     rmse_after: float
+    rmse_moved: float
     noise: float
     unit: str
     p_value: float
@@ -86,6 +91,14 @@ class Proof:
     measured: np.ndarray
     before: np.ndarray
     after: np.ndarray
+    moved: np.ndarray
+
+    @property
+    def sensitive(self) -> bool:
+        """Whether the prediction depends on how exactly the parameters are known: after impacts, a
+        small error makes another motion.
+        """
+        return self.rmse_after > SENSITIVE * self.rmse_moved
 
 
 @dataclass(frozen=True, eq=False)

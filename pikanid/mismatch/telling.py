@@ -27,8 +27,10 @@ def lines_of(dx: Diagnosis) -> list[str]:
         lines.append(f"Not: {h.title}: {h.why_not}")
     if dx.held_out is not None and dx.hypotheses:
         p = dx.held_out
-        lines.append(f"Proof: held-out RMSE {p.rmse_before:.3g} -> {p.rmse_after:.3g} {p.unit} "
-                     f"(noise {p.noise:.3g}), p = {p.p_value:.2g}")
+        moved = (f", {p.rmse_moved:.3g} with the parameters moved within their errors"
+                 if p.sensitive else "")
+        lines.append(f"Proof: held-out RMSE {p.rmse_before:.3g} -> {p.rmse_after:.3g} {p.unit}"
+                     f"{moved} (noise {p.noise:.3g}), p = {p.p_value:.2g}")
     if dx.patch is not None:
         unit = dx.held_out.unit if dx.held_out is not None else ""
         lines.append(f"Patch: {dx.patch.sentence(unit)}.")

@@ -120,8 +120,10 @@ def _proof(dx: Diagnosis) -> str:
     proof = dx.held_out
     if proof is None:
         return "<p>There is no held-out recording: nothing can be proved.</p>"
+    moved = (f"{proof.rmse_moved:.3g} with the parameters moved within their errors, "
+             if proof.sensitive and dx.hypotheses else "")
     return (f"<p>Held-out RMSE: {proof.rmse_before:.3g} before, {proof.rmse_after:.3g} after, "
-            f"noise {proof.noise:.3g} {escape(proof.unit)}; p = {proof.p_value:.2g}.</p>")
+            f"{moved}noise {proof.noise:.3g} {escape(proof.unit)}; p = {proof.p_value:.2g}.</p>")
 
 
 def _patch(dx: Diagnosis) -> str:
