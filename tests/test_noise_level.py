@@ -106,3 +106,18 @@ def test_the_shape_of_high_frequencies_does_not_mislead() -> None:
     level = refined(Level(1.0, 0.0, 0.0, 0.01, ""), Channel("y", t, steep), t, steep, 20.0, None)
     power = level.sigma**2 * (1 + level.rho) / (1 - level.rho)
     assert power < 2 * 1.6 / 0.4
+
+
+@pytest.mark.parametrize("rho", [0.4, 0.65])
+def test_an_explanation_tells_the_noise_better_than_high_frequencies_alone(rho: float) -> None:
+    t, low, errors = np.arange(2001) * 0.01, np.linspace(0.0, 0.25 * np.pi, 50), []
+    true = np.mean(np.log((1 - rho**2) / (1 - 2 * rho * np.cos(low) + rho**2)))
+    for seed in range(60):
+        y = coloured(rho, 1000 + seed)
+        levels = [refined(Level(1.0, 0.0, 0.0, 0.01, "", (0.0, 2.16)), Channel("y", t, y), t, y,
+                          8.0, None, explained) for explained in (False, True)]
+        errors.append([np.mean(np.log(level.sigma**2 * (1 - level.rho**2) / (
+            1 - 2 * level.rho * np.cos(low) + level.rho**2))) - true for level in levels])
+    before, after = np.std(errors, axis=0)  # of 60 they are known to 9 %
+    assert after < 0.85 * before
+    assert abs(np.mean(errors, axis=0)[1]) < 0.3 * after

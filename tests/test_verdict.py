@@ -44,9 +44,9 @@ def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothe
 
 def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
              refused: tuple[str, ...] = (), unseen: tuple[str, ...] = (),
-             contradicted: tuple[str, ...] = ()) -> Answer:
+             contradicted: tuple[str, ...] = (), inert: tuple[str, ...] = ()) -> Answer:
     """The answer with these held-out evidences (0 unless given), some effects refuted there, some
-    not to be seen, some contradicted by all recordings together.
+    not to be seen or not acting, some contradicted by all recordings together.
     """
     def found(h: Hypothesis, where: tuple[str, ...] = refused) -> Detection:
         p = 1e-6 if h.key & set(where) else 0.5
@@ -57,7 +57,7 @@ def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
         rest = np.array([3.0 * (name in h.key) * (name not in unseen) for name in ("a", "b")])
         return cast(HeldOut, SimpleNamespace(
             detection=found(h), together=found(h, contradicted), evidence=value, rmse=1.0,
-            rest=rest))
+            rest=rest, inert=frozenset(f"p_{name}" for name in inert)))
 
     def adequate(h: Hypothesis) -> Detection:
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
@@ -129,6 +129,14 @@ def test_an_effect_must_show_where_it_was_found() -> None:
     given = answered(fits, evidence)
     assert given.verdict == "unconfirmed" and "hardly shows b" in given.doubt
     assert answered([*fits[:2], hypothesis(980.0, A, B)], evidence).verdict == "named"
+
+
+def test_no_proof_is_asked_of_a_limit_that_is_not_met() -> None:
+    fits = [BASE, hypothesis(1300.0, A), hypothesis(1900.0, B), hypothesis(1000.0, A, B)]
+    evidence = {"": 500.0, "a": 1.0, "b": 300.0}
+    given = answered(fits, evidence)
+    assert given.verdict == "unconfirmed" and "does not need b" in given.doubt
+    assert answered(fits, evidence, inert=("b",)).verdict == "named"
 
 
 def test_what_is_sure_is_given_whatever_weak_effect_may_be_there_besides() -> None:

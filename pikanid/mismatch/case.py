@@ -76,7 +76,7 @@ class Case:
         # a large misfit may have led the nominal model's natural frequency far away
         here = self.model.with_values({n: best.values[n] for n in self.model.free_names})
         rate = sites(here, self.records.recordings)[0].rate
-        new, count = with_refined_noise(self.records, fit, rate, quiet)
+        new, count = with_refined_noise(self.records, fit, rate, quiet, self.adequate(best))
         note_outliers(count, "the recording", self.notes)
         same = all(
             abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO

@@ -38,6 +38,7 @@ class HeldOut:
         moved, rmse_moved: The same prediction, and its RMSE, with the parameters moved within their
             errors to where they suit this recording best.
         rest: (N,) whitened residual with that forgiveness.
+        inert: Names of parameters that hardly act there: a limit that is not met.
         residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
     """
 
@@ -53,6 +54,7 @@ class HeldOut:
     rmse_moved: float
     residuals: tuple[tuple[int, str, np.ndarray, np.ndarray], ...]
     rest: np.ndarray
+    inert: frozenset[str]
 
     @functools.cached_property
     def detection(self) -> Detection:
@@ -184,7 +186,15 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     samples = whitened.problem.experiments[0].samples[0]
     return HeldOut(_rmse(gaps), tests, together, chi2, chi2 + _room(found.J, shared, fit),
                    samples.t, samples.y, predicted, moved, _rmse(closer),
-                   tuple(_residuals(whitened, gaps)), found.r[: whitened.rows])
+                   tuple(_residuals(whitened, gaps)), found.r[: whitened.rows],
+                   _inert(whitened, found))
+
+
+def _inert(whitened: Whitened, found: Minimum) -> frozenset[str]:
+    """Names of the parameters whose whole size changes the residual by less than one row of it."""
+    acts = np.linalg.norm(found.J[: whitened.rows], axis=0) * np.abs(found.theta)
+    free = whitened.problem.free
+    return frozenset(f.name for f, size in zip(free, acts, strict=True) if size < 1)
 
 
 def _shown(whitened: Whitened, theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:

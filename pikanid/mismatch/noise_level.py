@@ -25,7 +25,7 @@ BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any
 BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
 GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
 UNKNOWN = 0.6  # relative standard error of a power, at most: then it is known by its order only
-REFUTED = 2.0  # standard errors that a power must exceed what a fit leaves by, to be given up
+REFUTED = 2.0  # standard errors of a power by which what a fit leaves differs from it
 CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
@@ -117,7 +117,7 @@ def _still(channel: Channel, drives: Sequence[Channel], start: float, stop: floa
 
 
 def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
-            quiet: tuple[float, float] | None) -> Level:
+            quiet: tuple[float, float] | None, explained: bool = False) -> Level:
     """The level again, now that a fit has taken the motion away.
 
     Args:
@@ -126,6 +126,7 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
         t, residual: (N,) of the fit at the samples that are there.
         rate: Natural frequency [rad/s]: the residual counts from `ABOVE` times that on.
         quiet: Stretch in which nothing moves, if one is known.
+        explained: Whether the fit leaves nothing that a test sees.
     """
     from scipy.signal.windows import tukey
 
@@ -155,12 +156,14 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
             source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
     given = level.sigma if level.source == "given" else None
     sigma, rho, spread = _whittle(spectra, given)
-    # what a fit leaves at low frequencies may be more than noise, never less: a stretch in which a
-    # motion dies out is no quiet one, and the shape of high frequencies can mislead
+    # What a fit leaves at all frequencies is noise and misfit: it may be more than noise, not less.
+    # A stretch in which a motion dies out is no quiet one, and the shape of high frequencies can
+    # mislead.  What explains all that a test sees leaves no more than an error of the noise.
     every = (omega > 0) & (omega < 0.97 * np.pi)
-    most = _whittle([(omega[every], power[every], 0.9 * share)], given)
-    if _power(*most[:2], low) < _power(sigma, rho, low) * np.exp(-REFUTED * spread):
-        sigma, rho, spread = most
+    whole = _whittle([(omega[every], power[every], 0.9 * share)], given)
+    margin = float(np.exp(REFUTED * spread * (1 if explained else -1)))
+    if _power(*whole[:2], low) < _power(sigma, rho, low) * margin:
+        sigma, rho, spread = whole
         source = "the residual at all frequencies"
     if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)

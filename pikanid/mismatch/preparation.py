@@ -91,7 +91,8 @@ def averaged(channel: Channel, count: int) -> Channel:
 
 
 def with_refined_noise(records: Records, fit: Estimate, rate: float,
-                       quiet: tuple[float, float] | None) -> tuple[Records, int]:
+                       quiet: tuple[float, float] | None, explained: bool = False
+                       ) -> tuple[Records, int]:
     """Noise levels again, from what a fit leaves, and without the outliers that it shows; how many
     these are.
     """
@@ -104,7 +105,8 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
         for name, level in found.items():
             f = fits[r, name]
             kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
-            new[name] = refined(level, recording[name], f.t[kept], f.residual[kept], rate, quiet)
+            new[name] = refined(level, recording[name], f.t[kept], f.residual[kept], rate, quiet,
+                                explained)
         levels.append(new)
     return Records(records.recordings, tuple(levels)), count
 

@@ -168,7 +168,8 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
             if gain < asked:
                 return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
                         f"{asked:.0f} are asked)")
-            needed = _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale)
+            needed = _speaks(h, o, predict, PROVEN * scale) or _alike(h, o, predict, scale) or (
+                a is not None and {p.name for p in e.parameters} <= a.inert)
             if len(h.effects) > 1 and not e.absent and not needed:
                 return f"the held-out recording does not need {e.name}"
     return ""
