@@ -10,6 +10,7 @@ import numpy as np
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut
+from pikanid.mismatch.noise_level import UNKNOWN
 from pikanid.mismatch.result import Verdict
 from pikanid.mismatch.same_law import integer_laws, merged_twins
 from pikanid.mismatch.whitened import GROSS
@@ -150,7 +151,7 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
     Of an effect that would hardly show in the held-out recording no proof can be asked.
     """
     fits = {o.key: o for o in ranked}
-    louder = float(np.exp(AT_MOST * h.whitened.records.spread))
+    louder = float(np.exp(AT_MOST * min(h.whitened.records.spread, UNKNOWN)))
     asked = STRONG * max(len(h.effects) - 1, 1) * louder
     for e in h.effects:
         rest = h.key - {e.key}
