@@ -204,6 +204,7 @@ class Simulator:
         for candidate in candidates:
             longest = usual
             rough = trial(Steps(candidate, longest), True)
+            failure = failure if rough.finished else rough
             while longest > max(spacing / FINEST, finest):
                 fine = trial(Steps(candidate, longest / 2), False)
                 if rough.finished and fine.finished:
