@@ -113,6 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         code = EXIT_INTERRUPTED
     except Exception as failure:
+        # what an import raises that was interrupted half-way; any other failure goes up as it is
         if not interrupts.became(failure):
             raise
         code = EXIT_INTERRUPTED

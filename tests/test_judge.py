@@ -9,7 +9,7 @@ import pikanid as pk
 from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.hypothesis import extended, fitted
-from pikanid.mismatch.judge import _elsewhere, _room
+from pikanid.mismatch.judge import _from_levels, _room
 from pikanid.mismatch.least_squares import minimise
 from pikanid.mismatch.prior import Prior
 from pikanid.mismatch.whitened import Whitened
@@ -81,7 +81,7 @@ def test_a_wall_that_a_fit_to_all_recordings_has_lost_is_found_again() -> None:
     assert lost is not None and lost.chi2 > 2 * whitened.rows
     one = fitted(case.model, [wall], case.records, [{"wall": 0.23, "k_wall": 3000.0}], 40)
     assert one is not None
-    found = _elsewhere(whitened, one, lost)
+    found = _from_levels(whitened, one, lost)
     assert found.chi2 == pytest.approx(whitened.rows, abs=4 * np.sqrt(2 * whitened.rows))
 
 

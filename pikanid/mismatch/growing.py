@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
-from pikanid.mismatch.least_squares import Minimum, minimise
+from pikanid.mismatch.least_squares import Evaluate, Minimum, minimise
 from pikanid.mismatch.whitened import Whitened
 
 SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of the records
@@ -44,6 +44,15 @@ def nothing(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.empty(0), np.empty((0, len(theta)))
 
 
+def besides(whitened: Whitened, known: Known) -> Evaluate:
+    """The residual of records with what is known besides below it."""
+    def evaluate(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        at, rows = whitened.residual(theta), known(theta)
+        return at and (np.concatenate([at[0], rows[0]]), np.vstack([at[1], rows[1]]))
+
+    return evaluate
+
+
 def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
           known: Known = nothing) -> Minimum | None:
     """Minimise χ² of longer and longer beginnings, and of the whole in the end.
@@ -62,12 +71,7 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
     hills = [(names.index(e.parameters[0].name), share) for e in effects for share in e.hills]
 
     def fit(of: Whitened, start: np.ndarray) -> Minimum | None:
-        def evaluate(at: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-            seen, besides = of.residual(at), known(at)
-            return seen and (np.concatenate([seen[0], besides[0]]),
-                             np.vstack([seen[1], besides[1]]))
-
-        return minimise(evaluate, start, problem.lower, problem.upper)
+        return minimise(besides(of, known), start, problem.lower, problem.upper)
 
     found, level = None, 1.0
     enough = FEWEST * len(theta) / max(whitened.rows, 1)

@@ -11,7 +11,7 @@ import numpy as np
 from pikanid.mismatch.beginning import own_beginning
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.detect import Detection, detect, frequency_bands, past_inputs, unit_columns
-from pikanid.mismatch.growing import grown, rough
+from pikanid.mismatch.growing import besides, grown, rough
 from pikanid.mismatch.hypothesis import Hypothesis, extended
 from pikanid.mismatch.least_squares import Minimum, held, minimise
 from pikanid.mismatch.prior import Prior, elsewhere, of_fit
@@ -146,10 +146,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         rows[:, shared] = prior.root
         return prior.residual(theta[shared]), rows
 
-    def evaluate(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        at, before = whitened.residual(theta), known_before(theta)
-        return at and (np.concatenate([at[0], before[0]]), np.vstack([at[1], before[1]]))
-
+    evaluate = besides(whitened, known_before)
     own = np.array([k not in shared for k in range(len(free))])
     if own.any():
         begun = own_beginning(whitened.problem, guess, tuple({c.site.q: c.site
@@ -244,11 +241,11 @@ def _tested_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum,
     if found is None:
         return None
     if found.chi2 > hypothesis.minimum.chi2 + apart.chi2 + MISSED:
-        found = _elsewhere(whitened, hypothesis, found)
+        found = _from_levels(whitened, hypothesis, found)
     return residual_tests(whitened, found.theta, found.r, found.J, candidates, rate)
 
 
-def _elsewhere(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> Minimum:
+def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> Minimum:
     """The closest of fits that begin where laws without a first step to them may act: a wall that
     was touched once can be soft or hard, and only other recordings tell which.
     """

@@ -204,7 +204,7 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
     weights = np.concatenate([np.full(len(o), w) for o, _, w in spectra])
     total = float(np.sum(weights))
     for rho in GRID:
-        shapes = [1.0 / (1 - 2 * rho * np.cos(o) + rho**2) for o, _, _ in spectra]
+        shapes = [_shape(rho, o) for o, _, _ in spectra]
         power = sum(w * np.sum(_calm(p / s)) for (_, p, w), s in zip(spectra, shapes, strict=True))
         scale = power / total if given is None else given**2 * (1 - rho**2)
         costs.append(total * np.log(scale) + power / scale + sum(
@@ -225,13 +225,17 @@ def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float |
 
 def _power(sigma: float, rho: float, top: float) -> float:
     """Mean power of ε between frequency zero and `top` [rad]."""
-    omega = np.linspace(0.0, top, 50)
-    return float(np.mean(sigma**2 * (1 - rho**2) / (1 - 2 * rho * np.cos(omega) + rho**2)))
+    return float(sigma**2 * (1 - rho**2) * np.mean(_shape(rho, np.linspace(0.0, top, 50))))
+
+
+def _shape(rho: float, omega: np.ndarray) -> np.ndarray:
+    """1/|1 - ρ exp(-iω)|²: the spectrum of AR(1) noise."""
+    return np.asarray(1.0 / (1 - 2 * rho * np.cos(omega) + rho**2))
 
 
 def _slope(rho: float, omega: np.ndarray) -> np.ndarray:
-    """∂/∂ρ of ln 1/|1 - ρ exp(-iω)|²."""
-    return np.asarray(2 * (np.cos(omega) - rho) / (1 - 2 * rho * np.cos(omega) + rho**2))
+    """∂/∂ρ of its logarithm."""
+    return np.asarray(2 * (np.cos(omega) - rho) * _shape(rho, omega))
 
 
 def likeliest(costs: np.ndarray, total: float) -> int:
