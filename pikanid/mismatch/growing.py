@@ -7,18 +7,18 @@ and what it tells leads to the next one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.descent import GLANCE
 from pikanid.mismatch.least_squares import Evaluate, Minimum, minimise
 from pikanid.mismatch.whitened import Whitened
 
-SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of the records
+SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of all motion, that beginnings hold
 FEWEST = 10  # rows a parameter that are worth a fit
 LOST = 3.0  # χ² per row from which on a beginning counts as unexplained
-COARSELY = 1e4  # χ² per row that steps may be chosen for where the noise would need too fine ones
 PLENTY = 3.0  # standard deviations of χ² beyond its mean that make a misfit
 
 Known = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -67,30 +67,65 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
         The fit of the whole; None where a beginning cannot be simulated, or not be explained.
     """
     problem = whitened.problem
-    names = [f.name for f in problem.free]
-    hills = [(names.index(e.parameters[0].name), share) for e in effects for share in e.hills]
-
-    def fit(of: Whitened, start: np.ndarray) -> Minimum | None:
-        return minimise(besides(of, known), start, problem.lower, problem.upper)
-
     found, level = None, 1.0
     enough = FEWEST * len(theta) / max(whitened.rows, 1)
-    for share in (*(share for share in SHARES if share > enough), 1.0):
+    for share in (*(share for share in _beginnings(whitened) if share > enough), 1.0):
         part = Whitened(problem.model, whitened.records.beginning(int(share * whitened.rows))
                         ) if share < 1 else whitened
-        # far off, every step of an impact that comes too early would have to be followed
-        exact = part.choose_steps(theta) or part.choose_steps(theta, misfit=COARSELY)
-        found = fit(part, theta) if exact else None
-        if found is None:
-            return None
-        for at, factor in hills:
-            if not rough(found.chi2 / (level if share < 1 else 1.0), part.rows, effects):
+        found = None
+        for begun in (theta, None):
+            if begun is None:  # what is first hit now may lie elsewhere altogether
+                begun = _level(part, effects, theta)
+            for start in _about(part, effects, begun):
+                other = minimise(besides(part, known), start, problem.lower, problem.upper)
+                found = min((m for m in (found, other) if m), key=lambda m: m.chi2, default=None)
+                if found and not rough(found.chi2 / (level if share < 1 else 1.0), part.rows,
+                                       effects):
+                    break
+            if found and not lost(found.chi2, part.rows):
                 break
-            beside = theta.copy()
-            beside[at] *= factor
-            found = min(found, fit(part, beside) or found, key=lambda m: m.chi2)
-        if lost(found.chi2, part.rows):
+        if found is None or lost(found.chi2, part.rows):
             return None
         # noise that was taken for too little is no reason to look again
         theta, level = found.theta, max(1.0, found.chi2 / part.rows)
     return found
+
+
+def _beginnings(whitened: Whitened) -> list[float]:
+    """How much of the records to fit at a time: where nothing moves, nothing is hit or learnt."""
+    samples = [s for e in whitened.problem.experiments for s in e.samples]
+    place = np.concatenate([np.linspace(0, 1, len(s.t)) for s in samples])
+    moved = np.concatenate([(s.y - np.median(s.y)) ** 2 for s in samples])
+    order = np.argsort(place, kind="stable")
+    so_far = np.cumsum(moved[order])
+    return [float(place[order][np.searchsorted(so_far, share * so_far[-1])]) for share in SHARES]
+
+
+def _about(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray
+           ) -> Iterator[np.ndarray]:
+    """Where a fit may begin: here and over the hills; nowhere if that cannot be simulated."""
+    # far off, every step of an impact that comes too early would have to be followed
+    if not (part.choose_steps(theta) or part.choose_steps(theta, misfit=GLANCE)):
+        return
+    yield theta
+    for effect in effects:
+        for factor in effect.hills:
+            beside = theta.copy()
+            beside[_place(part, effect.parameters[0].name)] *= factor
+            yield beside
+
+
+def _level(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray) -> np.ndarray:
+    """The levels of the effects that leave the least, one effect after the other."""
+    for effect in effects:
+        at = [theta]
+        for values in effect.levels:
+            at.append(theta.copy())
+            at[-1][[_place(part, name) for name in values]] = list(values.values())
+        if part.choose_steps(at[len(at) // 2], misfit=GLANCE):
+            theta = min(at, key=part.chi2)
+    return theta
+
+
+def _place(whitened: Whitened, name: str) -> int:
+    return [f.name for f in whitened.problem.free].index(name)

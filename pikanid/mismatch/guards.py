@@ -104,7 +104,7 @@ def dissipating_wall(site: Site) -> list[Candidate]:
         found.append(Candidate(
             ("dissipating_wall",), "impact on a wall that takes energy out", text, "dynamics",
             site, (*wall.parameters, a), _with_term(site.v, text), lambda view: [], wall.variant,
-            known=False, covers=(wall.key,)))
+            known=False, hills=wall.hills, levels=wall.levels, covers=(wall.key,)))
     return found
 
 

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from operator import lt
 
 import numpy as np
 
-from pikanid.mismatch.candidate import SYMBOLIC, Candidate, Sign
+from pikanid.mismatch.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.closest import Closest
+from pikanid.mismatch.descent import Start, descended, over_hills, per_row, place, renewed
 from pikanid.mismatch.growing import grown, hits, lost
-from pikanid.mismatch.least_squares import Minimum, minimise
+from pikanid.mismatch.least_squares import Minimum
 from pikanid.mismatch.whitened import CERTAIN, GROSS, Records, Whitened
 from pikanid.model import Model
 
 LIMIT = 30  # iterations of a fit
 HURRIED = 12  # and of one among gross misfits
 FAR = 2.0  # times the closest χ², and that of the noise: fits above both together are given up
-WILD = 1000.0  # times both, for a start
-GLANCE = 1e4  # χ² per row that is good enough to see that
-HILLS = 4  # times that a minimum is left over a hill, if that leads lower
-COARSE = 5  # iterations that each of several starts gets before the best one goes on
 
 
 @dataclass(frozen=True)
@@ -118,16 +113,6 @@ def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
     return model
 
 
-@dataclass(frozen=True)
-class Start:
-    """Where a fit begins: parameter values by name, and those it may fall back towards, where the
-    new effects do nothing and χ² is that of the hypothesis which they extend.
-    """
-
-    values: Mapping[str, float]
-    origin: Mapping[str, float]
-
-
 def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
            starts: Sequence[Start | Mapping[str, float]], choices: int,
            closest: Closest | None = None, settled: frozenset[str] = frozenset()
@@ -151,130 +136,29 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     whitened = Whitened(model, records)
     rows = max(whitened.rows, 1)
     closest = closest or Closest()
-    limit = closest.ask(lambda chi2: LIMIT if _misfit(chi2, rows) < GROSS else HURRIED)
+    limit = closest.ask(lambda chi2: LIMIT if per_row(chi2, rows) < GROSS else HURRIED)
 
     def beyond(size: float) -> bool:
         return closest.ask(lambda chi2: size > FAR * (chi2 + rows))
 
-    best = _descended(whitened, starts, closest, limit, beyond)
+    best = descended(whitened, starts, closest, limit, beyond)
     hilly = [e for e in effects if e.hills and e.key not in settled]
     astray = hits(hilly) and bool(starts) and (
-        best is None or (lost(best.chi2, rows) and not beyond(best.chi2)))
-    whole = grown(whitened, hilly, _place(whitened, starts[0])) if astray else None
+        best is None or (lost(best.chi2, rows) and (
+            len(effects) == 1 or not beyond(best.chi2))))
+    whole = grown(whitened, hilly, place(whitened, starts[0])) if astray else None
     if whole is not None and (best is None or whole.chi2 < best.chi2):
         best = whole
     elif best is not None and not beyond(best.chi2):
         for effect in hilly:
-            best = _over_hills(whitened, best, effect, limit)
+            best = over_hills(whitened, best, effect, limit)
+    best = renewed(whitened, best, closest, limit, beyond)
     if best is None:
         return None
     penalty = _penalty(effects, whitened.rows, choices)
     return Hypothesis(tuple(effects), model, whitened, best, penalty)
 
 
-def _misfit(chi2: float, rows: int) -> float:
-    return chi2 / rows if np.isfinite(chi2) else 1.0
-
-
-def _descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
-               closest: Closest, limit: int, beyond: Callable[[float], bool]) -> Minimum | None:
-    """The lowest of the minima that the starts lead to."""
-    problem, rows = whitened.problem, max(whitened.rows, 1)
-    misfit = partial(_misfit, rows=rows)
-    best: Minimum | None = None
-    for start in starts:
-        guess = _begun(whitened, start, misfit, closest)
-        if guess is None:
-            continue
-        found = minimise(whitened.residual, guess, problem.lower, problem.upper,
-                         COARSE if len(starts) > 1 else limit, beyond=beyond)
-        if found is not None and (best is None or found.chi2 < best.chi2):
-            best = found
-    if best is None:
-        return None
-    coarse = best.chi2
-    finer = closest.ask(lambda chi2: misfit(chi2) > GROSS and coarse < 0.25 * chi2)
-    if finer or (not best.converged and not beyond(coarse)):
-        if not closest.choose_steps(whitened, best.theta,
-                                    lambda chi2: min(coarse / rows, misfit(chi2))):
-            return None
-        best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        beyond=beyond)
-    return best
-
-
-def _over_hills(whitened: Whitened, best: Minimum, effect: Candidate, limit: int) -> Minimum:
-    """The lowest of the minima that steps in one parameter lead to, from the lowest so far."""
-    problem = whitened.problem
-    at = [k for k, f in enumerate(problem.free) if f.name == effect.parameters[0].name]
-    for _ in range(HILLS):
-        found = []
-        for share in effect.hills:
-            theta = best.theta.copy()
-            theta[at] *= share
-            found.append(minimise(whitened.residual, theta, problem.lower, problem.upper, COARSE,
-                                  beyond=partial(lt, best.chi2)))
-        lower = min((m for m in found if m is not None), key=lambda m: m.chi2, default=best)
-        if lower.chi2 > best.chi2 - 1.0:
-            break
-        best = lower
-        if not best.converged:
-            best = minimise(whitened.residual, best.theta, problem.lower, problem.upper,
-                            limit) or best
-    return best
-
-
-def _begun(whitened: Whitened, start: Start | Mapping[str, float],
-           misfit: Callable[[float], float], closest: Closest) -> np.ndarray | None:
-    """θ (n,) to begin at: the start, or nearer to its origin if χ² is smaller there.
-
-    A linear step out of a large misfit goes too far: the phase of an oscillation bends.  A start
-    that has no origin and a χ² far beyond the closest, seen at a glance, is not worth finer steps.
-    """
-    goal = _place(whitened, start)
-    home = _place(whitened, start.origin) if isinstance(start, Start) else goal
-    if not np.any(goal != home):
-        if isinstance(start, Start):
-            if not closest.choose_steps(whitened, goal, lambda chi2: max(misfit(chi2), GLANCE)):
-                return None
-            seen = whitened.chi2(goal)
-            if not closest.ask(lambda chi2: seen <= WILD * (chi2 + max(whitened.rows, 1))):
-                return None
-        return goal if closest.choose_steps(whitened, goal, misfit) else None
-    best, least = None, np.inf
-    for share in (1.0, 0.25, 0.06, 0.01):
-        theta = home + share * (goal - home)
-        if not closest.choose_steps(whitened, theta, misfit):
-            continue
-        size = whitened.chi2(theta)
-        if closest.ask(lambda chi2: misfit(chi2) < GROSS) or (share < 1 and size > least):
-            return theta if best is None or size < least else best
-        if size < least:
-            best, least = theta, size
-    return best
-
-
-def _place(whitened: Whitened, start: Start | Mapping[str, float]) -> np.ndarray:
-    """θ (n,) of a start, within the bounds."""
-    named, problem = start.values if isinstance(start, Start) else start, whitened.problem
-    return np.clip([named.get(f.label, named.get(f.name, f.guess)) for f in problem.free],
-                   problem.lower, problem.upper)
-
-
 def _penalty(effects: Sequence[Candidate], rows: int, choices: int) -> float:
     free = sum(max(len(e.parameters), 1) for e in effects)
     return free * float(np.log(rows)) + 2 * len(effects) * float(np.log(max(choices, 1)))
-
-
-def start_from(candidate: Candidate, sign: Sign, amplitude: float,
-               values: Mapping[str, float]) -> Start:
-    """Where a fit with one more effect begins; `values` are those of the other parameters."""
-    start = {**values, **sign.start}
-    origin = dict(start)
-    if sign.scales and candidate.parameters:
-        size = next(iter(sign.start), candidate.parameters[0].name)
-        null = next((p.value for p in candidate.parameters if p.name == size), 0.0)
-        null = null if sign.null is None else sign.null
-        start[size] = null + amplitude * sign.start.get(size, 1.0)
-        origin[size] = null
-    return Start(start, origin)

@@ -179,7 +179,10 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     # where corners stop the fit, as of a wall hardly touched, the tests forgive a last linear step
     pushed = held(found.theta, found.J.T @ found.r, whitened.problem.lower, whitened.problem.upper)
     q, _ = np.linalg.qr(found.J[:, ~pushed])
-    chi2 = found.chi2 + prior.constant - float(np.sum((q.T @ found.r) ** 2))
+    left = found.r - q @ (q.T @ found.r)
+    # nowhere does the first recording suit better than where it was fitted
+    worse = max(float(np.sum(left[whitened.rows:] ** 2)) + prior.constant, 0.0)
+    chi2 = float(np.sum(left[: whitened.rows] ** 2)) + worse
     samples = whitened.problem.experiments[0].samples[0]
     return HeldOut(_rmse(gaps), tests, together, chi2, chi2 + _room(found.J, shared, fit),
                    samples.t, samples.y, predicted, moved, _rmse(closer),

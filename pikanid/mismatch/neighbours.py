@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from pikanid.mismatch.candidate import Candidate
-from pikanid.mismatch.hypothesis import Hypothesis, Start
+from pikanid.mismatch.descent import Start
+from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.screen import as_strong
 
 WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.descent import GLANCE, Start, start_from
 from pikanid.mismatch.detect import unit_columns
-from pikanid.mismatch.hypothesis import GLANCE, Hypothesis, Start, start_from
+from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.tangent import Directions, directions
 from pikanid.mismatch.whitened import Whitened
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.closest import Closest
-from pikanid.mismatch.hypothesis import FAR, Hypothesis, Start, fitted
+from pikanid.mismatch.descent import Start
+from pikanid.mismatch.hypothesis import FAR, Hypothesis, fitted
 from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.neighbours import (
     Job,

@@ -9,8 +9,9 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.descent import start_from
 from pikanid.mismatch.detect import project
-from pikanid.mismatch.hypothesis import Hypothesis, fitted, start_from
+from pikanid.mismatch.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.noise_level import Level
 from pikanid.mismatch.screen import Screen
 from pikanid.mismatch.seen import Sigma

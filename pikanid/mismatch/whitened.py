@@ -15,6 +15,7 @@ from pikanid.simulation.simulator import Response, Steps
 from pikanid.simulation.translated import Translated
 
 CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
+SHARE = 0.05  # of the noise that a simulation may err by
 FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
 SHARP = 8  # steps a sample from which on it is better to stop at corners than to run through them
 GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
@@ -82,7 +83,7 @@ class Whitened:
         self.rows = self.problem.n_samples
         self.work = 0.0
 
-    def choose_steps(self, theta: np.ndarray, share: float = 0.05, misfit: float = 1.0) -> bool:
+    def choose_steps(self, theta: np.ndarray, share: float = SHARE, misfit: float = 1.0) -> bool:
         """Steps whose error stays below a share of the noise; False where nothing can be run.
 
         Where a misfit of many times the noise is left anyway (`misfit`, χ² per row), a fifth of
@@ -110,6 +111,20 @@ class Whitened:
             found.append(steps)
         self.steps = found
         return True
+
+    def step_errors(self, theta: np.ndarray) -> list[float]:
+        """Errors of the steps in use elsewhere than where they were chosen, as shares of what
+        `choose_steps` allows where nothing is left; by halving each step once.
+        """
+        found = []
+        for r, simulator in enumerate(self.simulators):
+            p = self.problem.parameters(theta, r)
+            halved = replace(self.steps[r], longest=self.steps[r].longest / 2)
+            rough, fine = (simulator.run(p, steps=s) for s in (self.steps[r], halved))
+            size = float(np.abs(fine.y - rough.y).max(initial=0.0)) * 16 / 15
+            usual = SHARE * min(level.sigma for level in self.records.levels[r].values())
+            found.append(size / usual if rough.finished and fine.finished else np.inf)
+        return found
 
     def step_as(self, *others: Whitened) -> None:
         """Simulate as others do that hold the same recordings, one after the other."""
