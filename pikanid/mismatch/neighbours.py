@@ -5,7 +5,7 @@ Each comes with the starts of its fit, on from where the hypothesis stands.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.descent import Start
@@ -60,5 +60,25 @@ def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
                 yield (*_rest(h, effect), other), [h.point]
 
 
+def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """The hypothesis that fits best of each number of effects from two on, most effects first.
+
+    What a first step out of a large misfit does not see can come to light beside another effect,
+    which then has to go.
+    """
+    several = [h for h in fits if len(h.effects) > 1 and h.known]
+    counts = sorted({len(h.effects) for h in several}, reverse=True)
+    return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
+            for n in counts]
+
+
 def _rest(h: Hypothesis, effect: Candidate) -> tuple[Candidate, ...]:
     return tuple(e for e in h.effects if e is not effect)
+
+
+def signature(job: Job) -> object:
+    """Tells a job from others: its effects, and where its fits begin."""
+    effects, starts = job
+    return frozenset(e.key for e in effects), tuple(
+        (tuple(sorted(s.values.items())), tuple(sorted(s.origin.items())))
+        if isinstance(s, Start) else tuple(sorted(s.items())) for s in starts)

@@ -14,6 +14,7 @@ from pikanid.mismatch.tangent import Directions, directions
 from pikanid.mismatch.whitened import Whitened
 
 FAINT, FAINT_PAIR = 3.0, 6.0  # χ² that one effect, and two, must gain to first order to be tried
+MOSTLY = 0.8  # of a parameter, that an effect may really be
 NOWHERE: Mapping[str, float] = {}
 EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # of |v|, that have names
 
@@ -22,19 +23,26 @@ def as_strong(h: Hypothesis, effect: Candidate, other: Candidate, n: float | Non
     """Size of a law of |v|ⁿ that takes as much energy out of the motion as another one does, or
     that one's own size where either is no such law.
     """
-    def exponent(e: Candidate) -> float | None:
-        if e.ids[0] == "power_drag" and e is effect:
-            return h.values[e.parameters[1].name]
-        return n if e.ids[0] == "power_drag" else EXPONENTS.get(e.ids[0])
-
-    size = h.values[effect.parameters[0].name]
-    a, b = exponent(effect), exponent(other)
-    if a is None or b is None:
-        return size
+    size, *more = (h.values[p.name] for p in effect.parameters)
     at = h.model.state_names.index(effect.site.v)
     speed = np.concatenate([np.abs(response.states[:, at]) for response in
                             h.whitened.responses(h.minimum.theta, states=True)])
-    return float(size * np.mean(speed ** (a + 1)) / max(float(np.mean(speed ** (b + 1))), 1e-12))
+    shape = _shape(effect.ids[0], more, speed)
+    wanted = _shape(other.ids[0], [] if n is None else [n], speed)
+    if shape is None or wanted is None:
+        return size
+    return float(size * np.mean(shape * speed) / max(float(np.mean(wanted * speed)), 1e-12))
+
+
+def _shape(law: str, more: Sequence[float], speed: np.ndarray) -> np.ndarray | None:
+    """What resists a motion of a speed (N,), at size 1 and with more parameters."""
+    if law in EXPONENTS:
+        return np.asarray(speed ** EXPONENTS[law])
+    if law == "power_drag" and more:
+        return np.asarray(speed ** more[0])
+    if law == "stribeck_friction" and more:
+        return np.asarray(1 + more[0] * np.exp(-(speed / more[1]) ** 2))
+    return None
 
 
 def law(c: Candidate) -> bool:
@@ -115,7 +123,7 @@ class Screen:
 
     def singles(self, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing
-                ) -> list[tuple[Candidate, list[Start]]]:
+                ) -> list[tuple[Candidate, list[Start | Mapping[str, float]]]]:
         """The most promising candidates, with the starts of their fits.
 
         Args:
@@ -126,14 +134,18 @@ class Screen:
         several = [self.best(c, 3) for c in range(len(self.found.candidates))]
         order = sorted((k for k, s in enumerate(several) if s),
                        key=lambda k: -self.gain[several[k][0]])
-        listed: list[tuple[Candidate, list[Start]]] = []
+        listed: list[tuple[Candidate, list[Start | Mapping[str, float]]]] = []
         for k in order:
             if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < FAINT and listed):
                 break
             candidate = self.found.candidates[k]
             signs = several[k] if len(candidate.parameters) > 1 or not self.found.signs[
                 several[k][0]].scales else several[k][:1]
-            listed.append((candidate, [self._start(candidate, s, self.z[s]) for s in signs]))
+            starts: list[Start | Mapping[str, float]] = [
+                self._start(candidate, s, self.z[s]) for s in signs]
+            if law(candidate) and self.about.far:
+                starts += self._instead(signs[0])
+            listed.append((candidate, starts))
         # guards beside the entries, not in their place
         known = [one for one in listed if one[0].known][:count]
         # where no start is better than another, each has to be followed to its end
@@ -161,6 +173,23 @@ class Screen:
         moved = {n: self.about.point[n] - size * float(d)
                  for n, d in zip(self.names, self.taken[:, sign], strict=True)}
         return Start({**start.values, **moved}, start.origin)
+
+    def _instead(self, sign: int) -> list[Mapping[str, float]]:
+        """Where a fit may begin besides: with the effect in the place of most of a parameter.
+        Out of a large misfit the first step is a small one, and a parameter that stands for the
+        effect can hold a fit where it is.
+        """
+        moves = self.taken[:, sign]
+        here = np.array([self.about.point[n] for n in self.names])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            size = MOSTLY * float(np.min(np.abs(here / moves), initial=np.inf, where=moves != 0))
+        if not np.isfinite(size):
+            return []
+        if not self.found.one_sided[sign]:
+            size *= float(np.sign(self.z[sign]))
+        name = next(iter(self.found.signs[sign].start))
+        return [{**self.about.point, name: size,
+                 **dict(zip(self.names, (here - size * moves).tolist(), strict=True))}]
 
     def pairs(self, count: int
               ) -> list[tuple[tuple[Candidate, Candidate], list[Start]]]:

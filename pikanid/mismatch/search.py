@@ -15,6 +15,8 @@ from pikanid.mismatch.hypothesis import FAR, Hypothesis, fitted
 from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.neighbours import (
     Job,
+    closest_of_each,
+    signature,
     with_simpler,
     with_twins,
     with_wider,
@@ -52,6 +54,8 @@ class Search:
         tell: Called with what is being done.
         predicts: Whether the second hypothesis is worth its effects beyond the first one, as far as
             other recordings say.
+        fits: The closest fit of each set of effects.
+        begun: Where fits have begun.
         guess: Parameters that the nominal model was given with.
         workers: Threads that fit side by side; the results do not depend on their number.
     """
@@ -63,6 +67,7 @@ class Search:
     predicts: Callable[[Hypothesis, Hypothesis], bool] = lambda fewer, more: True
     guess: Mapping[str, float] = field(default_factory=dict)
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
+    begun: set[object] = field(default_factory=set)
     spent: float = 0.0
     workers: int = 1
 
@@ -175,25 +180,14 @@ class Search:
         local minimum.
         """
         if self.ranked()[0].far:
-            for closest in self._closest():
+            for closest in closest_of_each(self.fits.values()):
                 self._fit_all([*without_one(closest)], again=True, always=True)
         for _ in range(MOST):
             best = self.ranked()[0]
             self._fit_all([*without_one(best), *with_simpler(best, self.candidates)], again=True,
-                          always=True)
+                          always=True, settled=best.key if self.tired else frozenset())
             if self.ranked()[0] is best:
                 break
-
-    def _closest(self) -> list[Hypothesis]:
-        """The hypothesis that fits best of each number of effects from two on, most effects first.
-
-        What a first step out of a large misfit does not see can come to light beside another
-        effect, which then has to go.
-        """
-        several = [h for h in self.fits.values() if len(h.effects) > 1 and h.known]
-        counts = sorted({len(h.effects) for h in several}, reverse=True)
-        return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
-                for n in counts]
 
     def _exchange(self, best: Hypothesis, anyway: bool = False) -> None:
         """Put others in the place of each effect of a hypothesis: rivals that no path led to."""
@@ -222,7 +216,7 @@ class Search:
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
-        new = dataclasses.replace(self, records=records, fits={})
+        new = dataclasses.replace(self, records=records, fits={}, begun=set())
         new.base()
         ranked = self.ranked()
         near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
@@ -284,12 +278,15 @@ class Search:
             found, _ = result
             self.spent += EACH + (found.whitened.work if found else 0.0)
             key = frozenset(e.key for e in job[0])
+            self.begun.add(signature(job))
             if found and (key not in self.fits
                           or found.minimum.chi2 < self.fits[key].minimum.chi2 - EQUAL):
                 self.fits[key] = found
 
-        in_turn([job for job in jobs if all(e.suits(job[0]) for e in job[0])
-                 and (again or frozenset(e.key for e in job[0]) not in self.fits)],
+        jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])
+                and (again or frozenset(e.key for e in job[0]) not in self.fits)
+                and signature(job) not in self.begun]  # from there it would end there again
+        in_turn(jobs,
                 lambda: max(self._closest_chi2(), beside), work, take,
                 lambda: always or not self.tired, self.workers,
                 lambda result, chi2: result[1].stands(chi2))

@@ -29,6 +29,7 @@ GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rar
 PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
 WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
+OPEN = 2.0  # of the criterion: two explanations that differ by less are given side by side
 BETTER = 1.0  # of the criterion: a smaller gain may be the same law, written in another way
 PREDICTED = 8  # hypotheses of which that is found out
 # p-values below which a hypothesis leaves something unexplained, in the recordings it was fitted to
@@ -127,8 +128,10 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         # what it holds may be sure by itself, whatever may be there besides
         simplest = min((h for h in known if h.key <= known[0].key), key=lambda h: len(h.effects))
         doubt = _doubt(simplest, ranked, predict, scale) and doubt
+    # beside one name, such a law may explain it by a factor e better: that is no evidence
+    margin = OPEN if len(merged) == 2 else 0.0
     if proves and not known[0].symbolic and any(
-            total(h) - _handicap(h) < least for h in outside):
+            total(h) - _handicap(h) < least - margin for h in outside):
         doubt = "a law outside the catalogue explains it better"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
