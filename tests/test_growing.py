@@ -50,6 +50,27 @@ def test_a_wall_is_found_from_far_off(seed: int, wall: float) -> None:
     assert plain is None or plain.chi2 > 3 * whitened.rows
 
 
+def test_a_wall_is_found_where_the_motion_begins_late_and_gently() -> None:
+    """The first beginnings say nothing of the wall, and would lead the other parameters away."""
+    model, t = pk.systems.sloshing(), np.arange(2001) * 0.01
+    truth = model.with_term("theta_dot", "-20000*max(theta - 0.15, 0)")
+    driven = pk.excitation.multisine(np.arange(1.0, 4.0, 0.17), 20.0, seed=4)
+    u = np.interp(t, driven["u_x"].time, driven["u_x"].values) * np.clip((t - 2) / 6, 0, 1)
+    recording = pk.simulate(truth, pk.Recording.from_arrays(t, {"u_x": u}, {"u_x": "m/s^2"}),
+                            sigma=SIGMA, seed=4)
+    records = Records((recording,), ({"theta": Level(SIGMA, 0.0, 0.0, 0.01, "")},))
+    effect = wall_impact(sites(model, records.recordings)[0])[0]
+    whitened = Whitened(extended(model, [effect]), records)
+    # as the nominal model's fit, misled by the impacts, may have left it
+    begin = {"wall": 0.08, "k_wall": 10000.0, "l_theta": 0.047, "d_theta": 0.5}
+    theta = np.array([begin.get(f.name, f.guess) for f in whitened.problem.free])
+    found = grown(whitened, [effect], theta)
+    assert found is not None
+    assert found.chi2 == pytest.approx(whitened.rows, abs=4 * np.sqrt(2 * whitened.rows))
+    values = dict(zip([f.name for f in whitened.problem.free], found.theta, strict=True))
+    assert values["wall"] == pytest.approx(0.15, rel=0.01)
+
+
 def test_what_is_known_besides_counts() -> None:
     """A fit that knows one parameter firmly keeps it: then the beginning is not explained."""
     whitened, theta = opened(0, 0.1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -93,3 +95,18 @@ def test_nothing_adds_up_where_nothing_is_missing() -> None:
     # all parameters are shared: the joint fit has as many degrees of freedom as each
     assert predicted.together.power == pytest.approx(
         case.base.whitened.rows + len(predicted.rest), rel=0.1)
+
+
+def test_no_prediction_counts_on_a_better_fit_of_the_first_recording() -> None:
+    """A fit that stopped short of its minimum must not be credited with what it would still gain.
+    """
+    case = opened(4.0)
+    h = case.base
+    theta = h.minimum.theta * [1.01, 1.0]
+    at = h.whitened.residual(theta)
+    assert at is not None
+    short = replace(h, minimum=replace(h.minimum, theta=theta, r=at[0], J=at[1]))
+    assert short.minimum.chi2 > h.minimum.chi2 + 1000
+    whole, later = case.predicted(h), case.predicted(short)
+    assert whole is not None and later is not None
+    assert later.chi2 > whole.chi2 - 1

@@ -77,3 +77,14 @@ def test_what_is_given_is_fitted_without_each_effect(case: Case) -> None:
     assert {frozenset({"cubic_stiffness"}), frozenset({"sensor_offset"}),
             frozenset({"cubic_stiffness", "static_bias"})} <= set(search.fits)
     assert not search.closer([pair])
+
+
+def test_nothing_is_fitted_twice_from_one_place(case: Case) -> None:
+    search = case.begin_search()
+    job = ([c for c in case.candidates if c.key == "sensor_drift"], [{"l_theta": 0.05}])
+    search._fit_all([job], always=True)
+    spent = search.spent
+    search._fit_all([job], again=True, always=True)
+    assert search.spent == spent
+    search._fit_all([(job[0], [{"l_theta": 0.04}])], again=True, always=True)
+    assert search.spent > spent

@@ -19,10 +19,9 @@ WITHIN = 6.0  # difference of the criterion below which hypotheses are not told 
 MANY = 12  # of them that are tested: no reader wants more
 BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
 PROVEN = 4.0  # of the criterion: what each of several effects must gain on held-out recordings
-# of χ² in all recordings, that each of one or two effects must gain: 4.7 standard deviations in
-# each of two; each of three must gain twice that, of four three times: they can take up most of
-# anything
-STRONG = 45.0
+# of χ² in all recordings, that one effect must gain, and each of two, of three, of four: 4.2
+# standard deviations in each of two recordings; several together can take up most of anything
+STRONG = (36.0, 45.0, 90.0, 135.0)
 AT_MOST = 1.64  # standard errors by which the noise may be larger than it seems
 FOUND = 12.0  # of χ² that it must gain in the recording it was found in: the other one is the proof
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
@@ -155,9 +154,10 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
     """
     fits = {o.key: o for o in ranked}
     louder = float(np.exp(AT_MOST * min(h.whitened.records.spread, UNKNOWN)))
-    asked = STRONG * max(len(h.effects) - 1, 1) * louder
     for e in h.effects:
         rest = h.key - {e.key}
+        count = max(len(h.effects), len(e.covers) if h.symbolic else 1)
+        asked = STRONG[count - 1] * louder
         # a formula that is the sum of two entries must need both
         for fewer in (rest, *(rest | {part} for part in e.covers if h.symbolic)):
             o = fits.get(fewer)

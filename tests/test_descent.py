@@ -1,0 +1,61 @@
+"""Where fits begin, and that they end where an exact simulation would."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.api import _opened
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.hypothesis import extended, fitted
+from pikanid.mismatch.screen import Screen
+from pikanid.mismatch.whitened import Whitened
+
+
+def opened(truth: pk.Model, train: pk.Recording, sigma: float) -> Case:
+    recording = pk.simulate(truth, train, sigma=sigma, seed=3)
+    return _opened(pk.systems.sloshing(), (recording,), None, None, lambda text: None)
+
+
+@pytest.mark.parametrize("stiff", [3000.0, 20000.0, 70000.0])
+def test_a_fit_simulates_finely_enough_where_it_ends(stiff: float) -> None:
+    """A fit that begins at a soft wall and ends at a stiff one is as exact as one begun there."""
+    truth = pk.systems.sloshing().with_term("theta_dot", f"-{stiff}*max(theta - 0.15, 0)")
+    case = opened(truth, pk.excitation.two_pulse(), 0.002)
+    wall = next(c for c in case.candidates if c.key == "wall_impact")
+    begin = {"wall": 0.14, "k_wall": 1500.0, "l_theta": 0.045, "d_theta": 0.15}
+    found = fitted(case.model, [wall], case.records, [begin], 30)
+    assert found is not None
+    exact = Whitened(found.model, case.records)
+    assert exact.choose_steps(found.minimum.theta, share=0.002)
+    assert found.minimum.chi2 == pytest.approx(exact.chi2(found.minimum.theta), rel=0.02)
+
+
+def test_steps_that_are_too_long_elsewhere_are_seen() -> None:
+    truth = pk.systems.sloshing().with_term("theta_dot", "-70000*max(theta - 0.15, 0)")
+    case = opened(truth, pk.excitation.two_pulse(), 0.002)
+    wall = next(c for c in case.candidates if c.key == "wall_impact")
+    whitened = Whitened(extended(case.model, [wall]), case.records)
+    soft, stiff = (np.array([{"wall": 0.15, "k_wall": k}.get(f.name, f.guess)
+                             for f in whitened.problem.free]) for k in (1500.0, 70000.0))
+    assert whitened.choose_steps(soft)
+    assert max(whitened.step_errors(soft)) <= 1 and max(whitened.step_errors(stiff)) > 2
+    assert whitened.choose_steps(stiff)
+    assert max(whitened.step_errors(stiff)) <= 1
+
+
+@pytest.mark.parametrize(("friction", "damping", "length"),
+                         [(3.15, 0.16, 0.058), (2.4, 0.24, 0.039), (5.0, 0.28, 0.05)])
+def test_strong_friction_is_found_beside_damping_that_stands_for_it(
+        friction: float, damping: float, length: float) -> None:
+    """The nominal fit has made all of it viscous: from there small steps lead nowhere."""
+    model = pk.systems.sloshing().with_values({"d_theta": damping, "l_theta": length})
+    case = opened(model.with_term("theta_dot", f"-{friction}*sign(theta_dot)"),
+                  pk.excitation.two_pulse(), 0.0017)
+    assert case.base.far and case.base.values["d_theta"] > 3 * damping
+    listed = Screen(case.base, [c for c in case.candidates if c.fits and c.suits()]).singles(14)
+    coulomb, starts = next(one for one in listed if one[0].key == "coulomb_friction")
+    found = fitted(case.model, [coulomb], case.records, starts, 30)
+    assert found is not None and not found.far
+    assert found.values["c"] == pytest.approx(friction, rel=0.05)
