@@ -143,7 +143,7 @@ class Screen:
                 several[k][0]].scales else several[k][:1]
             starts: list[Start | Mapping[str, float]] = [
                 self._start(candidate, s, self.z[s]) for s in signs]
-            if law(candidate) and self.about.far:
+            if law(candidate):
                 starts += self._instead(signs[0])
             listed.append((candidate, starts))
         # guards beside the entries, not in their place
@@ -154,7 +154,7 @@ class Screen:
                   for start in self._anyhow(k)]
         return known + [one for one in listed if not one[0].known][:max(count // 3, 1)]
 
-    def _anyhow(self, candidate: int) -> list[Start]:
+    def _anyhow(self, candidate: int) -> list[Start | Mapping[str, float]]:
         """Where a fit of a candidate begins that promises nothing."""
         c = self.found.candidates[candidate]
         if c.levels:
@@ -163,7 +163,10 @@ class Screen:
         own = np.flatnonzero((self.found.owner == candidate) & (self.lengths > 0))
         levels = [int(k) for k in own if not self.found.signs[k].scales]
         some = levels[::-2][:3] if len(levels) > 3 else levels
-        return [self._start(c, k, 0.0) for k in some] or [Start(self.about.point, self.about.point)]
+        if some:
+            return [self._start(c, k, 0.0) for k in some]
+        return [Start(self.about.point, self.about.point),
+                *(self._instead(int(own[0])) if len(own) and law(c) else [])]
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
         size = float(amplitude / self.lengths[sign])
@@ -179,14 +182,14 @@ class Screen:
         Out of a large misfit the first step is a small one, and a parameter that stands for the
         effect can hold a fit where it is.
         """
+        if not (self.about.far and self.found.one_sided[sign]):
+            return []
         moves = self.taken[:, sign]
         here = np.array([self.about.point[n] for n in self.names])
         with np.errstate(divide="ignore", invalid="ignore"):
             size = MOSTLY * float(np.min(np.abs(here / moves), initial=np.inf, where=moves != 0))
         if not np.isfinite(size):
             return []
-        if not self.found.one_sided[sign]:
-            size *= float(np.sign(self.z[sign]))
         name = next(iter(self.found.signs[sign].start))
         return [{**self.about.point, name: size,
                  **dict(zip(self.names, (here - size * moves).tolist(), strict=True))}]
