@@ -109,6 +109,11 @@ class Candidate:
         """Identifies it among the candidates of a model."""
         return self.ids[0] + (f"[{self.variant}]" if self.variant else "") + self.site.suffix
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Under which it is reported: a law that no catalogue holds is its formula."""
+        return self.ids if self.known else (SYMBOLIC + self.expression,)
+
     def applied(self, model: Model) -> Model:
         """The model with this effect."""
         return self.extend(model.with_parameters(*self.parameters))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,10 @@ from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.in_turn import side_by_side
-from pikanid.mismatch.judge import HeldOut, held_out, residual_tests
+from pikanid.mismatch.judge import HeldOut, held_out
 from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.preparation import with_refined_noise
+from pikanid.mismatch.remainder import residual_tests
 from pikanid.mismatch.repeats import Repeats
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
@@ -119,10 +120,9 @@ class Case:
                                                self.rate)
         return self.predictions[h.fit]
 
-    def ahead(self, hypotheses: Sequence[Hypothesis]) -> None:
-        """Test hypotheses and let them predict, side by side."""
-        jobs = [(ask, h) for h in hypotheses for ask in (self.predicted, self.test)]
-        side_by_side(jobs, lambda job: job[0](job[1]), self.search.workers)
+    def ahead(self, jobs: Sequence[Callable[[], object]]) -> None:
+        """Do this side by side."""
+        side_by_side(jobs, lambda job: job(), self.search.workers)
 
     def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
         """Whether a hypothesis is worth its effects beyond another one.

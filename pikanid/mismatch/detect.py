@@ -84,14 +84,14 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
         return np.stack([np.max(size, axis=1, initial=0.0) ** 2, np.max(normal[:, :-1], axis=1),
                          normal[:, -1]], axis=1)
 
-    root = _root(L.T @ L)
+    root = _root(L.T @ L).astype(np.float32)  # of a p-value nobody needs more digits
     rng = np.random.default_rng(seed)
     z = L.T @ r
     observed = statistics(z[None])[0]
     drawn: list[np.ndarray] = []
     for _ in range(DRAWS // BATCH):
-        noise = rng.standard_normal((BATCH, len(root))) @ root
-        noise *= np.exp(0.5 * spread * rng.standard_normal((BATCH, 1)))
+        noise = rng.standard_normal((BATCH, len(root)), np.float32) @ root
+        noise *= np.exp(0.5 * spread * rng.standard_normal((BATCH, 1), np.float32))
         drawn.append(statistics(noise))
         p = [_tail(value, column) for value, column in
              zip(observed, np.concatenate(drawn).T, strict=True)]

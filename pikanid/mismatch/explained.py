@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pikanid.mismatch.candidate import SYMBOLIC
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.result import Explanation, NamedEffect, values_of
 from pikanid.mismatch.verdict import Answer, Predict, Test, criterion
@@ -24,8 +23,8 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict
     def one(h: Hypothesis, probability: float, why: str) -> Explanation:
         table = answer.twins.get(h.key, {})
         effects = tuple(NamedEffect(
-            table.get(e.key, e.ids if e.known else (SYMBOLIC + e.expression,)), e.name,
-            e.expression, values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
+            table.get(e.key, e.names), e.name, e.expression,
+            values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
         p = predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(
             {n: v for n, v in h.values.items()}), h.score(scale),

@@ -23,7 +23,7 @@ from scipy.stats import chi2
 from pikanid.mismatch.candidate import Candidate, Sign, View
 from pikanid.mismatch.detect import project
 from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.judge import residual_tests
+from pikanid.mismatch.remainder import residual_tests
 from pikanid.mismatch.site import Site
 from pikanid.mismatch.tangent import directions
 from pikanid.symbolic.curve import Curve

@@ -7,7 +7,7 @@ and what it tells leads to the next one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from pikanid.mismatch.whitened import Whitened
 SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of all motion, that beginnings hold
 FEWEST = 10  # rows a parameter that are worth a fit
 LOST = 3.0  # χ² per row from which on a beginning counts as unexplained
+LIMIT, HURRIED = 30, 10  # iterations of a fit, and of one over a hill
+HOPELESS = 300.0  # χ² per row above which no hill about a fit leads anywhere
 PLENTY = 3.0  # standard deviations of χ² beyond its mean that make a misfit
 
 Known = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -72,23 +74,45 @@ def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
     for share in (*(share for share in _beginnings(whitened) if share > enough), 1.0):
         part = Whitened(problem.model, whitened.records.beginning(int(share * whitened.rows))
                         ) if share < 1 else whitened
-        found = None
-        for begun in (theta, None):
-            if begun is None:  # what is first hit now may lie elsewhere altogether
-                begun = _level(part, effects, theta)
-            for start in _about(part, effects, begun):
-                other = minimise(besides(part, known), start, problem.lower, problem.upper)
-                found = min((m for m in (found, other) if m), key=lambda m: m.chi2, default=None)
-                if found and not rough(found.chi2 / (level if share < 1 else 1.0), part.rows,
-                                       effects):
-                    break
-            if found and not lost(found.chi2, part.rows):
-                break
+        found = _fitted(part, effects, theta, known, level if share < 1 else 1.0)
         if found is None or lost(found.chi2, part.rows):
             return None
         # noise that was taken for too little is no reason to look again
         theta, level = found.theta, max(1.0, found.chi2 / part.rows)
     return found
+
+
+def _fitted(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray, known: Known,
+            level: float) -> Minimum | None:
+    """The fit of a beginning: from where the last one ended or, if that leaves more than noise of a
+    `level`, from where the effects leave the least, and over the hills about that.
+    """
+    problem, found = part.problem, None
+
+    def explained(start: np.ndarray, limit: int = LIMIT) -> bool:
+        nonlocal found
+        other = minimise(besides(part, known), start, problem.lower, problem.upper, limit)
+        found = min((m for m in (found, other) if m), key=lambda m: m.chi2, default=None)
+        return found is not None and not rough(found.chi2 / level, part.rows, effects)
+
+    if _runs(part, theta) and explained(theta):
+        return found
+    theta = _level(part, effects, theta)
+    if not _runs(part, theta) or explained(theta) or (
+            found is not None and found.chi2 > HOPELESS * part.rows):
+        return found
+    for effect in effects:
+        for factor in effect.hills:
+            beside = theta.copy()
+            beside[_place(part, effect.parameters[0].name)] *= factor
+            if explained(beside, HURRIED):
+                return found
+    return found
+
+
+def _runs(part: Whitened, theta: np.ndarray) -> bool:
+    # far off, every step of an impact that comes too early would have to be followed
+    return part.choose_steps(theta) or part.choose_steps(theta, misfit=GLANCE)
 
 
 def _beginnings(whitened: Whitened) -> list[float]:
@@ -99,20 +123,6 @@ def _beginnings(whitened: Whitened) -> list[float]:
     order = np.argsort(place, kind="stable")
     so_far = np.cumsum(moved[order])
     return [float(place[order][np.searchsorted(so_far, share * so_far[-1])]) for share in SHARES]
-
-
-def _about(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray
-           ) -> Iterator[np.ndarray]:
-    """Where a fit may begin: here and over the hills; nowhere if that cannot be simulated."""
-    # far off, every step of an impact that comes too early would have to be followed
-    if not (part.choose_steps(theta) or part.choose_steps(theta, misfit=GLANCE)):
-        return
-    yield theta
-    for effect in effects:
-        for factor in effect.hills:
-            beside = theta.copy()
-            beside[_place(part, effect.parameters[0].name)] *= factor
-            yield beside
 
 
 def _level(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray) -> np.ndarray:

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 
 from pikanid.mismatch.beginning import own_beginning
 from pikanid.mismatch.candidate import Candidate
-from pikanid.mismatch.detect import Detection, detect, frequency_bands, past_inputs, unit_columns
+from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.growing import besides, grown, rough
 from pikanid.mismatch.hypothesis import Hypothesis, extended
 from pikanid.mismatch.least_squares import Minimum, held, minimise
 from pikanid.mismatch.prior import Prior, elsewhere, of_fit
-from pikanid.mismatch.tangent import directions
+from pikanid.mismatch.remainder import residual_tests
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
 
-MOST_ROWS = 6000  # of a residual that is tested as it is
 NEAR, AGAIN = 3.0, 4  # standard deviations that a linearisation holds for; how often it is renewed
 MISSED = 15.0  # of χ² that a fit to all recordings may exceed fits to each by, where it is best
 
@@ -40,6 +40,7 @@ class HeldOut:
         rest: (N,) whitened residual with that forgiveness.
         inert: Names of parameters that hardly act there: a limit that is not met.
         residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
+        known: Tests made so far.
     """
 
     rmse: float
@@ -55,65 +56,22 @@ class HeldOut:
     residuals: tuple[tuple[int, str, np.ndarray, np.ndarray], ...]
     rest: np.ndarray
     inert: frozenset[str]
+    known: dict[str, Detection | None] = field(default_factory=dict, repr=False)
 
-    @functools.cached_property
+    # cached properties would let threads wait for each other
+    @property
     def detection(self) -> Detection:
         """Tests of what is left, with the parameters' uncertainty forgiven."""
-        return self.tested()
+        if "alone" not in self.known:
+            self.known["alone"] = self.tested()
+        return cast(Detection, self.known["alone"])
 
-    @functools.cached_property
+    @property
     def together(self) -> Detection | None:
         """Tests of what one fit of all recordings leaves in them; None where no such fit is."""
-        return self.tested_together()
-
-
-def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
-                   candidates: tuple[Candidate, ...], rate: float, seed: int = 0) -> Detection:
-    """Test the residual of a fit against everything that the catalogue and its guards would show.
-
-    r and J may have more rows than there are samples: those of a prior.
-    """
-    found = directions(whitened, theta, candidates)
-    more = len(r) - whitened.rows
-    D = np.vstack([found.D, np.zeros((more, found.D.shape[1]))])
-    bands, inputs = lines(whitened, rate, more)
-    count = -(-whitened.rows // MOST_ROWS)
-    if count > 1:
-        r, J, D, inputs, *bands = (
-            condensed(part, whitened.rows, count) for part in (r, J, D, inputs, *bands))
-    units, _ = unit_columns(D, J)
-    return detect(-r, J, units, found.one_sided, bands, inputs, whitened.records.spread, seed)
-
-
-def condensed(rows: np.ndarray, samples: int, count: int) -> np.ndarray:
-    """Sums of `count` neighbouring rows over √count: white stays white, slow signs stay as clear.
-
-    Rows behind the first `samples` are those of a prior and stay as they are.
-    """
-    ends = np.arange(0, samples, count)
-    return np.concatenate([np.add.reduceat(rows[:samples], ends, axis=0) / np.sqrt(count),
-                           rows[samples:]])
-
-
-def lines(whitened: Whitened, rate: float, more: int) -> tuple[list[np.ndarray], np.ndarray]:
-    """Bands of frequency and the inputs' past, for all rows (and `more` rows of zeros)."""
-    blocks: list[list[np.ndarray]] = []
-    pasts: list[np.ndarray] = []
-    for experiment in whitened.problem.experiments:
-        held = [(h.time, h.values) for h in experiment.held if len(h.time) > 1]
-        for s in experiment.samples:
-            blocks.append(frequency_bands(s.t, rate))
-            pasts.append(past_inputs(s.t, held, rate))
-    count = min(len(b) for b in blocks)
-    bands = [_stacked([b[k] for b in blocks], more) for k in range(count)]
-    return bands, _stacked(pasts, more)
-
-
-def _stacked(blocks: list[np.ndarray], more: int) -> np.ndarray:
-    from scipy.linalg import block_diag
-
-    whole = block_diag(*blocks)
-    return np.vstack([whole, np.zeros((more, whole.shape[1]))])
+        if "together" not in self.known:
+            self.known["together"] = self.tested_together()
+        return self.known["together"]
 
 
 def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,

@@ -30,8 +30,8 @@ from scipy.linalg import solve_triangular
 from pikanid.channel import Channel
 from pikanid.mismatch.candidate import Candidate, Sign
 from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.judge import MOST_ROWS, condensed
 from pikanid.mismatch.penalised import Penalised, critical_value
+from pikanid.mismatch.remainder import MOST_ROWS, condensed
 from pikanid.mismatch.site import Site
 from pikanid.mismatch.tangent import TOGETHER, Tangent
 from pikanid.mismatch.whitened import Records, Whitened

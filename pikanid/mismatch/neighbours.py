@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.descent import Start
-from pikanid.mismatch.hypothesis import Hypothesis
+from pikanid.mismatch.hypothesis import FAR, Hypothesis
 from pikanid.mismatch.screen import as_strong
 
 WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
@@ -58,6 +58,23 @@ def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
         for other in candidates:
             if effect.twin and other.twin == effect.twin and other.fits and other is not effect:
                 yield (*_rest(h, effect), other), [h.point]
+
+
+def leading(ranked: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """Hypotheses to extend, best first: none that only adds effects to a better one."""
+    found: list[Hypothesis] = []
+    for h in ranked:
+        if h.effects and not any(o.key < h.key for o in found):
+            found.append(h)
+    return found
+
+
+def wide(h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
+    """Whether a law that one of its effects contains does nearly as well in that one's place: then
+    more is added to the simpler one.
+    """
+    simpler = (fits.get(h.key - {e.key} | {part}) for e in h.effects for part in e.covers)
+    return any(o is not None and o.minimum.chi2 < FAR * h.minimum.chi2 for o in simpler)
 
 
 def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:

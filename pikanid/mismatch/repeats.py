@@ -16,8 +16,8 @@ import numpy as np
 from pikanid.channel import Array
 from pikanid.expressions import TIME
 from pikanid.mismatch.hypothesis import fitted
-from pikanid.mismatch.judge import condensed
 from pikanid.mismatch.noise_level import GRID, Level, likeliest
+from pikanid.mismatch.remainder import condensed
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 from pikanid.recording import Recording

@@ -56,7 +56,7 @@ def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) ->
 
 
 def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
-            ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
+                 ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
@@ -71,11 +71,11 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
     for h in known:
         signature = frozenset(group(e) for e in h.effects)
         leader = first.setdefault(signature, h)
-        table = twins.setdefault(leader.key, {e.key: e.ids for e in leader.effects})
+        table = twins.setdefault(leader.key, {e.key: e.names for e in leader.effects})
         for e in leader.effects:
             for o in h.effects:
                 if group(o) == group(e):
-                    table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.ids)))
+                    table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.names)))
         for e in h.effects:
             power = _power_law(h, e, tried) if e.ids[0] in EXPONENTS else None
             if leader is h and power and _open_exponent(power, EXPONENTS[e.ids[0]]):

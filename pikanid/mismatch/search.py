@@ -11,12 +11,15 @@ import numpy as np
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.descent import Start
+from pikanid.mismatch.growing import hits, lost
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, fitted
 from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.neighbours import (
     Job,
     closest_of_each,
+    leading,
     signature,
+    wide,
     with_simpler,
     with_twins,
     with_wider,
@@ -28,13 +31,14 @@ from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 
 SINGLES, PAIRS = 14, 8  # refits of one effect, of two at once
-MORE, LATER = 6, 4  # of one more beside one, beside two or three
+MORE, LATER = 8, 4  # of one more beside one, beside two or three
 LEADING = 3  # single effects that a second one is added to
 CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
 PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
 EQUAL = 0.05  # of χ²: another fit of the same is no better, and what was tested stands
 KEPT = 0.5  # of what an effect promises, to first order, that a fit of it must gain
 TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
+ASKED = 2  # hypotheses to be given that are looked at once more
 MOST = 4  # effects in a hypothesis
 EFFORT = 8e6  # states times steps simulated for combinations, before nothing new is begun
 EACH = 6e4  # that setting up one fit takes as much time as, as measured
@@ -56,6 +60,7 @@ class Search:
             other recordings say.
         fits: The closest fit of each set of effects.
         begun: Where fits have begun.
+        astray: Effects that were looked for beyond all hills, and explained nothing.
         guess: Parameters that the nominal model was given with.
         workers: Threads that fit side by side; the results do not depend on their number.
     """
@@ -68,6 +73,7 @@ class Search:
     guess: Mapping[str, float] = field(default_factory=dict)
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     begun: set[object] = field(default_factory=set)
+    astray: set[frozenset[str]] = field(default_factory=set)
     spent: float = 0.0
     workers: int = 1
 
@@ -117,10 +123,11 @@ class Search:
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
             near = rows + FAR * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
-            for h in self._leading()[: LEADING if count == 1 else 1]:
-                if len(h.effects) < MOST and (h is best or h.minimum.chi2 < near):
+            simple = [h for h in leading(self.ranked()) if not wide(h, self.fits)] or [best]
+            for h in simple[: LEADING if count == 1 else 1]:
+                if len(h.effects) < MOST and (h is simple[0] or h.minimum.chi2 < near):
                     self._extend(h, MORE if count == 1 else LATER,
-                                 always=law if count == 1 and h is best else nothing)
+                                 always=law if count == 1 and h is simple[0] else nothing)
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
@@ -128,7 +135,7 @@ class Search:
         self._simplify()
         best = self.ranked()[0]
         if not adequate(best):
-            for h in self._leading()[:LEADING]:
+            for h in leading(self.ranked())[:LEADING]:
                 self._fit_all([job for job in with_wider(h, self.candidates)
                                if all(e.known for e in job[0])], always=True)
             best = self.ranked()[0]
@@ -158,14 +165,6 @@ class Search:
                 self._fit_all([(best.effects, starts) for _, starts in
                                Screen(best, [effect]).singles(1)], again=True)
         return self.ranked()[0]
-
-    def _leading(self) -> list[Hypothesis]:
-        """Hypotheses to extend, best first: none that only adds effects to a better one."""
-        found: list[Hypothesis] = []
-        for h in self.ranked():
-            if h.effects and not any(o.key < h.key for o in found):
-                found.append(h)
-        return found
 
     def _contenders(self) -> Iterator[Hypothesis]:
         """The hypotheses that score about as well as the best."""
@@ -203,7 +202,7 @@ class Search:
         stand; whether that found anything.
         """
         before = {h.fit for h in self.fits.values()}
-        for h in hypotheses:
+        for h in hypotheses[:ASKED]:
             self._fit_all([*without_one(h), *with_twins(h, self.candidates)], again=True,
                           always=True)
             self._exchange(h, anyway=True)
@@ -216,7 +215,8 @@ class Search:
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
-        new = dataclasses.replace(self, records=records, fits={}, begun=set())
+        new = dataclasses.replace(self, records=records, fits={}, begun=set(),
+                                  astray=set())
         new.base()
         ranked = self.ranked()
         near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
@@ -268,17 +268,22 @@ class Search:
         `settled` are not looked for beyond hills.
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
+        astray = frozenset(self.astray)
 
         def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
             (effects, starts), closest = job, Closest(chi2)
-            return fitted(self.nominal, sorted(effects, key=lambda e: order[e.key]), self.records,
-                          starts, self.choices, closest, settled), closest
+            effects = sorted(effects, key=lambda e: order[e.key])
+            key = frozenset(e.key for e in effects)
+            return fitted(self.nominal, effects, self.records, starts, self.choices, closest,
+                          key if key in astray else settled), closest
 
         def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
             found, _ = result
             self.spent += EACH + (found.whitened.work if found else 0.0)
             key = frozenset(e.key for e in job[0])
             self.begun.add(signature(job))
+            if found and hits(found.effects) and lost(found.minimum.chi2, found.whitened.rows):
+                self.astray.add(key)
             if found and (key not in self.fits
                           or found.minimum.chi2 < self.fits[key].minimum.chi2 - EQUAL):
                 self.fits[key] = found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class Answer:
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
            checked: bool, proves: bool,
-           ahead: Callable[[Sequence[Hypothesis]], None] = lambda near: None) -> Answer:
+           ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None) -> Answer:
     """Choose what is given.
 
     Args:
@@ -65,7 +66,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         test, predict: Adequacy on the train and on the held-out recordings.
         checked: Whether there is anything held out.
         proves: Whether that is a recording of its own.
-        ahead: Told of the hypotheses that will all be tested and predict, before they are.
+        ahead: Given work that is all needed, before it is: to do it side by side.
     """
     reasons: dict[frozenset[str], str] = {}
     tried = [h for h in ranked if h.effects]
@@ -75,7 +76,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     lowest = min(_handicapped(h, scale) for h in tried)
     near = [h for h in tried if h.score(scale) < lowest + WITHIN][:MANY]
     near = integer_laws(near)
-    ahead(near)
+    ahead([partial(ask, h) for h in near for ask in (predict, test)])
 
     def total(h: Hypothesis) -> float:
         return criterion(h, predict(h), scale) if predict(h) or not checked else np.inf
@@ -93,6 +94,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             reasons[h.key] = "leaves something unexplained in all recordings together"
         return h.key not in reasons
 
+    if checked:
+        ahead([partial(getattr, seen, "detection") for h in near
+               if test(h).p_value >= ADEQUATE and (seen := predict(h))])
     given = [h for h in near if passes(h)]
     given = [h for h in given if not _needless(h, near, given, scale)]
     if checked:
@@ -107,6 +111,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             given.remove(h)
     if checked and len(given) > 1:
         given = _by_evidence(given, total, reasons)
+    if checked:
+        ahead([partial(getattr, seen, "together") for h in given if (seen := predict(h))])
     given = [h for h in given if explains_all(h)]
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
@@ -121,7 +127,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     merged, twins = merged_twins(known, tried)
     # laws outside the catalogue that would do as well are for the reader to know
     least = min(map(total, known))
-    merged += [h for h in outside if total(h) - _handicap(h) < least + WITHIN]
+    open_to, more = merged_twins(
+        [h for h in outside if total(h) - _handicap(h) < least + WITHIN], tried)
+    merged, twins = merged + open_to, {**twins, **more}
     doubt = _doubt(known[0], ranked, predict, scale) if proves else ""
     if doubt and not outside:
         # what it holds may be sure by itself, whatever may be there besides
