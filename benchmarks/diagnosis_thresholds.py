@@ -54,10 +54,10 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
                  "patch": "*", "penalised": "*"},
     BEFOREHAND: {"confusable": "*", "experiments": "*", "profiles": "*", "seen": "*",
                  "sizing": "*"},
-    LONGER: {"case": "SEARCHED", "judge": "MOST_ROWS", "preparation": "LONG FINE"},
+    LONGER: {"case": "SEARCHED", "preparation": "LONG FINE", "remainder": "MOST_ROWS"},
     REPEATED: {"repeats": "*"},
-    STEPS: {"api": "RELEVELLED", "growing": "SHARES",
-            "hypothesis": "LIMIT HURRIED HILLS COARSE", "judge": "AGAIN",
+    STEPS: {"api": "RELEVELLED", "descent": "HILLS COARSE RENEWED",
+            "growing": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED", "judge": "AGAIN",
             "least_squares": "PATIENCE", "tangent": "*", "whitened": "FINEST"},
     "number of threads": {"in_turn": "*"},
     "number of draws, points or knots": {

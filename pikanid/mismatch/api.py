@@ -15,7 +15,7 @@ from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.explained import explanations
 from pikanid.mismatch.force_shape import ForceShape, force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.in_turn import threads
+from pikanid.mismatch.in_turn import blas_on_one_thread, threads
 from pikanid.mismatch.latent_force import force_over_time
 from pikanid.mismatch.locate import locate, smallest
 from pikanid.mismatch.patch import patch
@@ -89,9 +89,17 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         raise errors.BadSetting(errors.bad_value("workers", workers, "at least 1"))
     if not model.free_names:
         raise errors.BadModel(errors.nothing_free(model.name))
-    case = _opened(model, _several(train), None if held_out is None else _several(held_out),
-                   quiet, tell)
-    case.search.workers = threads(workers)
+    later = None if held_out is None else _several(held_out)
+    with blas_on_one_thread():
+        found = _diagnosed(model, _several(train), later, alpha, quiet, tell, threads(workers))
+    return replace(found, seconds=time.perf_counter() - begun)
+
+
+def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
+               alpha: float, quiet: tuple[float, float] | None, tell: Callable[[str], None],
+               workers: int) -> Diagnosis:
+    case = _opened(model, train, later, quiet, tell)
+    case.search.workers = workers
     tell("detection")
     detection = case.test(case.base)
     if case.repeats is not None:
@@ -134,8 +142,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     if shape is not None and answer.verdict == "unnamed" and case.later is not None:
         mend = patch(case.base, case.model, shape, case.sites[0], case.records, case.later,
                      case.predicted)
-    return replace(_diagnosis(case, detection, answer, shape, alpha), patch=mend,
-                   seconds=time.perf_counter() - begun)
+    return replace(_diagnosis(case, detection, answer, shape, alpha), patch=mend)
 
 
 def _settled(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
