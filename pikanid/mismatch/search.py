@@ -216,19 +216,19 @@ class Search:
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
         new = dataclasses.replace(self, records=records, fits={}, begun=set(),
-                                  astray=set())
+                                  astray=set(self.astray))
         new.base()
         ranked = self.ranked()
         near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
         new._fit_all([(h.effects, [h.point]) for h in ranked[: FEW if ranked[0].far else CARRIED]
-                      if h.effects and h.minimum.chi2 < near], always=True)
+                      if h.effects and h.minimum.chi2 < near], always=True,
+                     settled=frozenset(c.key for c in self.candidates))
         return new
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
-        every = list(self.fits.values())
         scale = self.scale()
-        return sorted(every, key=lambda h: h.score(scale))
+        return sorted(self.fits.values(), key=lambda h: h.score(scale))
 
     def scale(self) -> float:
         """What χ² counts for."""
