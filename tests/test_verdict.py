@@ -183,6 +183,18 @@ def test_a_law_outside_the_catalogue_that_would_do_as_well_stands_beside_the_nam
     assert answered(fits, refused=("a",)).verdict == "unnamed"
 
 
+def test_twins_beside_a_law_outside_the_catalogue_are_one_hypothesis() -> None:
+    one, other = (replace(effect(name), twin="scale") for name in ("gain", "lever"))
+    fits = [BASE, hypothesis(1000.0, A, one), hypothesis(1000.1, A, other),
+            hypothesis(1001.0, GUARD, one), hypothesis(1001.1, GUARD, other),
+            hypothesis(1300.0, A), hypothesis(1900.0, one), hypothesis(1900.0, other)]
+    given = answered(fits, {"a": 500.0, "gain": 500.0, "lever": 500.0})
+    assert [sorted(h.key) for h in given.given] == [["a", "gain"], ["gain", "outside"]]
+    assert given.verdict == "set"
+    table = given.twins[frozenset({"outside", "gain"})]
+    assert table["gain"] == ("gain", "lever") and table["outside"] == ("symbolic:outside",)
+
+
 def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1001.0, GUARD), hypothesis(1000.0, LAW)]
     refuted = answered(fits, refused=("a",))

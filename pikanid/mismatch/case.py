@@ -140,4 +140,5 @@ class Case:
 def note_outliers(count: int, where: str, notes: list[str]) -> None:
     """Add a sentence about outliers that were left out to the notes, if there were any."""
     if count:
-        notes.append(f"{count} more outliers of {where} show beside a fit and are left out.")
+        these = "outliers" if count > 1 else "outlier"
+        notes.append(f"Beside a fit, {count} more {these} of {where} can be seen: left out.")

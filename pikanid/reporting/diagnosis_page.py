@@ -7,6 +7,8 @@ import io
 from html import escape
 from typing import TYPE_CHECKING
 
+from pikanid.estimate import rounded
+
 if TYPE_CHECKING:
     from pikanid.mismatch.result import Diagnosis, Explanation
 
@@ -86,7 +88,7 @@ def _what(dx: Diagnosis) -> str:
 
 def _explanation(h: Explanation) -> str:
     rows = "".join(
-        f"<tr><td>{escape(n)}</td><td>{v.value:.5g} ± {v.std:.2g}</td>"
+        f"<tr><td>{escape(n)}</td><td>{rounded(v.value, v.std)}</td>"
         f"<td>{escape(v.unit)}</td></tr>"
         for e in h.effects for n, v in e.parameters.items())
     formulas = "".join(f"<li>{escape(e.name)} ({escape(' or '.join(e.ids))}): "
@@ -96,14 +98,13 @@ def _explanation(h: Explanation) -> str:
 
 
 def _parameters(dx: Diagnosis) -> str:
-    before = {f.label: (float(v), dx.before.covariance[k, k] ** 0.5)
-              for k, (f, v) in enumerate(zip(dx.before.free, dx.before.theta, strict=True))}
+    before, after = ({f.label: rounded(float(v), found.covariance[k, k] ** 0.5)
+                      for k, (f, v) in enumerate(zip(found.free, found.theta, strict=True))}
+                     for found in (dx.before, dx.after))
     rows = "".join(
-        f"<tr><td>{escape(f.label)}</td>"
-        f"<td>{before[f.label][0]:.6g} ± {before[f.label][1]:.2g}</td>"
-        f"<td>{v:.6g} ± {dx.after.covariance[k, k] ** 0.5:.2g}</td><td>{escape(f.unit)}</td></tr>"
-        for k, (f, v) in enumerate(zip(dx.after.free, dx.after.theta, strict=True))
-        if f.label in before)
+        f"<tr><td>{escape(f.label)}</td><td>{before[f.label]}</td>"
+        f"<td>{after[f.label]}</td><td>{escape(f.unit)}</td></tr>"
+        for f in dx.after.free if f.label in before)
     return ("<table><tr><th>parameter</th><th>before</th><th>after</th><th></th></tr>"
             f"{rows}</table>")
 
