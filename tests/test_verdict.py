@@ -122,7 +122,7 @@ def test_more_is_asked_where_the_noise_is_little_known() -> None:
 
     assert answered(fits(0.1)).verdict == "named"
     unsure = answered(fits(0.5))
-    assert unsure.verdict == "unconfirmed" and "82 are asked" in unsure.doubt
+    assert unsure.verdict == "unconfirmed" and "91 are asked" in unsure.doubt
     # known by its order only, no more: some gain is always enough
     strong = [hypothesis(1130.0), hypothesis(1000.0, A, spread=3.0)]
     assert answered(strong).verdict == "named"

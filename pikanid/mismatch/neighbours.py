@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.descent import Start
 from pikanid.mismatch.hypothesis import FAR, Hypothesis
-from pikanid.mismatch.screen import as_strong
+from pikanid.mismatch.screen import Screen, as_strong
 
 WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
 Job = tuple[Sequence[Candidate], Sequence[Start | Mapping[str, float]]]
@@ -20,6 +20,16 @@ def without_one(h: Hypothesis) -> Iterator[Job]:
     """The hypothesis without each of its effects, where it has several."""
     for effect in h.effects if len(h.effects) > 1 else ():
         yield _rest(h, effect), [h.point]
+
+
+def afresh(h: Hypothesis) -> Iterator[Job]:
+    """The same, effects begun where what it leaves shows them as well: a mode, or a moment, may
+    have been a wrong one.
+    """
+    for effect in h.effects:
+        if len(effect.parameters) > 2:
+            for _, starts in Screen(h, [effect]).singles(1):
+                yield h.effects, starts
 
 
 def with_simpler(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:

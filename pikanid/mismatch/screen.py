@@ -52,9 +52,18 @@ def law(c: Candidate) -> bool:
     return c.known and c.channel == "dynamics" and len(c.parameters) == 1
 
 
-def entry(c: Candidate) -> bool:
-    """An entry of the catalogue.  About a model that is far off, first steps say little."""
-    return c.known
+def drag(c: Candidate) -> bool:
+    """A force of one parameter that only takes energy out: beside a model whose damping has taken
+    it up, the first step to it may point the wrong way.
+    """
+    return law(c) and c.parameters[0].bounds[0] == 0
+
+
+def entry(c: Candidate, channel: str = "") -> bool:
+    """An entry of the catalogue (of a channel).  About a model that is far off, first steps say
+    little.
+    """
+    return c.known and channel in ("", c.channel)
 
 
 def fixed(c: Candidate) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from pikanid.mismatch.hypothesis import FAR, Hypothesis, fitted
 from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.neighbours import (
     Job,
+    afresh,
     closest_of_each,
     leading,
     signature,
@@ -25,7 +27,7 @@ from pikanid.mismatch.neighbours import (
     with_wider,
     without_one,
 )
-from pikanid.mismatch.screen import Screen, entry, fixed, law, nothing
+from pikanid.mismatch.screen import Screen, drag, entry, fixed, law, nothing
 from pikanid.mismatch.what_counts import what_counts
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
@@ -117,8 +119,9 @@ class Search:
     def grow(self, adequate: Adequate) -> list[Hypothesis]:
         """Add effects to the best hypotheses as long as something is left and that helps."""
         for count in range(1, MOST):
-            best = self._afresh(self.ranked()[0], adequate)
-            if adequate(best) or self.tired:
+            if not adequate(best := self.ranked()[0]):
+                self._fit_all([*afresh(best)], again=True)
+            if adequate(best := self.ranked()[0]) or self.tired:
                 break
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
@@ -133,12 +136,13 @@ class Search:
                 break
             self._simplify()  # what led out of a dead end may have done its part
         self._simplify()
-        best = self.ranked()[0]
-        if not adequate(best):
+        if not (best := self.ranked()[0]).known:
+            self._exchange(best, anyway=True)
+        if not adequate(self.ranked()[0]):
             for h in leading(self.ranked())[:LEADING]:
                 self._fit_all([job for job in with_wider(h, self.candidates)
                                if all(e.known for e in job[0])], always=True)
-            best = self.ranked()[0]
+        best = self.ranked()[0]
         if any(e.hills for e in best.effects) and not adequate(best):
             best = self._fit(best.effects, [best.point], again=True)  # hills left for later
         if adequate(best):
@@ -157,14 +161,6 @@ class Search:
             for job in with_wider(h, self.candidates):
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
-
-    def _afresh(self, best: Hypothesis, adequate: Adequate) -> Hypothesis:
-        """The best hypothesis, its effects begun where what it leaves shows them as well."""
-        for effect in best.effects if not adequate(best) else ():
-            if len(effect.parameters) > 2:  # a mode, or a moment, may have been a wrong one
-                self._fit_all([(best.effects, starts) for _, starts in
-                               Screen(best, [effect]).singles(1)], again=True)
-        return self.ranked()[0]
 
     def _contenders(self) -> Iterator[Hypothesis]:
         """The hypotheses that score about as well as the best."""
@@ -189,13 +185,16 @@ class Search:
                 break
 
     def _exchange(self, best: Hypothesis, anyway: bool = False) -> None:
-        """Put others in the place of each effect of a hypothesis: rivals that no path led to."""
+        """Put others in the place of each effect: rivals that no path led to."""
         for effect in best.effects if len(best.effects) > 1 else ():
             rest = tuple(e for e in best.effects if e is not effect)
             without = self._fit(rest, [best.point])
             if without.key == frozenset(e.key for e in rest):
                 gap = without.minimum.chi2 - best.minimum.chi2
-                self._extend(without, MORE, PROMISING * gap, anyway=anyway)
+                # a law outside the catalogue takes up what no first step to an entry sees
+                always = (partial(entry, channel=effect.channel) if not effect.known
+                          else drag if anyway else nothing)
+                self._extend(without, MORE, PROMISING * gap, always, anyway)
 
     def closer(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Fit hypotheses with one effect less, or another one in its place, on from where they

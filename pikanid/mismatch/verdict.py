@@ -20,17 +20,18 @@ WITHIN = 6.0  # difference of the criterion below which hypotheses are not told 
 MANY = 12  # of them that are tested: no reader wants more
 BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
 PROVEN = 4.0  # of the criterion: what each of several effects must gain on held-out recordings
-# of χ² in all recordings, that one effect must gain, and each of two, of three, of four: 4.2
+# of χ² in all recordings, that one effect must gain, and each of two, of three, of four: 4.5
 # standard deviations in each of two recordings; several together can take up most of anything
-STRONG = (36.0, 45.0, 90.0, 135.0)
+STRONG = (40.0, 45.0, 90.0, 135.0)
 AT_MOST = 1.64  # standard errors by which the noise may be larger than it seems
 FOUND = 12.0  # of χ² that it must gain in the recording it was found in: the other one is the proof
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
 PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
 ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
 WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
+WORSE = 1.5  # times the nominal held-out RMSE: no proof, whatever errors of parameters forgive
 OPEN = 2.0  # of the criterion: two explanations that differ by less are given side by side
-BETTER = 1.0  # of the criterion: a smaller gain may be the same law, written in another way
+SAME = 1.0  # of the criterion: what differs by less may be the same law, written in another way
 PREDICTED = 8  # hypotheses of which that is found out
 # p-values below which a hypothesis leaves something unexplained, in the recordings it was fitted to
 # or in held-out ones, and in all together: one right hypothesis in a hundred is refused
@@ -161,6 +162,10 @@ def _doubt(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale:
     Of an effect that would hardly show in the held-out recording no proof can be asked.
     """
     fits = {o.key: o for o in ranked}
+    nominal = predict(fits[frozenset()])
+    proof = predict(h)
+    if nominal and proof and proof.rmse > WORSE * nominal.rmse:
+        return "as it stands it predicts the held-out recording far worse than the nominal model"
     louder = float(np.exp(AT_MOST * min(h.whitened.records.spread, UNKNOWN)))
     for e in h.effects:
         rest = h.key - {e.key}
@@ -251,16 +256,22 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
     """The answer where nothing in the catalogue would do, after formulas have been fitted as well.
 
     A formula is given where it explains about as much as the laws outside the catalogue that kept
-    names away, and predicts what is held out; one of those that does better stands beside it.
+    names away, and predicts what is held out; those that do about as well stand beside it.
     """
     if not any(h.symbolic for h in ranked):
         return answer
     found = settle(ranked, scale, test, predict, checked, proves)
     totals = {h.key: criterion(h, predict(h), scale) - _handicap(h) for h in found.given}
     least = min((totals[h.key] for h in found.given if h.symbolic), default=-np.inf)
-    given = tuple(h for h in found.given if h.symbolic or totals[h.key] < least - BETTER)
+    given = tuple(h for h in found.given if h.symbolic or abs(totals[h.key] - least) > SAME)
     if not given or any(h.known and not h.symbolic for h in given):
         return answer
+    likely = [h for h in ranked if h.effects and not h.known and h not in given
+              and h.score(scale) < given[0].score(scale) + BEHIND * WITHIN][:PREDICTED]
+    if any(predict(h) and SAME < criterion(h, predict(h), scale) - _handicap(h) - least < WITHIN
+           for h in likely):
+        doubt = "another law outside the catalogue explains it about as well"
+        return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
     return replace(found, given=given, verdict="named" if found.verdict == "set" and len(given) == 1
                    else found.verdict)
 
