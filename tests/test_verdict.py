@@ -44,20 +44,23 @@ def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothe
 
 def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
              refused: tuple[str, ...] = (), unseen: tuple[str, ...] = (),
-             contradicted: tuple[str, ...] = (), inert: tuple[str, ...] = ()) -> Answer:
-    """The answer with these held-out evidences (0 unless given), some effects refuted there, some
-    not to be seen or not acting, some contradicted by all recordings together.
+             contradicted: tuple[str, ...] = (), inert: tuple[str, ...] = (),
+             rmse: dict[str, float] | None = None) -> Answer:
+    """The answer with these held-out evidences (0 unless given) and RMSEs (1), some effects refuted
+    there, some not to be seen or not acting, some contradicted by all recordings together.
     """
     def found(h: Hypothesis, where: tuple[str, ...] = refused) -> Detection:
         p = 1e-6 if h.key & set(where) else 0.5
         return cast(Detection, SimpleNamespace(p_value=p))
 
     def predicted(h: Hypothesis) -> HeldOut:
-        value = (evidence or {}).get("+".join(sorted(h.key)), 0.0)
-        rest = np.array([3.0 * (name in h.key) * (name not in unseen) for name in ("a", "b")])
+        name = "+".join(sorted(h.key))
+        value = (evidence or {}).get(name, 0.0)
+        rest = np.array([3.0 * (one in h.key) * (one not in unseen) for one in ("a", "b")])
         return cast(HeldOut, SimpleNamespace(
-            detection=found(h), together=found(h, contradicted), evidence=value, rmse=1.0,
-            rest=rest, inert=frozenset(f"p_{name}" for name in inert)))
+            detection=found(h), together=found(h, contradicted), evidence=value,
+            rmse=(rmse or {}).get(name, 1.0), rest=rest,
+            inert=frozenset(f"p_{one}" for one in inert)))
 
     def adequate(h: Hypothesis) -> Detection:
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
@@ -126,6 +129,14 @@ def test_more_is_asked_where_the_noise_is_little_known() -> None:
     # known by its order only, no more: some gain is always enough
     strong = [hypothesis(1130.0), hypothesis(1000.0, A, spread=3.0)]
     assert answered(strong).verdict == "named"
+
+
+def test_what_predicts_far_worse_than_the_nominal_model_is_not_proved() -> None:
+    """However much of that the parameters' errors would forgive."""
+    fits = [BASE, hypothesis(1000.0, A)]
+    assert answered(fits, rmse={"a": 1.4}).verdict == "named"
+    given = answered(fits, rmse={"a": 1.6})
+    assert given.verdict == "unconfirmed" and "far worse" in given.doubt
 
 
 def test_an_effect_must_show_where_it_was_found() -> None:
@@ -202,6 +213,13 @@ def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:
     # a formula that explains far less than the law outside the catalogue is none
     poor = [*fits[:3], hypothesis(1012.0, LAW)]
     assert answered(poor, refused=("a",)).verdict == "unnamed"
+
+
+def test_a_formula_is_not_sure_beside_another_law_that_does_about_as_well() -> None:
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1013.0, GUARD), hypothesis(1000.0, LAW)]
+    given = answered(fits, {"outside": -9.0}, refused=("a",))
+    assert given.verdict == "unconfirmed" and "about as well" in given.doubt
+    assert answered(fits, {"outside": 9.0}, refused=("a",)).verdict == "named"
 
 
 def test_a_formula_that_is_the_sum_of_two_entries_needs_both() -> None:
