@@ -63,3 +63,21 @@ def test_strong_friction_is_found_beside_damping_that_stands_for_it(
             if c.key == "coulomb_friction"]
     found = min((h for h in fits if h), key=lambda h: h.minimum.chi2)
     assert not found.far and found.values["c"] == pytest.approx(friction, rel=0.05)
+
+
+@pytest.mark.parametrize("periods", [-0.5, 0.5, -1.0])
+def test_a_force_local_in_time_is_found_from_another_half_period(periods: float) -> None:
+    """It rings alike there, the other way round: a descent ends beside the right moment."""
+    model = pk.systems.sloshing()
+    truth = model.with_term("theta_dot", "8*exp(-((t - 9)/0.1)**2)")
+    case = opened(truth, pk.excitation.planar_moves(6, 20.0, seed=2), 0.002)
+    once = next(c for c in case.candidates if c.key == "disturbance")
+    later = periods * 2 * np.pi / case.rate
+    begin = {"peak": 8.0 * (-1) ** int(2 * periods), "t_peak": 9.0 + later, "width": 0.4}
+    found = fitted(case.model, [once], case.records, [{**case.base.point, **begin}], 30)
+    assert found is not None and found.values["t_peak"] == pytest.approx(9.0, abs=0.02)
+    assert found.minimum.chi2 < 1.2 * found.whitened.rows
+    # what is settled is left where it is
+    left = fitted(case.model, [once], case.records, [{**case.base.point, **begin}], 30,
+                  settled=frozenset({"disturbance"}))
+    assert left is not None and left.minimum.chi2 > found.minimum.chi2 + 20

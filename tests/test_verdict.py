@@ -219,6 +219,8 @@ def test_a_formula_is_not_sure_beside_another_law_that_does_about_as_well() -> N
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1013.0, GUARD), hypothesis(1000.0, LAW)]
     given = answered(fits, {"outside": -9.0}, refused=("a",))
     assert given.verdict == "unconfirmed" and "about as well" in given.doubt
+    better = [*fits[:2], hypothesis(1016.0, GUARD), fits[3]]
+    assert answered(better, {"outside": -30.0}, refused=("a",)).verdict != "named"
     assert answered(fits, {"outside": 9.0}, refused=("a",)).verdict == "named"
 
 

@@ -112,14 +112,22 @@ def _fine(error: float, misfit: Callable[[float], float], chi2: float) -> bool:
 
 
 def over_hills(whitened: Whitened, best: Minimum, effect: Candidate, limit: int) -> Minimum:
-    """The lowest of the minima that steps in one parameter lead to, from the lowest so far."""
+    """The lowest of the minima that steps in one parameter lead to, from the lowest so far; what
+    acts once rings alike half a period earlier or later, the other way round.
+    """
     problem = whitened.problem
-    at = [k for k, f in enumerate(problem.free) if f.name == effect.parameters[0].name]
+    first, *more = ([k for k, f in enumerate(problem.free) if f.name == p.name]
+                    for p in effect.parameters)
+    steps = [(share, 0.0) for share in effect.hills]
+    if effect.absent and effect.site.rate:
+        steps += [(-1.0, side * np.pi / effect.site.rate) for side in (-1, 1)]
     for _ in range(HILLS):
         found = []
-        for share in effect.hills:
+        for share, later in steps:
             theta = best.theta.copy()
-            theta[at] *= share
+            theta[first] *= share
+            if later:
+                theta[more[0]] += later
             found.append(minimise(whitened.residual, theta, problem.lower, problem.upper, COARSE,
                                   beyond=partial(lt, best.chi2)))
         lower = min((m for m in found if m is not None), key=lambda m: m.chi2, default=best)

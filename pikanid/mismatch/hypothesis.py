@@ -142,7 +142,7 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         return closest.ask(lambda chi2: size > FAR * (chi2 + rows))
 
     best = descended(whitened, starts, closest, limit, beyond)
-    hilly = [e for e in effects if e.hills and e.key not in settled]
+    hilly = [e for e in effects if (e.hills or e.absent) and e.key not in settled]
     astray = hits(hilly) and bool(starts) and (
         best is None or (lost(best.chi2, rows) and (
             len(effects) == 1 or not beyond(best.chi2))))

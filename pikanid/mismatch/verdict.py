@@ -268,8 +268,8 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
         return answer
     likely = [h for h in ranked if h.effects and not h.known and h not in given
               and h.score(scale) < given[0].score(scale) + BEHIND * WITHIN][:PREDICTED]
-    if any(predict(h) and SAME < criterion(h, predict(h), scale) - _handicap(h) - least < WITHIN
-           for h in likely):
+    apart = [criterion(h, predict(h), scale) - _handicap(h) - least for h in likely if predict(h)]
+    if any(abs(d) > SAME and d < WITHIN for d in apart):
         doubt = "another law outside the catalogue explains it about as well"
         return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
     return replace(found, given=given, verdict="named" if found.verdict == "set" and len(given) == 1
