@@ -53,7 +53,7 @@ def per_row(chi2: float, rows: int) -> float:
 
 
 def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
-               closest: Closest, limit: int, beyond: Callable[[float], bool]) -> Minimum | None:
+              closest: Closest, limit: int, beyond: Callable[[float], bool]) -> Minimum | None:
     """The lowest of the minima that the starts lead to."""
     problem, rows = whitened.problem, max(whitened.rows, 1)
     misfit = partial(per_row, rows=rows)
@@ -80,7 +80,7 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
 
 
 def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: int,
-             beyond: Callable[[float], bool]) -> Minimum | None:
+            beyond: Callable[[float], bool]) -> Minimum | None:
     """A fit that goes on with finer steps where those of its start are too long: a stiff wall met
     in one step takes energy out that a real one gives back.
     """

@@ -152,7 +152,8 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     elif best is not None and not beyond(best.chi2):
         for effect in hilly:
             best = over_hills(whitened, best, effect, limit)
-    best = renewed(whitened, best, closest, limit, beyond)
+    if hilly:
+        best = renewed(whitened, best, closest, limit, beyond)
     if best is None:
         return None
     penalty = _penalty(effects, whitened.rows, choices)
