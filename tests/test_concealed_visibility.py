@@ -201,3 +201,21 @@ def test_what_a_tank_hides_is_seen_part_by_part() -> None:
     flow, friction, bias = found.effects
     # coarse noise hides that the liquid is no pendulum, not that it is held and tilted
     assert flow < 4 < min(friction, bias) and max(friction, bias) <= found.nominal
+
+
+def test_friction_in_a_tank_is_fitted_from_several_sizes() -> None:
+    """What sticks has many minima, and the first one that is met may be far from the lowest."""
+    ratio = 0.01
+    tank = Tank(0.033, 0.09, (ratio, 0.0115, 0.0205, 0.0252, 0.0266), 1.5e-4)
+    rate = float(np.sqrt(9.81 / tank.length))
+    base = Rig(length=tank.length, damping=2 * ratio * rate * Rig().mass)
+    noise = Noise("white", np.pi / 180)
+    train, _ = pair("rich", np.random.default_rng(1), rate / (2 * np.pi),
+                    lambda e: measured(base, e), 0.15)
+    scales = Scales(0.15, float(np.max(np.abs(train.u_x))), 20.0, rate)
+    truth, parts = measured(tank, train), in_tank(tank).parts
+    found = visibility(truth, train, noise, base, parts, scales)
+    friction = Candidate((parts[1],), scales, train, noise, Rig())
+    best = min(friction.refitted(noise.whitened(truth), np.array([tank.length, d, c]), 25).distance
+               for d in (0.1, 0.2, 0.4) for c in (0.3, 1.0, 2.5))
+    assert found.effects[0] <= 1.05 * best + 0.05

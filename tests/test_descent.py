@@ -8,7 +8,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.hypothesis import extended, fitted
+from pikanid.mismatch.hypothesis import extended, fitted, turned
 from pikanid.mismatch.screen import Screen, law
 from pikanid.mismatch.whitened import Whitened
 
@@ -81,3 +81,38 @@ def test_a_force_local_in_time_is_found_from_another_half_period(periods: float)
     left = fitted(case.model, [once], case.records, [{**case.base.point, **begin}], 30,
                   settled=frozenset({"disturbance"}))
     assert left is not None and left.minimum.chi2 > found.minimum.chi2 + 20
+
+
+@pytest.mark.parametrize("bent_first", [True, False])
+def test_what_a_sensor_does_is_put_in_the_order_that_the_recording_shows(bent_first: bool) -> None:
+    """A sensor that bends and drifts: what drifts is bent, or what is bent drifts."""
+    maps: list[dict[str, str]] = [{"function": "theta + 6.0*theta**3"}, {"drift": "0.004"}]
+    truth = pk.systems.sloshing()
+    for change in maps if bent_first else maps[::-1]:
+        truth = truth.map_output("theta", **change)  # type: ignore[arg-type]  # all text
+    case = opened(truth, pk.excitation.two_pulse(), 0.0004)
+    effects = [next(c for c in case.candidates if c.key == key)
+               for key in ("sensor_drift", "sensor_nonlinearity")]
+    found = fitted(case.model, effects, case.records, [case.base.values], 30)
+    assert found is not None
+    assert found.effects == (tuple(effects) if not bent_first else turned(tuple(effects)))
+    assert found.minimum.chi2 < 1.3 * found.whitened.rows
+    assert found.values["k_y3"] == pytest.approx(6.0, rel=0.05)
+    # the other order does not do
+    other = Whitened(extended(case.model, turned(found.effects)), case.records)
+    theta = [found.values[f.name] for f in other.problem.free]
+    assert other.choose_steps(np.array(theta)) and other.chi2(np.array(theta)) > (
+        found.minimum.chi2 + 20)
+
+
+def test_the_order_is_turned_within_inputs_and_within_outputs() -> None:
+    case = opened(pk.systems.sloshing(), pk.excitation.two_pulse(), 0.002)
+    by_key = {c.key: c for c in case.candidates}
+    keys = ["sensor_drift", "coulomb_friction", "input_saturation", "sensor_nonlinearity",
+            "input_gain", "sensor_saturation"]
+    there = tuple(by_key[k] for k in keys)
+    assert [e.key for e in turned(there)] == [
+        "sensor_saturation", "coulomb_friction", "input_gain", "sensor_nonlinearity",
+        "input_saturation", "sensor_drift"]
+    assert turned(turned(there)) == there
+    assert turned(there[:3]) == there[:3]

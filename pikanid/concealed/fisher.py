@@ -85,6 +85,12 @@ def refit(response: Response, target: Array, start: Array, low: Array, high: Arr
     return Refit(v, r, jacobian)
 
 
+def at(response: Response, target: Array, v: Array, high: Array, scale: Array) -> Refit:
+    """A model as it is at v (p,), not adjusted; arguments as those of `refit`."""
+    now = response(v)
+    return Refit(v, target - now, sensitivities(response, v, now, high, scale))
+
+
 def sensitivities(response: Response, v: Array, at_v: Array, high: Array, scale: Array) -> Array:
     """(N, p) one-sided differences of the response, inwards where v is at its upper bound.
 

@@ -18,16 +18,18 @@ from pikanid.concealed.arrays import Array
 from pikanid.concealed.effect import Effect, Quantity, Scales
 from pikanid.concealed.effects import CATALOGUE
 from pikanid.concealed.experiment import Experiment
-from pikanid.concealed.fisher import MOST_STEPS, Refit, refit, unexplained
+from pikanid.concealed.fisher import MOST_STEPS, Refit, at, refit, unexplained
 from pikanid.concealed.noise import Noise
 from pikanid.concealed.rig import Rig
 from pikanid.concealed.simulate import measured
 
 FROM_NOMINAL, FROM_RIVAL = 5.0, 4.0
 # Rivals that get a rough refit after the screening to first order, and a full one after that.
-ROUGH, FULL = 12, 4
+ROUGH, FULL = 12, 6
 ROUGH_STEPS = 2
-IN_PAIRS = 6, 2  # the same, where one of two effects is replaced
+IN_PAIRS = 6, 4  # the same, where one of two effects is replaced
+# A hidden effect without the others: times its size to first order, dampings, and full refits.
+SIZES, DAMPINGS, ALONE = np.geomspace(0.3, 3.0, 9), 4, 6
 BASE_LOW, BASE_HIGH = np.array([0.003, 0.0]), np.array([1.0, 20.0])
 BASE_SCALE = np.array([0.005, 0.1])
 
@@ -89,11 +91,19 @@ class Candidate:
                 found.append((low, high, typical))
         return found
 
+    def at(self, target: Array, values: Array) -> Refit:
+        """As it is at values (p,), not adjusted to a whitened target (N,)."""
+        low, high, scale = self._box()
+        return at(self.response, target, np.clip(values, low, high), high, scale)
+
     def refitted(self, target: Array, start: Array, steps: int = MOST_STEPS) -> Refit:
         """Adjusted to a whitened target (N,) in at most so many steps."""
+        return refit(self.response, target, start, *self._box(), steps)
+
+    def _box(self) -> tuple[Array, Array, Array]:
+        """(p,) lower and upper bounds and scales."""
         low, high, scale = np.array(self._columns()).reshape(-1, 3).T
-        return refit(self.response, target, start, np.r_[BASE_LOW, low],
-                     np.r_[BASE_HIGH, high], np.r_[BASE_SCALE, scale], steps)
+        return np.r_[BASE_LOW, low], np.r_[BASE_HIGH, high], np.r_[BASE_SCALE, scale]
 
 
 def starts(effect: Effect, scales: Scales) -> Iterator[Array]:
@@ -135,22 +145,25 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
     clean = Candidate((), scales, experiment, noise, Rig())
     rivals = [c for c in CATALOGUE
               if len(true_effects) != 1 or is_rival(c, true_effects[0])]
+    bare = np.array([base.length, base.damping])
     if true_effects and nominal.distance > 1.0:
-        contest.enter(clean, nominal, rivals)
+        contest.enter(clean, (nominal, clean.at(target, bare)), rivals)
     without = [nominal.distance] * len(true_effects)
     if len(true_effects) > 1 and nominal.distance > 1.0:
         drawn = {effect: own for own, effect in zip(sizes, true_effects, strict=False)}
         for k, other in enumerate(true_effects):
             kept = [e for e in true_effects if e is not other and e.kind == "catalogue"]
-            part, fit = clean, nominal
+            part, fit, anchor = clean, nominal, clean.at(target, bare)
             for effect in kept:
                 part = replace(part, effects=(*part.effects, effect))
-                fit = contest.alone(part, fit, effect, _at_truth(part.effects, base, drawn))
+                fit = contest.alone(part, (fit, anchor), effect,
+                                    _at_truth(part.effects, base, drawn))
+                anchor = part.at(target, np.r_[bare, fit.values[len(bare):]])
             without[k] = fit.distance
             same = {name for e in kept for name in (e.id, *e.twins)}
             others = [c for c in CATALOGUE if is_rival(c, other) and c.id not in same]
             if kept:
-                contest.enter(part, fit, others, *IN_PAIRS)
+                contest.enter(part, (fit, anchor), others, *IN_PAIRS)
     names, distance = contest.winner()
     return Visibility(nominal.distance, names, min(distance, nominal.distance), tuple(without),
                       float(nominal.values[0]), float(nominal.values[1]))
@@ -173,26 +186,49 @@ class _Contest:
         # By effects, not by their ids: variants of one id have other quantities.
         self.fits: dict[tuple[Effect, ...], Refit] = {}
 
-    def enter(self, against: Candidate, fit: Refit, rivals: Sequence[Effect],
+    def enter(self, against: Candidate, fits: Sequence[Refit], rivals: Sequence[Effect],
               rough: int = ROUGH, full: int = FULL) -> None:
-        """Let rivals extend a fitted candidate, and refit the most promising."""
+        """Let rivals extend a candidate at several values, and refit the most promising.
+
+        Where a candidate is fitted, its damping has taken the place of what may be missing (dry
+        friction above all), and a rival begun there finds nothing left to do: it is begun at the
+        true damping as well.
+        """
         candidates = [
             Candidate((*against.effects, rival), self.scales, self.experiment, self.noise, Rig())
             for rival in rivals]
-        screened = [(c, *self._screen(c, fit, rival))
-                    for c, rival in zip(candidates, rivals, strict=True)]
-        # Stable sorts: of equals the first in the catalogue comes first, in every run.
-        screened.sort(key=lambda entry: -entry[1])
-        roughly = [(c, c.refitted(self.target, start, ROUGH_STEPS))
-                   for c, _, start in screened[:rough]]
-        roughly.sort(key=lambda entry: entry[1].distance)
-        for candidate, found in roughly[:full]:
+        best: dict[tuple[Effect, ...], tuple[Candidate, Refit]] = {}
+        for fit in fits:
+            screened = [(c, *self._screen(c, fit, rival))
+                        for c, rival in zip(candidates, rivals, strict=True)]
+            # Stable sorts: of equals the first in the catalogue comes first, in every run.
+            screened.sort(key=lambda entry: -entry[1])
+            for c, _, start in screened[:rough]:
+                found = c.refitted(self.target, start, ROUGH_STEPS)
+                if c.effects not in best or found.distance < best[c.effects][1].distance:
+                    best[c.effects] = c, found
+        closest = sorted(best.values(), key=lambda entry: entry[1].distance)
+        for candidate, found in closest[:full]:
             self._keep(candidate, candidate.refitted(self.target, found.values))
 
-    def alone(self, candidate: Candidate, nominal: Refit, effect: Effect,
+    def alone(self, candidate: Candidate, fits: Sequence[Refit], effect: Effect,
               more: Sequence[Array]) -> Refit:
-        """One effect alone, refitted from where it does most to first order, and from more."""
-        for start in [self._screen(candidate, nominal, effect)[1], *more]:
+        """One effect alone, refitted from where it does most to first order, and from more.
+
+        Where its true size is not known, from others and other dampings as well: what sticks has
+        many minima.
+        """
+        begun = [*more, *(self._screen(candidate, fit, effect)[1] for fit in fits)]
+        beside: list[Array] = []
+        if effect.quantities and not more:
+            size = len(fits[0].values)
+            dampings = np.geomspace(*(max(fit.values[1], 1e-3) for fit in fits), DAMPINGS)
+            for start, factor, damping in product(begun, SIZES, dampings):
+                beside.append(start.copy())
+                beside[-1][1], beside[-1][size] = damping, factor * start[size]
+        roughly = [candidate.refitted(self.target, start, ROUGH_STEPS) for start in beside]
+        roughly.sort(key=lambda fit: fit.distance)
+        for start in [*begun, *(found.values for found in roughly[:ALONE])]:
             self._keep(candidate, candidate.refitted(self.target, start))
         return self.fits[candidate.effects]
 

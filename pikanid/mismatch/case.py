@@ -14,6 +14,7 @@ from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.in_turn import side_by_side
 from pikanid.mismatch.judge import HeldOut, held_out
+from pikanid.mismatch.least_squares import minimise
 from pikanid.mismatch.outliers import without_lone
 from pikanid.mismatch.preparation import with_refined_noise
 from pikanid.mismatch.remainder import residual_tests
@@ -21,11 +22,12 @@ from pikanid.mismatch.repeats import Repeats
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
 from pikanid.mismatch.verdict import WORTH
-from pikanid.mismatch.whitened import Records
+from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
 
 SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
 EXPLAINED = 0.05  # p-value above which a search need not go on
+AGAIN = 5  # iterations of a fit where nothing but the noise is another
 SAME, SAME_RHO = 0.05, 0.06  # changes of a noise level, and its correlation, that make none
 BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
 
@@ -77,18 +79,32 @@ class Case:
         # a large misfit may have led the nominal model's natural frequency far away
         here = self.model.with_values({n: best.values[n] for n in self.model.free_names})
         rate = sites(here, self.records.recordings)[0].rate
-        new, count = with_refined_noise(self.records, fit, rate, quiet, self.adequate(best))
+        explained = self.adequate(best)
+        new, count = with_refined_noise(self.records, fit, rate, quiet, explained)
         note_outliers(count, "the recording", self.notes)
-        same = all(
-            abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO
-            for a, b in zip(self.records.levels, new.levels, strict=True) for o in a)
-        if same and not count:
+        if not explained:
+            # high frequencies tell little of the colour of noise: it may be all that is left
+            other, _ = with_refined_noise(self.records, fit, rate, quiet, True)
+            if not _same(other, new) and self._clears(best, other):
+                new = other
+        if _same(self.records, new) and not count:
             return False
         self.records = new
         self.resumed(self.search)
         if self.later is not None:
             self.later = self.later.with_levels(new.levels[0])
         return True
+
+    def _clears(self, h: Hypothesis, records: Records) -> bool:
+        """Whether nothing is left where the noise is as these records have it."""
+        whitened = Whitened(h.model, records)
+        problem = whitened.problem
+        if not whitened.choose_steps(h.minimum.theta):
+            return False
+        found = minimise(whitened.residual, h.minimum.theta, problem.lower, problem.upper, AGAIN)
+        return found is not None and residual_tests(
+            whitened, found.theta, found.r, found.J, self.candidates, self.rate
+        ).p_value > EXPLAINED
 
     def clear_later(self, best: Hypothesis) -> None:
         """Leave the outliers of the held-out recordings out that the best prediction shows."""
@@ -135,6 +151,11 @@ class Case:
         old, new, nominal = (self.predicted(h) for h in (fewer, more, self.base))
         return old is None or nominal is None or (
             new is not None and new.rmse < min(BETTER * old.rmse, old.rmse - WORTH * nominal.rmse))
+
+
+def _same(one: Records, other: Records) -> bool:
+    return all(abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO
+               for a, b in zip(one.levels, other.levels, strict=True) for o in a)
 
 
 def note_outliers(count: int, where: str, notes: list[str]) -> None:

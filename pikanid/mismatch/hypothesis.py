@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from pikanid.model import Model
 
 LIMIT = 30  # iterations of a fit
 HURRIED = 12  # and of one among gross misfits
+TURNED = 1.0  # of χ²: what the order in which inputs or outputs are changed has to matter
 FAR = 2.0  # times the closest χ², and that of the noise: fits above both together are given up
 
 
@@ -157,7 +159,37 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     if best is None:
         return None
     penalty = _penalty(effects, whitened.rows, choices)
-    return Hypothesis(tuple(effects), model, whitened, best, penalty)
+    found = Hypothesis(tuple(effects), model, whitened, best, penalty)
+    if not beyond(best.chi2):
+        found = _turned(found, nominal, records, closest, limit, beyond) or found
+    return found
+
+
+def _turned(found: Hypothesis, nominal: Model, records: Records, closest: Closest, limit: int,
+            beyond: Callable[[float], bool]) -> Hypothesis | None:
+    """The fit with what happens to inputs, and to outputs, in the opposite order, where that is
+    closer: a sensor that bends and drifts may bend first.
+    """
+    effects = turned(found.effects)
+    if effects == found.effects:
+        return None
+    model = extended(nominal, effects)
+    whitened = Whitened(model, records)
+    theta = place(whitened, found.point)
+    if not closest.choose_steps(whitened, theta, partial(per_row, rows=max(whitened.rows, 1))) or \
+            abs(whitened.chi2(theta) - found.minimum.chi2) < TURNED:
+        return None
+    best = descended(whitened, [found.point], closest, limit, beyond)
+    if best is None or best.chi2 > found.minimum.chi2 - TURNED:
+        return None
+    return Hypothesis(effects, model, whitened, best, found.penalty)
+
+
+def turned(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """Effects in the opposite order within the channels where the order counts."""
+    last = {channel: [e for e in effects if e.channel == channel]
+            for channel in ("input", "sensor")}
+    return tuple(last[e.channel].pop() if e.channel in last else e for e in effects)
 
 
 def _penalty(effects: Sequence[Candidate], rows: int, choices: int) -> float:

@@ -25,7 +25,9 @@ BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any
 BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
 GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
 UNKNOWN = 0.6  # relative standard error of a power, at most: then it is known by its order only
-REFUTED = 2.0  # standard errors of a power by which what a fit leaves differs from it
+REFUTED = 2.0  # standard errors of a power by which less than that is left by a fit
+UNLIKELY = 4.6  # of log-likelihood that what all frequencies say may cost: one time in a hundred
+Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
 CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
@@ -158,11 +160,12 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     sigma, rho, spread = _whittle(spectra, given)
     # What a fit leaves at all frequencies is noise and misfit: it may be more than noise, not less.
     # A stretch in which a motion dies out is no quiet one, and the shape of high frequencies can
-    # mislead.  What explains all that a test sees leaves no more than an error of the noise.
+    # mislead.  What explains all that a test sees leaves noise alone: it is read at all
+    # frequencies, unless where noise was sure that makes it unlikely.
     every = (omega > 0) & (omega < 0.97 * np.pi)
     whole = _whittle([(omega[every], power[every], 0.9 * share)], given)
-    margin = float(np.exp(REFUTED * spread * (1 if explained else -1)))
-    if _power(*whole[:2], low) < _power(sigma, rho, low) * margin:
+    if (_against(spectra, *whole[:2]) - _against(spectra, sigma, rho) < UNLIKELY if explained else
+            _power(*whole[:2], low) < _power(sigma, rho, low) * np.exp(-REFUTED * spread)):
         sigma, rho, spread = whole
         source = "the residual at all frequencies"
     if given is not None:
@@ -196,31 +199,41 @@ def bridged(grid: np.ndarray) -> np.ndarray:
     return np.asarray(np.fft.rfft(lags).real / n)
 
 
-def _whittle(spectra: list[tuple[np.ndarray, np.ndarray, float]], given: float | None
-             ) -> tuple[float, float, float]:
+def _whittle(spectra: list[Spectrum], given: float | None) -> tuple[float, float, float]:
     """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`."""
-    costs, scales = [], []
-    omega = np.concatenate([o for o, _, _ in spectra])
-    weights = np.concatenate([np.full(len(o), w) for o, _, w in spectra])
-    total = float(np.sum(weights))
+    total = sum(w * len(o) for o, _, w in spectra)
+    scales = []
     for rho in GRID:
-        shapes = [_shape(rho, o) for o, _, _ in spectra]
-        power = sum(w * np.sum(_calm(p / s)) for (_, p, w), s in zip(spectra, shapes, strict=True))
-        scale = power / total if given is None else given**2 * (1 - rho**2)
-        costs.append(total * np.log(scale) + power / scale + sum(
-            w * np.sum(np.log(s)) for (_, _, w), s in zip(spectra, shapes, strict=True)))
-        scales.append(scale)
-    best = likeliest(np.array(costs), total)
-    rho, scale = float(GRID[best]), float(scales[best])
+        power = sum(w * np.sum(_calm(p / _shape(rho, o))) for o, p, w in spectra)
+        scales.append(power / total if given is None else given**2 * (1 - rho**2))
+    sigmas = np.sqrt(np.array(scales) / (1 - GRID**2))
+    costs = np.array([_against(spectra, *level) for level in zip(sigmas, GRID, strict=True)])
+    best = likeliest(costs, total)
     spread = 1.0 / np.sqrt(total)
-    if 0 < best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
-        # q and ρ are wrong together, by what the likelihood is expected to leave: its curvature as
-        # found jumps where ordinates are limited
-        by_rho = float(np.gradient(np.log(scales), GRID)[best])
-        rho_std = 1.0 / np.sqrt(np.sum(weights * (_slope(rho, omega) + by_rho) ** 2))
-        low = np.linspace(0.0, spectra[0][0][0], 50)
-        spread = float(np.hypot(spread, np.mean(_slope(rho, low) + by_rho) * rho_std))
-    return float(np.sqrt(scale / (1 - rho**2))), rho, min(spread, UNKNOWN)
+    if best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
+        # the curvature at the best ρ says too little: far smaller ones may be nearly as likely
+        low = spectra[0][0][0]
+        powers = np.log([_power(*level, low) for level in zip(sigmas, GRID, strict=True)])
+        likely = np.exp(costs.min() - costs) / len(GRID)
+        likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
+        spread = float(np.hypot(spread, _two_thirds(np.abs(powers - powers[best]), likely)))
+    return float(sigmas[best]), float(GRID[best]), min(spread, UNKNOWN)
+
+
+def _two_thirds(distances: np.ndarray, weights: np.ndarray) -> float:
+    """Below which 68 % of the weight lies."""
+    order = np.argsort(distances)
+    share = np.cumsum(weights[order]) / np.sum(weights)
+    return float(np.interp(0.683, share, distances[order]))
+
+
+def _against(spectra: list[Spectrum], sigma: float, rho: float) -> float:
+    """-ln of the likelihood of AR(1) noise."""
+    cost, scale = 0.0, sigma**2 * (1 - rho**2)
+    for omega, power, weight in spectra:
+        expected = scale * _shape(rho, omega)
+        cost += weight * float(np.sum(_calm(power / expected) + np.log(expected)))
+    return cost
 
 
 def _power(sigma: float, rho: float, top: float) -> float:
@@ -231,11 +244,6 @@ def _power(sigma: float, rho: float, top: float) -> float:
 def _shape(rho: float, omega: np.ndarray) -> np.ndarray:
     """1/|1 - ρ exp(-iω)|²: the spectrum of AR(1) noise."""
     return np.asarray(1.0 / (1 - 2 * rho * np.cos(omega) + rho**2))
-
-
-def _slope(rho: float, omega: np.ndarray) -> np.ndarray:
-    """∂/∂ρ of its logarithm."""
-    return np.asarray(2 * (np.cos(omega) - rho) * _shape(rho, omega))
 
 
 def likeliest(costs: np.ndarray, total: float) -> int:
