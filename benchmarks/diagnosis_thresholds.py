@@ -56,7 +56,7 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
                  "sizing": "*"},
     LONGER: {"case": "SEARCHED", "preparation": "LONG FINE", "remainder": "MOST_ROWS"},
     REPEATED: {"repeats": "*"},
-    STEPS: {"api": "RELEVELLED", "descent": "HILLS COARSE RENEWED",
+    STEPS: {"api": "RELEVELLED ASKED", "case": "AGAIN", "descent": "HILLS COARSE RENEWED",
             "growing": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED", "judge": "AGAIN",
             "least_squares": "PATIENCE", "tangent": "*", "whitened": "FINEST"},
     "number of threads": {"in_turn": "*"},

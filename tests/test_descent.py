@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import pikanid as pk
 from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.hypothesis import extended, fitted, turned
+from pikanid.mismatch.hypothesis import extended, fitted, read_otherwise, turned
 from pikanid.mismatch.screen import Screen, law
 from pikanid.mismatch.whitened import Whitened
 
@@ -116,3 +118,28 @@ def test_the_order_is_turned_within_inputs_and_within_outputs() -> None:
         "input_saturation", "sensor_drift"]
     assert turned(turned(there)) == there
     assert turned(there[:3]) == there[:3]
+
+
+@pytest.mark.parametrize("directly", [True, False])
+def test_a_leak_reaches_a_second_mode_or_not_as_the_recording_shows(directly: bool) -> None:
+    rng = np.random.default_rng(4)
+    recording = pk.excitation.planar_moves(6, 10.0, seed=2)
+    t = recording["u_x"].time
+    knots = np.arange(0.0, t[-1] + 1.0, 0.25)
+    leaking = np.interp(t, knots, rng.normal(size=len(knots)))
+    recording = recording.with_channels(replace(recording["u_x"], name="u_y", values=leaking))
+    case = opened(pk.systems.sloshing(), recording, 0.002)
+    mode, leak = (next(c for c in case.candidates if c.key == key)
+                  for key in ("second_mode", "cross_axis[u_y]"))
+    pair, true = (mode, leak), {"a_2": -60.0, "omega_2": 46.0, "zeta_2": 0.03, "l_theta": 0.045,
+                                "d_theta": 0.15, "kappa_u_y": 0.6}
+    truth = extended(case.model, read_otherwise(pair) if directly else pair).with_values(true)
+    case = opened(truth, recording, 0.001)
+    begin = {**true, "a_2": -50.0, "omega_2": 44.0, "kappa_u_y": 0.4}
+    found = fitted(pk.systems.sloshing(), pair, case.records, [begin], 30)
+    assert found is not None
+    assert found.effects[1].extend is (leak.other if directly else leak.extend)
+    assert found.minimum.chi2 < 1.2 * found.whitened.rows
+    assert found.values["kappa_u_y"] == pytest.approx(0.6, abs=0.01)
+    assert found.values["omega_2"] == pytest.approx(46.0, abs=0.5)
+    assert read_otherwise((leak,)) == (leak,)

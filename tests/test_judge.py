@@ -11,7 +11,7 @@ import pikanid as pk
 from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.hypothesis import extended, fitted
-from pikanid.mismatch.judge import _from_levels, _room
+from pikanid.mismatch.judge import _from_levels, _room, held_out
 from pikanid.mismatch.least_squares import minimise
 from pikanid.mismatch.prior import Prior
 from pikanid.mismatch.whitened import Whitened
@@ -110,3 +110,26 @@ def test_no_prediction_counts_on_a_better_fit_of_the_first_recording() -> None:
     whole, later = case.predicted(h), case.predicted(short)
     assert whole is not None and later is not None
     assert later.chi2 > whole.chi2 - 1
+
+
+@pytest.mark.parametrize(("depth", "seed"), [(0.97, 2), (0.985, 4), (0.99, 1)])
+def test_a_wall_that_was_hardly_touched_predicts_a_hard_hit(depth: float, seed: int) -> None:
+    """From there its stiffness is known within a factor of ten, and of no use as a straight line:
+    without a fit of both recordings the misfit of the second one is 12 to 2000 times the noise.
+    """
+    train = pk.excitation.two_pulse()
+    later = train.with_channels(replace(train["u_x"], values=1.5 * train["u_x"].values))
+    top = float(np.max(pk.simulate(pk.systems.sloshing(), train)["theta"].values))
+    truth = pk.systems.sloshing().with_term("theta_dot", f"-6000*max(theta - {depth * top}, 0)")
+    seen = [pk.simulate(truth, r, sigma=0.0017, seed=seed + k)
+            for k, r in enumerate((train, later))]
+    case = _opened(pk.systems.sloshing(), (seen[0],), (seen[1],), None, lambda text: None)
+    wall = next(c for c in case.candidates if c.key == "wall_impact")
+    begin = {"wall": 0.95 * depth * top, "k_wall": 60.0, "l_theta": 0.045, "d_theta": 0.15}
+    found = fitted(case.model, [wall], case.records, [begin], 30)
+    assert found is not None and case.later is not None
+    predicted = held_out(found, case.model, case.later, case.candidates, case.rate)
+    assert predicted is not None
+    # noise, and what the move costs the first recording
+    assert predicted.chi2 < 501 + 4 * np.sqrt(2 * 501)
+    assert predicted.rmse_moved == pytest.approx(0.0017, rel=0.1)

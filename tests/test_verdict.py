@@ -148,6 +148,16 @@ def test_an_effect_must_show_where_it_was_found() -> None:
     assert answered([*fits[:2], hypothesis(980.0, A, B)], evidence).verdict == "named"
 
 
+def test_no_name_is_sure_while_what_is_refused_does_far_better() -> None:
+    """It is a part of the truth, or close to it."""
+    fits = [BASE, hypothesis(1000.0, A), hypothesis(1003.0, B)]
+    sure = answered(fits, {"b": -5.0}, refused=("b",))
+    assert (sure.verdict, sure.given[0].key) == ("named", {"a"})
+    doubted = answered(fits, {"b": -12.0}, refused=("b",))
+    assert (doubted.verdict, doubted.given[0].key) == ("unconfirmed", {"a"})
+    assert doubted.doubt == "what explains it far better leaves something unexplained"
+
+
 def test_no_proof_is_asked_of_a_limit_that_is_not_met() -> None:
     fits = [BASE, hypothesis(1300.0, A), hypothesis(1900.0, B), hypothesis(1000.0, A, B)]
     evidence = {"": 500.0, "a": 1.0, "b": 300.0}

@@ -222,7 +222,8 @@ class _Contest:
         beside: list[Array] = []
         if effect.quantities and not more:
             size = len(fits[0].values)
-            dampings = np.geomspace(*(max(fit.values[1], 1e-3) for fit in fits), DAMPINGS)
+            low, *_, high = sorted(max(float(fit.values[1]), 1e-3) for fit in fits)
+            dampings = np.geomspace(low, high, DAMPINGS)
             for start, factor, damping in product(begun, SIZES, dampings):
                 beside.append(start.copy())
                 beside[-1][1], beside[-1][size] = damping, factor * start[size]

@@ -39,6 +39,7 @@ from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
 RELEVELLED = 3  # times that the noise is read from what the best explanation leaves, at most
+ASKED = 3  # times that rivals of what is given are looked for
 
 Recordings = Recording | Sequence[Recording]
 
@@ -125,9 +126,12 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
         tell("confirmation")
         case.clear_later(ranked[0])
         answer = _settled(case, ranked)
-        if search.closer(answer.given):
+        for _ in range(ASKED):
+            before = {h.fit for h in search.ranked()}
+            if not search.closer(answer.given):
+                break
             # one that is better has rivals of its own
-            known = search.ranked()[0].fit in {h.fit for h in ranked}
+            known = search.ranked()[0].fit in before
             answer = _settled(case, search.ranked() if known else search.grow(case.adequate))
     shape = None
     if answer.verdict != "none":

@@ -77,6 +77,7 @@ class Candidate:
             comes to rest between two samples.
         levels: Values of its parameters, from the best of which a fit begins where the model is far
             off: no first step leads to them.
+        other: Adds it in another reading, which makes a difference beside other effects only.
         beside: Ids of effects, one of which has to be there: without them it is a twin of another
             entry.
     """
@@ -99,6 +100,7 @@ class Candidate:
     hills: tuple[float, ...] = ()
     levels: tuple[Mapping[str, float], ...] = ()
     beside: tuple[str, ...] = ()
+    other: Callable[[Model], Model] | None = None
 
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these."""

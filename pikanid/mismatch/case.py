@@ -21,7 +21,7 @@ from pikanid.mismatch.remainder import residual_tests
 from pikanid.mismatch.repeats import Repeats
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
-from pikanid.mismatch.verdict import WORTH
+from pikanid.mismatch.verdict import ADEQUATE, WORTH
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
 
@@ -104,7 +104,7 @@ class Case:
         found = minimise(whitened.residual, h.minimum.theta, problem.lower, problem.upper, AGAIN)
         return found is not None and residual_tests(
             whitened, found.theta, found.r, found.J, self.candidates, self.rate
-        ).p_value > EXPLAINED
+        ).p_value > ADEQUATE
 
     def clear_later(self, best: Hypothesis) -> None:
         """Leave the outliers of the held-out recordings out that the best prediction shows."""

@@ -6,12 +6,14 @@ from collections.abc import Callable, Sequence
 
 from pikanid.mismatch import channels, forces, guards, late_inputs
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.cross_axis import cross_axis
+from pikanid.mismatch.second_mode import second_mode
 from pikanid.mismatch.site import Site
 
 ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
     forces.coulomb_friction, forces.quadratic_drag, forces.power_drag, forces.amplitude_damping,
-    forces.cubic_stiffness, forces.static_bias, forces.parameter_drift, channels.second_mode,
-    forces.wall_impact, channels.cross_axis, forces.disturbance, forces.boundary_layer,
+    forces.cubic_stiffness, forces.static_bias, forces.parameter_drift, second_mode,
+    forces.wall_impact, cross_axis, forces.disturbance, forces.boundary_layer,
     forces.hysteresis, channels.delay, late_inputs.input_delay, channels.lags, channels.input_gain,
     channels.sensor_gain, channels.input_limits, channels.input_backlash, channels.sensor_offset,
     channels.sensor_drift, channels.sensor_saturation, channels.sensor_nonlinearity,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,7 +18,7 @@ from pikanid.model import Model
 
 LIMIT = 30  # iterations of a fit
 HURRIED = 12  # and of one among gross misfits
-TURNED = 1.0  # of χ²: what the order in which inputs or outputs are changed has to matter
+OTHER = 1.0  # of χ²: what another way to put the same effects together has to matter
 FAR = 2.0  # times the closest χ², and that of the noise: fits above both together are given up
 
 
@@ -160,33 +160,37 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         return None
     penalty = _penalty(effects, whitened.rows, choices)
     found = Hypothesis(tuple(effects), model, whitened, best, penalty)
-    if not beyond(best.chi2):
-        found = _turned(found, nominal, records, closest, limit, beyond) or found
+    for other in (turned(found.effects), read_otherwise(found.effects)):
+        if other != found.effects and not beyond(found.minimum.chi2):
+            found = _instead(found, other, nominal, closest, limit, beyond) or found
     return found
 
 
-def _turned(found: Hypothesis, nominal: Model, records: Records, closest: Closest, limit: int,
-            beyond: Callable[[float], bool]) -> Hypothesis | None:
-    """The fit with what happens to inputs, and to outputs, in the opposite order, where that is
-    closer: a sensor that bends and drifts may bend first.
-    """
-    effects = turned(found.effects)
-    if effects == found.effects:
-        return None
+def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, closest: Closest,
+             limit: int, beyond: Callable[[float], bool]) -> Hypothesis | None:
+    """The fit with the same effects put together in another way, where that is closer."""
     model = extended(nominal, effects)
-    whitened = Whitened(model, records)
+    whitened = Whitened(model, found.whitened.records)
     theta = place(whitened, found.point)
     if not closest.choose_steps(whitened, theta, partial(per_row, rows=max(whitened.rows, 1))) or \
-            abs(whitened.chi2(theta) - found.minimum.chi2) < TURNED:
+            abs(whitened.chi2(theta) - found.minimum.chi2) < OTHER:
         return None
     best = descended(whitened, [found.point], closest, limit, beyond)
-    if best is None or best.chi2 > found.minimum.chi2 - TURNED:
+    if best is None or best.chi2 > found.minimum.chi2 - OTHER:
         return None
     return Hypothesis(effects, model, whitened, best, found.penalty)
 
 
+def read_otherwise(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """Several effects, those with another reading in that one."""
+    return tuple(replace(e, extend=e.other, other=e.extend)
+                 if e.other is not None and len(effects) > 1 else e for e in effects)
+
+
 def turned(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
-    """Effects in the opposite order within the channels where the order counts."""
+    """What happens to inputs, and to outputs, in the opposite order: a sensor that bends and drifts
+    may bend first.
+    """
     last = {channel: [e for e in effects if e.channel == channel]
             for channel in ("input", "sensor")}
     return tuple(last[e.channel].pop() if e.channel in last else e for e in effects)

@@ -164,8 +164,9 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     # frequencies, unless where noise was sure that makes it unlikely.
     every = (omega > 0) & (omega < 0.97 * np.pi)
     whole = _whittle([(omega[every], power[every], 0.9 * share)], given)
-    if (_against(spectra, *whole[:2]) - _against(spectra, sigma, rho) < UNLIKELY if explained else
-            _power(*whole[:2], low) < _power(sigma, rho, low) * np.exp(-REFUTED * spread)):
+    louder = np.log(_power(*whole[:2], low) / _power(sigma, rho, low))
+    dearer = _against(spectra, *whole[:2]) - _against(spectra, sigma, rho)
+    if louder < -REFUTED * spread or (explained and (louder < 0 or dearer < UNLIKELY)):
         sigma, rho, spread = whole
         source = "the residual at all frequencies"
     if given is not None:

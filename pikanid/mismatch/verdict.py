@@ -141,6 +141,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if proves and not known[0].symbolic and any(
             total(h) - _handicap(h) < least - margin for h in outside):
         doubt = "a law outside the catalogue explains it better"
+    if proves and any(total(h) < least - WITHIN for h in near if h.key in reasons):
+        doubt = doubt or "what explains it far better leaves something unexplained"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]

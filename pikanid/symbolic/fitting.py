@@ -255,7 +255,9 @@ def _covariance(form: Form, curve: Curve, p: Array, raw: Array, a: Array, base: 
     size = np.linalg.norm(J, axis=0)
     flat = size <= 0.0
     size[flat] = 1.0
-    inverse = np.linalg.pinv((J / size).T @ (J / size), 1e-13, True) / np.outer(size, size)
+    inverse = np.linalg.pinv((J / size).T @ (J / size), 1e-13, True)
+    with np.errstate(over="ignore"):  # of a column that is next to nothing nothing is known
+        inverse = inverse / size[:, None] / size
     inverse[flat] = inverse[:, flat] = np.nan
     keep = len(a) + q + 1
     return np.asarray(inverse[:keep, :keep])
