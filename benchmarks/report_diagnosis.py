@@ -50,9 +50,9 @@ class Set:
 
 
 SETS = (
-    Set("rich", "rich", 0.1 * DEGREE, 20401),
-    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20402),
-    Set("rich_1deg", "rich", 1.0 * DEGREE, 20403),
+    Set("rich", "rich", 0.1 * DEGREE, 20431),
+    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20432),
+    Set("rich_1deg", "rich", 1.0 * DEGREE, 20433),
 )
 
 

@@ -99,12 +99,6 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     if not whitened.choose_steps(guess, misfit=misfit):
         return None
 
-    def known_before(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rows = np.zeros((len(prior.root), len(theta)))
-        rows[:, shared] = prior.root
-        return prior.residual(theta[shared]), rows
-
-    evaluate = besides(whitened, known_before)
     own = np.array([k not in shared for k in range(len(free))])
     if own.any():
         begun = own_beginning(whitened.problem, guess, tuple({c.site.q: c.site
@@ -114,31 +108,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
                          np.where(own, whitened.problem.upper, guess), 40)
         if first is not None:
             guess = first.theta
-    found = minimise(evaluate, guess, whitened.problem.lower, whitened.problem.upper, 25)
-    suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects)
-    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
-        found = min(found, grown(whitened, effects, guess, known_before) or found,
-                    key=lambda m: m.chi2)
-    for _ in range(AGAIN):
-        if found is None or prior.distance(found.theta[shared]) < NEAR:
-            break
-        anew = elsewhere(prior, hypothesis, found.theta[shared])
-        if anew is None:
-            break
-        prior = anew
-        found = minimise(evaluate, found.theta, whitened.problem.lower, whitened.problem.upper, 25)
-    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
-        # a wall that was hardly touched is stiffer than any line from there leads to
-        both = _fitted_together(hypothesis, whitened, found, whitened.rows)
-        anew = both and elsewhere(prior, hypothesis, _part(both, whitened)[shared])
-        if both is not None and anew:
-            before, prior = prior, anew
-            other = minimise(evaluate, _part(both, whitened), whitened.problem.lower,
-                             whitened.problem.upper, 25)
-            if other and other.chi2 + prior.constant < found.chi2 + before.constant:
-                found = other
-            else:
-                prior = before
+    found, prior = _moved(hypothesis, whitened, guess, shared, prior)
     if found is None or not np.isfinite(found.J).all():
         return None
     tests = functools.partial(residual_tests, whitened, found.theta, found.r, found.J, candidates,
@@ -158,6 +128,45 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
                    samples.t, samples.y, predicted, moved, _rmse(closer),
                    tuple(_residuals(whitened, gaps)), found.r[: whitened.rows],
                    _inert(whitened, found))
+
+
+def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared: list[int],
+           prior: Prior) -> tuple[Minimum | None, Prior]:
+    """Where parameters suit both a recording and a prior, and that prior, linearised near there."""
+    problem = whitened.problem
+    effects = [e for e in hypothesis.effects if not e.absent]
+
+    def known_before(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows = np.zeros((len(prior.root), len(theta)))
+        rows[:, shared] = prior.root
+        return prior.residual(theta[shared]), rows
+
+    evaluate = besides(whitened, known_before)
+    found = minimise(evaluate, guess, problem.lower, problem.upper, 25)
+    suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects)
+    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
+        found = min(found, grown(whitened, effects, guess, known_before) or found,
+                    key=lambda m: m.chi2)
+    for _ in range(AGAIN):
+        if found is None or prior.distance(found.theta[shared]) < NEAR:
+            break
+        anew = elsewhere(prior, hypothesis, found.theta[shared])
+        if anew is None:
+            break
+        prior = anew
+        found = minimise(evaluate, found.theta, problem.lower, problem.upper, 25)
+    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
+        # a wall that was hardly touched is stiffer than any line from there leads to
+        both = _fitted_together(hypothesis, whitened, found, whitened.rows)
+        anew = both and elsewhere(prior, hypothesis, _part(both, whitened)[shared])
+        if both is not None and anew:
+            before, prior = prior, anew
+            other = minimise(evaluate, _part(both, whitened), problem.lower, problem.upper, 25)
+            if other and other.chi2 + prior.constant < found.chi2 + before.constant:
+                found = other
+            else:
+                prior = before
+    return found, prior
 
 
 def _inert(whitened: Whitened, found: Minimum) -> frozenset[str]:

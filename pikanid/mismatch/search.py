@@ -157,7 +157,9 @@ class Search:
                         and h.score(self.scale()) < best.score(self.scale()) + 2 * CLOSE:
                     self._extend(h, MORE)
             self._simplify()
-        for h in self._contenders():
+        # however tired, no name without the laws that keep wrong ones away, of its parts as well
+        parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
+        for h in (*parts, *self._contenders()):
             for job in with_wider(h, self.candidates):
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
@@ -226,8 +228,7 @@ class Search:
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
-        scale = self.scale()
-        return sorted(self.fits.values(), key=lambda h: h.score(scale))
+        return sorted(self.fits.values(), key=partial(Hypothesis.score, scale=self.scale()))
 
     def scale(self) -> float:
         """What χ² counts for."""
