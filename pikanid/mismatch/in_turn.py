@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
-AHEAD = 2  # jobs a thread that are begun: none waits for one that takes longer
+AHEAD = 4  # jobs a thread that are begun: few wait for one that takes longer
 USEFUL = 2  # threads: beyond them what is begun ahead is too often begun in vain
 
 Job = TypeVar("Job")
