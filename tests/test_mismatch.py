@@ -169,8 +169,18 @@ def test_a_clean_recording_gets_no_diagnosis(recording: Recording) -> None:
     other = simulate(systems.sloshing(), moves, sigma=SIGMA, seed=4)
     dx = diagnose(systems.sloshing(), recording, other)
     assert dx.verdict == "none" and not dx.mismatch and dx.hypotheses == ()
+    assert not any("held-out" in note for note in dx.notes)
     content = json.loads(json.dumps(dx.to_dict(), allow_nan=False))
     assert content["schema_version"] == 1 and content["hypotheses"] == []
+
+
+def test_a_model_that_fails_on_the_held_out_recording_only_is_not_passed_over(
+        recording: Recording) -> None:
+    moves = excitation.planar_moves(4, 8.0, channels=("u_x", "u_y"), seed=9)
+    truth = systems.sloshing().with_term("theta_dot", "-300*theta**3")
+    dx = diagnose(systems.sloshing(), recording, simulate(truth, moves, sigma=SIGMA, seed=4))
+    assert dx.verdict == "none"
+    assert any("does not predict the held-out one" in note for note in dx.notes)
 
 
 @pytest.mark.slow

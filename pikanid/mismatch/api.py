@@ -206,12 +206,17 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
     best = answer.given[0] if answer.given else case.base
     after = as_estimate(best, case.before) if answer.given else case.before
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
+    proof = _proof(case, answer, best)
+    if answer.verdict == "none" and proof is not None and proof.p_value < alpha:
+        case.notes.append(
+            "Nothing is missing in the recording, but the model does not predict the held-out one "
+            f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
     levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, case.sites[0])
     return Diagnosis(
         answer.verdict, detection.p_value, alpha,
         locate(case.base, best, answer, case.sites, shape, force, alpha),
-        given, rejected, case.before, after, _proof(case, answer, best), tuple(levels),
+        given, rejected, case.before, after, proof, tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
                case.search.workers, bool(answer.doubt)), shape=shape,
