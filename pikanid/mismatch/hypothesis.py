@@ -160,7 +160,8 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         return None
     penalty = _penalty(effects, whitened.rows, choices)
     found = Hypothesis(tuple(effects), model, whitened, best, penalty)
-    for other in (turned(found.effects), read_otherwise(found.effects)):
+    for otherwise in (turned, read_otherwise):
+        other = otherwise(found.effects)
         if other != found.effects and not beyond(found.minimum.chi2):
             found = _instead(found, other, nominal, closest, limit, beyond) or found
     return found

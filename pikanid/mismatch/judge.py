@@ -136,36 +136,35 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
     problem = whitened.problem
     effects = [e for e in hypothesis.effects if not e.absent]
 
-    def known_before(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rows = np.zeros((len(prior.root), len(theta)))
-        rows[:, shared] = prior.root
-        return prior.residual(theta[shared]), rows
+    def known(before: Prior, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows = np.zeros((len(before.root), len(theta)))
+        rows[:, shared] = before.root
+        return before.residual(theta[shared]), rows
 
-    evaluate = besides(whitened, known_before)
-    found = minimise(evaluate, guess, problem.lower, problem.upper, 25)
+    def suited(before: Prior, begin: np.ndarray) -> Minimum | None:
+        return minimise(besides(whitened, functools.partial(known, before)), begin, problem.lower,
+                        problem.upper, 25)
+
+    found = suited(prior, guess)
     suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects)
     if suits and found is not None and rough(found.chi2, whitened.rows, effects):
-        found = min(found, grown(whitened, effects, guess, known_before) or found,
-                    key=lambda m: m.chi2)
+        whole = grown(whitened, effects, guess, functools.partial(known, prior))
+        found = min(found, whole or found, key=lambda m: m.chi2)
     for _ in range(AGAIN):
         if found is None or prior.distance(found.theta[shared]) < NEAR:
             break
         anew = elsewhere(prior, hypothesis, found.theta[shared])
         if anew is None:
             break
-        prior = anew
-        found = minimise(evaluate, found.theta, problem.lower, problem.upper, 25)
+        prior, found = anew, suited(anew, found.theta)
     if suits and found is not None and rough(found.chi2, whitened.rows, effects):
         # a wall that was hardly touched is stiffer than any line from there leads to
         both = _fitted_together(hypothesis, whitened, found, whitened.rows)
-        anew = both and elsewhere(prior, hypothesis, _part(both, whitened)[shared])
-        if both is not None and anew:
-            before, prior = prior, anew
-            other = minimise(evaluate, _part(both, whitened), problem.lower, problem.upper, 25)
-            if other and other.chi2 + prior.constant < found.chi2 + before.constant:
-                found = other
-            else:
-                prior = before
+        begin = None if both is None else _part(both, whitened)
+        anew = None if begin is None else elsewhere(prior, hypothesis, begin[shared])
+        other = None if begin is None or anew is None else suited(anew, begin)
+        if anew and other and other.chi2 + anew.constant < found.chi2 + prior.constant:
+            prior, found = anew, other
     return found, prior
 
 
