@@ -1,20 +1,23 @@
 """The command line: which commands there are, and what becomes of failures.
 
 Exit codes: 0 done; 2 bad input, with one sentence on standard error; 3 fitted, but the model does
-not explain the recording; 130 interrupted; 141 the reader of the output has left.
+not explain the recording; 70 something failed that nobody foresaw, with one sentence that says
+where and how to report it (``--debug`` shows the traceback); 130 interrupted; 141 the reader of
+the output has left.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from typing import Annotated, Any, TextIO
 
 import typer
 
 from pikanid import errors
-from pikanid.commands import interrupts
+from pikanid.commands import interrupts, unforeseen
 from pikanid.commands.conceal import EXAMPLES as CONCEAL
 from pikanid.commands.conceal import conceal
 from pikanid.commands.confusable import EXAMPLES as CONFUSABLE
@@ -36,6 +39,7 @@ from pikanid.commands.simulate import simulate
 from pikanid.commands.study import EXAMPLES as STUDY
 from pikanid.commands.study import study
 
+EXIT_UNFORESEEN = 70  # EX_SOFTWARE of sysexits.h
 EXIT_INTERRUPTED = 130
 EXIT_PIPE = 141  # 128 + SIGPIPE: what other programs end with when nobody reads on
 EXAMPLES = """Examples:
@@ -46,7 +50,8 @@ EXAMPLES = """Examples:
 
   pikanid models sloshing
 
-Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
+Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording, \
+70 a failure of pikanid itself (--debug shows where), 130 interrupted."""
 
 # What typer raises for wrong usage; where its base class lives depends on the version.
 UsageError: Any = typer.BadParameter.__mro__[2]
@@ -70,6 +75,9 @@ app.command(epilog=CONCEAL)(conceal)
 def pikanid(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="print the version")] = False,
+    debug: Annotated[bool, typer.Option(
+        unforeseen.DEBUG, help="show the traceback of a failure of pikanid itself; may stand "
+        "anywhere in the line")] = False,  # taken from the line by `main`
 ) -> None:
     """Parameters of a simulation model from a recording, and how far to trust them."""
     if version:
@@ -90,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     for stream in (sys.stdout, sys.stderr):
         _never_fail_to_print(stream)
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words, debug = unforeseen.without_debug(sys.argv[1:] if arguments is None else arguments)
     try:
         with interrupts.none_lost():
             code = app(args=words, prog_name="pikanid", standalone_mode=False)
@@ -112,10 +120,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain(errors.out_of_memory(), 2)
     except (KeyboardInterrupt, typer.Abort):
         code = EXIT_INTERRUPTED
-    except Exception as failure:
-        # what an import raises that was interrupted half-way; any other failure goes up as it is
+    except Exception as failure:  # the net: the only place that takes what nobody foresaw
+        # an import that was interrupted half-way raises something of its own
         if not interrupts.became(failure):
-            raise
+            if debug:
+                traceback.print_exception(failure)
+            return _complain(unforeseen.sentence(failure, words), EXIT_UNFORESEEN)
         code = EXIT_INTERRUPTED
     if code == EXIT_INTERRUPTED:
         print("Interrupted.", file=sys.stderr)

@@ -973,6 +973,14 @@ def nothing_to_simulate(name: str) -> str:
     return f"'{name}' drives the model with nothing: none of its columns is an input of the model."
 
 
+def unforeseen(command: str, failure: str, place: str) -> str:
+    return (
+        f"pikanid itself failed while running '{_short(command, 400)}': {_short(failure, 200)}"
+        f"{place}. What was written before is kept. Please report this line with the files; "
+        "with --debug the same command shows the traceback."
+    )
+
+
 def out_of_memory() -> str:
     return "There is not enough memory for this: shorten the recording, or thin it with --decimate."
 
