@@ -7,6 +7,7 @@ parameters and returns what the parameters alone cannot do, edge by edge, with b
 from __future__ import annotations
 
 from pikanid.discrepancy.api import kan_discrepancy
-from pikanid.discrepancy.result import Discrepancy, Edge
+from pikanid.discrepancy.edge import Edge
+from pikanid.discrepancy.result import Discrepancy
 
 __all__ = ["Discrepancy", "Edge", "kan_discrepancy"]

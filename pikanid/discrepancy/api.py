@@ -11,13 +11,14 @@ import numpy as np
 from pikanid import errors
 from pikanid.adequacy import judge
 from pikanid.discrepancy.bands import Posterior, holm, likelihood, wald
+from pikanid.discrepancy.edge import Edge
 from pikanid.discrepancy.edges import OFFSET, plan_edges
 from pikanid.discrepancy.functional import relaxed_level
 from pikanid.discrepancy.gauge import Gauge, fix_gauges
 from pikanid.discrepancy.level import Level
 from pikanid.discrepancy.levels import search
 from pikanid.discrepancy.mixture import View, mixed_edge, mixed_plans, views
-from pikanid.discrepancy.result import Discrepancy, Edge
+from pikanid.discrepancy.result import Discrepancy
 from pikanid.estimate import Estimate, total_cost
 from pikanid.model import Input, Model, Parameter, State
 from pikanid.problem import Problem

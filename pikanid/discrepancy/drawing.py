@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pikanid.discrepancy.edge import Edge
 from pikanid.plots import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from pikanid.discrepancy.result import Discrepancy
-
 LINE, FAINT, BAND = "#0072B2", "#777777", "#BBBBBB"
 
 
-def draw(found: Discrepancy) -> Figure:
+def draw(edges: Sequence[Edge], title: str) -> Figure:
     """One axes an edge: value, 95 % band, and below it how often each value was visited."""
-    count = len(found.edges)
+    count = len(edges)
     figure = new_figure(4.0 * count, 3.6)
-    for k, edge in enumerate(found.edges):
+    for k, edge in enumerate(edges):
         axes = figure.add_subplot(1, count, k + 1)
         colour = LINE if edge.significant else FAINT
         low, high = edge.band
@@ -41,21 +41,20 @@ def draw(found: Discrepancy) -> Figure:
         axes.set_ylabel(f"δ [{edge.unit}]" if k == 0 else "")
         verdict = "significant" if edge.significant else "nothing significant"
         axes.set_title(f"{verdict}, p = {edge.p_value:.2g}", fontsize=10)
-    figure.suptitle(f"{found.nominal.model.name}: missing in the equation of {found.equation}")
+    figure.suptitle(title)
     return figure
 
 
-def page(found: Discrepancy) -> str:
+def page(edges: Sequence[Edge], title: str, sentence: str, figure: Figure) -> str:
     """Table, sentence and drawing as HTML."""
     rows = "".join(
         f"<tr><td>{escape(e.argument)}</td><td>{e.range[0]:.4g} ... {e.range[1]:.4g}</td>"
         f"<td>{np.max(np.abs(e.values)):.3g} {escape(e.unit)}</td><td>{e.p_value:.2g}</td>"
-        f"<td>{'yes' if e.significant else 'no'}</td></tr>" for e in found.edges)
+        f"<td>{'yes' if e.significant else 'no'}</td></tr>" for e in edges)
     image = io.BytesIO()
-    found.plot().savefig(image, format="png", dpi=90)
+    figure.savefig(image, format="png", dpi=90)
     data = base64.b64encode(image.getvalue()).decode()
-    return (f"<b>Discrepancy</b> of {escape(found.nominal.model.name)} in the equation of "
-            f"{escape(found.equation)}<table><tr><th>edge</th><th>visited range</th>"
+    return (f"<b>{escape(title)}</b><table><tr><th>edge</th><th>visited range</th>"
             f"<th>largest</th><th>p</th><th>significant</th></tr>{rows}</table>"
-            f"<p>{escape(found.estimate.sentence())}</p>"
+            f"<p>{escape(sentence)}</p>"
             f'<img alt="edges with bands" src="data:image/png;base64,{data}">')

@@ -7,13 +7,12 @@ from functools import partial
 
 import numpy as np
 
+from pikanid.equivalence.agreement import GRADIENTS, MATRICES, difference
 from pikanid.equivalence.ipda import IpdaObjective
 from pikanid.equivalence.optimisers import Path, adam, lbfgs, levenberg_marquardt
 from pikanid.equivalence.report import Check, EquivalenceReport
 from pikanid.equivalence.setting import Array, Form, Setting
 
-MATRICES = 1e-12
-GRADIENTS = 1e-10
 MINIMISERS = 1e-8
 _STEPS = 20
 
@@ -159,12 +158,6 @@ def compare_paths(setting: Setting, *, quick: bool = False) -> tuple[Check, ...]
             found = apart(a.last(), b.last(), basis, outputs)
             rows.append(Check(_SHALLOW, setting.describe(), "minimiser", found, MINIMISERS))
     return tuple(rows)
-
-
-def difference(a: Array, b: Array) -> float:
-    """Largest difference relative to the largest entry."""
-    scale = max(float(np.abs(a).max()), float(np.abs(b).max()))
-    return float(np.abs(a - b).max()) / scale if scale else 0.0
 
 
 def apart(a: Path, b: Path, basis: Array, outputs: int) -> float:

@@ -9,7 +9,7 @@ import torch
 from scipy.interpolate import BSpline
 
 from pikanid.approximators.kan import build_kan
-from pikanid.equivalence.checks import GRADIENTS, MATRICES, difference
+from pikanid.equivalence.agreement import GRADIENTS, MATRICES, difference
 from pikanid.equivalence.ipda import IpdaObjective
 from pikanid.equivalence.network import NetworkLoss
 from pikanid.equivalence.report import Check

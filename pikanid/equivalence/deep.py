@@ -14,7 +14,7 @@ import torch
 from torch.func import functional_call
 
 from pikanid.approximators.kan import DeepKAN, build_kan
-from pikanid.equivalence.checks import GRADIENTS, difference
+from pikanid.equivalence.agreement import GRADIENTS, difference
 from pikanid.equivalence.report import Check
 from pikanid.equivalence.setting import Array, Setting
 

@@ -83,7 +83,7 @@ class NextExperiment:
         """The profile, and the outputs that the hypotheses foretell."""
         from pikanid.mismatch.design_figure import design_figure
 
-        return design_figure(self)
+        return design_figure(self.profile, self.responses)
 
     def to_dict(self) -> dict[str, object]:
         """What can go into a report as JSON."""

@@ -12,22 +12,18 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Literal
 
-import numpy as np
-
-from pikanid import errors
-from pikanid.chains import Form
 from pikanid.estimate import Estimate
 from pikanid.model import Model
 from pikanid.problem import Problem
 from pikanid.recording import Recording
-from pikanid.strategies.pinn_fit import PAPER_RATE, Progress, fit_network
+from pikanid.strategies.pinn_fit import fit_network
+from pikanid.strategies.pinn_settings import PinnSettings, check
 from pikanid.strategies.relaxed_estimate import assemble
 
 
 @dataclass(frozen=True)
-class PINN:
+class PINN(PinnSettings):
     """Physics-informed neural network.
 
     Parameters
@@ -62,21 +58,6 @@ class PINN:
     (2, 2)
     """
 
-    protocol: Literal["default", "paper"] = "default"
-    optimiser: Literal["gauss_newton", "gradient"] | None = None
-    hidden: tuple[int, ...] | None = None
-    form: Form = "second_order"
-    lam: float | None = None
-    balance: Literal["none", "gradnorm"] = "none"
-    hard_initial: bool | None = None
-    exact_switches: bool | None = None
-    collocation: int | None = None
-    steps: int | tuple[int, int] | None = None
-    learning_rate: float = PAPER_RATE
-    seed: int = 0
-    device: str = "cpu"
-    progress: Progress | None = None
-
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
 
@@ -88,26 +69,8 @@ class PINN:
         pikanid.errors.BadSetting : options that cannot work, no torch, or a delay to be estimated
         """
         begun = time.perf_counter()
-        _check(self)
+        check(self)
         fit, curves = fit_network(Problem(model, recordings), self)
         settings = asdict(replace(self, progress=None))
         del settings["progress"]
         return assemble("pinn", fit, {**settings, **fit.settings}, list(fit.history), begun, curves)
-
-
-def _check(settings: PINN) -> None:
-    paper = settings.protocol == "paper"
-    newton = settings.optimiser == "gauss_newton" or (settings.optimiser is None and not paper)
-    wanted = "a whole number" if newton else "two whole numbers, (Adam, L-BFGS)"
-    steps = settings.steps
-    if steps is not None and (isinstance(steps, int) is not newton or np.min(steps) < 1):
-        raise errors.BadSetting(errors.bad_value("steps", steps, f"{wanted}, at least 1"))
-    if settings.lam is not None and not settings.lam > 0.0:
-        raise errors.BadSetting(errors.bad_value("lam", settings.lam, "positive"))
-    if settings.hidden is not None and (not settings.hidden or min(settings.hidden) < 1):
-        raise errors.BadSetting(errors.bad_value("hidden", settings.hidden, "units of each layer"))
-    if settings.collocation is not None and settings.collocation < 2:
-        raise errors.BadSetting(errors.bad_value("collocation", settings.collocation, "2 or more"))
-    if not settings.learning_rate > 0.0:
-        raise errors.BadSetting(
-            errors.bad_value("learning_rate", settings.learning_rate, "positive"))

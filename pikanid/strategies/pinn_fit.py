@@ -5,7 +5,7 @@ torch is imported in the functions here, on the first fit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -21,14 +21,12 @@ from pikanid.problem import Problem
 from pikanid.simulation.lowering import lower_model
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.pinn_check import against_simulation
+from pikanid.strategies.pinn_settings import PinnSettings
 from pikanid.strategies.relaxation import start_is_estimated
 
 if TYPE_CHECKING:
     from pikanid.optimise.gradient_functional import TorchFunctional
-    from pikanid.strategies.pinn import PINN
     from pikanid.strategies.pinn_networks import Architecture, Networks
-
-Progress = Callable[[dict[str, float]], None]
 
 # Table II: Adam 5000 with λ 0 → 0.1, L-BFGS 500 at λ = 1, 501 collocation points; λ doubled for
 # the sparse scenario, read as fewer than half as many samples as collocation points.  What it does
@@ -38,7 +36,6 @@ PAPER_STEPS = (5000, 500)
 PAPER_COLLOCATION = 501
 PAPER_HIDDEN = (64, 16)
 PAPER_SPREAD = 1.25
-PAPER_RATE = 3e-3
 
 GRADIENT_STEPS = (3000, 3000)
 GRADIENT_LAMBDA = 100.0
@@ -74,7 +71,7 @@ class _Stop:
     settings: Mapping[str, Any]
 
 
-def fit_network(problem: Problem, settings: PINN) -> tuple[PinnFit, Any]:
+def fit_network(problem: Problem, settings: PinnSettings) -> tuple[PinnFit, Any]:
     """A PINN of a model bound to recordings, and its curves.
 
     Raises
@@ -127,7 +124,7 @@ def fit_network(problem: Problem, settings: PINN) -> tuple[PinnFit, Any]:
                    stop.converged, tuple(notes), stop.history, used), curves
 
 
-def _newton(loss: TorchFunctional, start: Array, settings: PINN, noise: float) -> _Stop:
+def _newton(loss: TorchFunctional, start: Array, settings: PinnSettings, noise: float) -> _Stop:
     """λ climbing, damped Gauss-Newton steps on all unknowns."""
     from pikanid.strategies.pinn_newton import climb
 
@@ -140,7 +137,7 @@ def _newton(loss: TorchFunctional, start: Array, settings: PINN, noise: float) -
                  {"optimiser": "gauss_newton", "steps": found.iterations})
 
 
-def _descend(loss: TorchFunctional, start: Array, settings: PINN, noise: float) -> _Stop:
+def _descend(loss: TorchFunctional, start: Array, settings: PinnSettings, noise: float) -> _Stop:
     """Adam with λ rising from 0 or balanced, then L-BFGS at the final λ."""
     from pikanid.optimise.gradient import GradNorm, Ramp, Weight, adam, lbfgs
 
@@ -194,7 +191,7 @@ def _uncertainty(loss: TorchFunctional, stop: _Stop, noise: float) -> tuple[Arra
                    "noise": noise}
 
 
-def _architecture(problem: Problem, settings: PINN) -> Architecture:
+def _architecture(problem: Problem, settings: PinnSettings) -> Architecture:
     from pikanid.strategies.pinn_networks import Architecture
 
     paper = settings.protocol == "paper"

@@ -2,20 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from pikanid.plots import new_figure
-from pikanid.symbolic.composed import Place
+from pikanid.symbolic.composed import Groups, Place
 from pikanid.symbolic.named import NamedEdge
+from pikanid.symbolic.significance import Contribution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from pikanid.symbolic.reading import Reading
+
+class Drawable(Protocol):
+    """What is drawn of a network that was read: see `pikanid.symbolic.reading.Reading`."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the formula says all that the network says."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names or formulas of the inputs."""
+
+    @property
+    def edges(self) -> Mapping[Place, NamedEdge]:
+        """Every edge that was read."""
+
+    @property
+    def groups(self) -> Groups:
+        """Layer by layer, the subnodes that every node multiplies."""
+
+    @property
+    def contributions(self) -> tuple[Contribution, ...]:
+        """Of edges and nodes, those removed included."""
+
+    @property
+    def forms(self) -> Mapping[Place, str]:
+        """The form chosen for every edge."""
+
+    def latex(self, digits: int = 4) -> str:
+        """The formula with numbers."""
+
 
 LINE, FAINT, BAND, NODE = "#0072B2", "#999999", "#A6CBE3", "#222222"
 COLUMN, ROW, PLOT = 3.6, 1.75, (1.75, 1.05)  # inches
@@ -23,7 +55,7 @@ THIN, THICK = 0.7, 5.0
 NORMAL_95 = 1.959963984540054
 
 
-def draw(reading: Reading, *paths: str | Path) -> Figure:
+def draw(reading: Drawable, *paths: str | Path) -> Figure:
     """Nodes from left to right, each edge a small diagram between two of them.
 
     The band is pointwise 95 %; the dashed line is the named form; lines are as wide as the edge's
@@ -56,12 +88,12 @@ def draw(reading: Reading, *paths: str | Path) -> Figure:
     return figure
 
 
-def _title(reading: Reading) -> str:
+def _title(reading: Drawable) -> str:
     text = reading.latex(3)
     return f"${text}$" if reading.ok and len(text) < 160 and "\\operatorname" not in text else ""
 
 
-def _nodes(reading: Reading, layers: int, height: float
+def _nodes(reading: Drawable, layers: int, height: float
            ) -> dict[tuple[int, int], tuple[float, float, str]]:
     """Place and label of every node (layer, number), subnodes of a product drawn as one."""
     found = {}
@@ -78,7 +110,7 @@ def _nodes(reading: Reading, layers: int, height: float
     return found
 
 
-def _edge(figure: Figure, back: Axes, reading: Reading, place: Place, y: float,
+def _edge(figure: Figure, back: Axes, reading: Drawable, place: Place, y: float,
           nodes: dict[tuple[int, int], tuple[float, float, str]]) -> None:
     layer, source, target = place
     edge = reading.edges[place]

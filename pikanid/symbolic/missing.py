@@ -15,7 +15,8 @@ from itertools import islice, product
 import numpy as np
 
 from pikanid import errors
-from pikanid.discrepancy.result import Discrepancy, Edge
+from pikanid.discrepancy.edge import Edge
+from pikanid.discrepancy.result import Discrepancy
 from pikanid.estimate import Estimate
 from pikanid.model import Model
 from pikanid.recording import Recording
