@@ -72,6 +72,32 @@ def test_bound_needs_a_noise_and_a_known_name() -> None:
         bound.std("l_teta")
 
 
+@pytest.mark.parametrize("stated", [None, 0.3, {"x": 0.3, "w": 5.0}, {"w": 5.0}])
+def test_bound_is_the_inverse_of_the_information_by_hand(
+        stated: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """x = a + b·t, w = 80·x + c: a σ that is asked for counts before that of the recording."""
+    interpreted.instead_of_compiled(monkeypatch)
+    model = Model.from_dict({
+        "states": {"x": {"initial": "a"}}, "equations": {"x": "b"},
+        "parameters": {n: {"guess": 1.0} for n in "abc"},
+        "outputs": {"x": {"expression": "x"}, "w": {"expression": "80*x + c"}}})
+    t, own = np.linspace(0, 2, 9), {"x": np.linspace(0.1, 0.2, 9), "w": 2.0}
+    recording = Recording.from_arrays(t, {"x": np.cos(t), "w": np.sin(t)}, sigma=own)
+    sigma = stated if isinstance(stated, dict) else {} if stated is None else dict.fromkeys(
+        own, stated)
+    bound = cramer_rao(model, recording, sigma=stated)  # type: ignore[arg-type]
+    x = np.column_stack([np.ones(9), t, np.zeros(9)])
+    rows = np.vstack([x / np.broadcast_to(sigma.get("x", own["x"]), 9)[:, None],
+                      (80 * x + [0, 0, 1]) / sigma.get("w", 2.0)])
+    np.testing.assert_allclose(bound.fisher, rows.T @ rows, rtol=1e-9)
+    inverse = np.linalg.inv(rows.T @ rows)
+    std = np.sqrt(np.diag(inverse))
+    size = np.outer(std, std)
+    np.testing.assert_allclose(bound.covariance / size, inverse / size, atol=1e-7)
+    assert [bound.std(n) for n in "abc"] == pytest.approx(list(std), rel=1e-7)
+    np.testing.assert_allclose(bound.correlation, inverse / size, atol=1e-7)
+
+
 # --- linear algebra ------------------------------------------------------------------------------
 
 

@@ -1,0 +1,203 @@
+"""Every number of an estimate, against linear regression written out by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import interpreted
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from scipy.stats import t as student
+
+import pikanid as pk
+from pikanid.estimate import Estimate
+from pikanid.model import Model
+from pikanid.recording import Recording
+
+SLOPE, CONSTANT = 0.7, -1.3
+STARTS = (2.0, 3.5)  # of the two recordings
+TIMES = (np.linspace(0.0, 2.0, 15), np.linspace(0.0, 1.0, 12))
+WEIGHED = {"x": 0.05, "w": 4.0}  # noise of the outputs; w is in other units
+
+
+@dataclass(frozen=True)
+class Case:
+    """Which outputs are measured, what is known of their noise, and how often.
+
+    `sigma` says of each output "stated", "by sample" or "" (unknown).
+    """
+
+    sigma: dict[str, str]
+    recordings: int = 1
+    missing: bool = False
+
+    @property
+    def several(self) -> bool:
+        return len(self.sigma) > 1
+
+
+CASES = {
+    "stated": Case({"x": "stated"}),
+    "by sample": Case({"x": "by sample"}),
+    "unknown": Case({"x": ""}),
+    "missing": Case({"x": "stated"}, missing=True),
+    "two recordings": Case({"x": "stated"}, 2),
+    "two recordings, unknown": Case({"x": ""}, 2, missing=True),
+    "two outputs": Case({"x": "stated", "w": "by sample"}, 2, missing=True),
+    "two outputs, unknown": Case({"x": "", "w": ""}, 2),
+    "two outputs, one unknown": Case({"x": "stated", "w": ""}),
+}
+
+
+def line(case: Case) -> Model:
+    """x' = b from x(0) = a; w = 80·x + c: every residual is linear in θ."""
+    outputs = {"x": {"expression": "x"}, "w": {"expression": "80*x + c"}}
+    parameters = {"a": {"guess": 1.0}, "b": {"guess": 0.1}}
+    if "w" in case.sigma:
+        parameters["c"] = {"guess": 0.0}
+    model = Model.from_dict({
+        "states": {"x": {"initial": "a"}}, "parameters": parameters, "equations": {"x": "b"},
+        "outputs": {o: outputs[o] for o in case.sigma}})
+    return model.per_recording("a") if case.recordings > 1 else model
+
+
+def measured(case: Case) -> list[Recording]:
+    rng, made = np.random.default_rng(3), []
+    for start, t in zip(STARTS[:case.recordings], TIMES, strict=False):
+        x = start + SLOPE * t
+        clean = {"x": x, "w": 80 * x + CONSTANT}
+        channels, sigmas = {}, {}
+        for output, how in case.sigma.items():
+            sizes = WEIGHED[output] * np.where(how == "by sample", 0.5 + np.arange(t.size) % 3, 1.0)
+            channels[output] = clean[output] + rng.normal(size=t.size) * sizes
+            if case.missing:
+                channels[output][[3, 7]] = np.nan
+            if how:
+                sigmas[output] = sizes if how == "by sample" else WEIGHED[output]
+        made.append(Recording.from_arrays(t, channels, sigma=sigmas))
+    return made
+
+
+@dataclass(frozen=True)
+class Regression:
+    """What linear regression says: rows output by output, recording by recording."""
+
+    theta: np.ndarray
+    covariance: np.ndarray
+    residual: np.ndarray
+    value: float
+    dof: int
+
+
+def visible(y: np.ndarray) -> float:
+    """σ from fourth differences."""
+    return float(np.median(np.abs(np.diff(y, 4)))) / 0.6744897501960817 / np.sqrt(70.0)
+
+
+def regression(case: Case, columns: list[int] | None = None,
+               known: np.ndarray | None = None) -> Regression:
+    """Of the parameters `columns` (by default all) with the others `known`.
+
+    θ is a, or one a recording, then b, then c.
+    """
+    rows, y, weights, noise = [], [], [], []
+    for r, recording in enumerate(measured(case)):
+        for output, how in case.sigma.items():
+            channel = recording[output]
+            seen = np.isfinite(channel.values)
+            t, own = channel.time[seen], np.eye(case.recordings)[r]
+            factor = 80.0 if output == "w" else 1.0
+            design = np.column_stack([np.tile(factor * own, (t.size, 1)), factor * t])
+            if "w" in case.sigma:
+                design = np.column_stack([design, np.full(t.size, float(output == "w"))])
+            values = channel.values[seen]
+            unknown = visible(values)
+            spread = np.full(t.size, unknown)
+            if how:
+                spread = np.broadcast_to(np.asarray(channel.sigma), channel.values.shape)[seen]
+            rows.append(design)
+            y.append(values)
+            noise.append(spread)
+            weights.append(1 / spread if how or case.several else np.ones(t.size))
+    X, Y, W, S = np.vstack(rows), *map(np.concatenate, (y, weights, noise))
+    theta = np.zeros(X.shape[1]) if known is None else known.copy()
+    free = list(range(X.shape[1])) if columns is None else columns
+    theta[free] = 0.0
+    A, b = X[:, free] * W[:, None], (Y - X @ theta) * W
+    theta[free] = np.linalg.lstsq(A, b, rcond=None)[0]
+    residual = Y - X @ theta
+    dof = len(Y) - X.shape[1]
+    covariance = np.full((len(theta),) * 2, np.nan)
+    covariance[np.ix_(free, free)] = np.linalg.inv(A.T @ A)
+    if not all(case.sigma.values()):
+        covariance *= np.sum((W * residual) ** 2) / dof
+    return Regression(theta, covariance, residual, float(np.sum((residual / S) ** 2)), dof)
+
+
+@pytest.fixture
+def by_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    interpreted.instead_of_compiled(monkeypatch)
+
+
+def fitted(case: Case, **bounds: tuple[float, float]) -> Estimate:
+    model = line(case).with_values(**{n: sum(ends) / 2 for n, ends in bounds.items()})
+    return pk.NLS(starts=1).fit(model.with_bounds(**bounds), measured(case))
+
+
+@pytest.mark.usefixtures("by_python")
+@pytest.mark.parametrize("name", CASES)
+def test_every_number_is_that_of_linear_regression(name: str) -> None:
+    case, known = CASES[name], regression(CASES[name])
+    found = fitted(case)
+    std = np.sqrt(np.diag(known.covariance))
+    np.testing.assert_allclose(found.theta, known.theta, atol=1e-5 * std.min())
+    np.testing.assert_allclose(found.covariance / np.outer(std, std),
+                               known.covariance / np.outer(std, std), atol=1e-6)
+    np.testing.assert_allclose(found.correlation, known.covariance / np.outer(std, std), atol=1e-6)
+    assert found.n == len(known.residual)
+    ours = np.concatenate([f.residual for f in found.fits])
+    np.testing.assert_allclose(ours, known.residual, atol=1e-6)
+    assert found.cost == pytest.approx(0.5 * np.sum(known.residual**2))
+    assert found.adequacy.value == pytest.approx(known.value)
+    assert found.adequacy.dof == known.dof
+    assert found.adequacy.p_value == pytest.approx(chi2.sf(known.value, known.dof))
+    stated = all(case.sigma.values())
+    assert found.adequacy.source == ("given" if stated else "differences")
+    assert found.converged and found.adequacy.verdict == "fits"
+    half = student.ppf(0.95, known.dof) * std[found.index("b")]
+    assert found.interval("b", 0.9) == pytest.approx(
+        (found.value("b") - half, found.value("b") + half))
+
+
+@pytest.mark.usefixtures("by_python")
+@pytest.mark.parametrize("name", ["stated", "two outputs"])
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_parameter_held_at_its_bound_is_no_unknown_to_the_others(name: str, side: int) -> None:
+    case = CASES[name]
+    at = 0.5 if side else 0.9
+    found = fitted(case, b=(0.0, at) if side else (at, 2.0))
+    k, free = found.index("b"), [j for j in range(len(found.theta)) if j != found.index("b")]
+    known = regression(case, free, np.where(np.arange(len(found.theta)) == k, at, 0.0))
+    assert found.value("b") == pytest.approx(at, abs=1e-6)
+    assert np.isnan(found.std("b"))
+    assert any("'b' ended at its bound" in w for w in found.warnings)
+    kept = np.ix_(free, free)
+    np.testing.assert_allclose(found.covariance[kept], known.covariance[kept], rtol=1e-5)
+    np.testing.assert_allclose(found.theta[free], known.theta[free], rtol=1e-5)
+
+
+@pytest.mark.usefixtures("by_python")
+def test_what_was_measured_comes_back_with_its_noise_and_unit() -> None:
+    case = CASES["two outputs"]
+    found, recordings = fitted(case), measured(case)
+    assert [(f.output, len(f.t)) for f in found.fits] == [
+        ("x", 13), ("w", 13), ("x", 10), ("w", 10)]
+    for k, fit in enumerate(found.fits):
+        channel = recordings[k // 2][fit.output]
+        seen = np.isfinite(channel.values)
+        np.testing.assert_array_equal(fit.t, channel.time[seen])
+        np.testing.assert_array_equal(fit.measured, channel.values[seen])
+        sigma = np.broadcast_to(np.asarray(channel.sigma), seen.shape)[seen]
+        np.testing.assert_array_equal(fit.sigma, sigma)
+        assert fit.rmse == pytest.approx(np.sqrt(np.mean((fit.fitted - fit.measured) ** 2)))
