@@ -28,7 +28,7 @@ $(STAMP): pyproject.toml constraints.txt
 		-c constraints.txt -e '.[all,dev]'
 	touch $@
 
-study: $(STAMP) ## the main job: every strategy on the slosh profile and on a real recording
+study: $(STAMP) ## the main job: strategies compared, a real recording diagnosed; writes build/study
 	$(BIN)/pikanid study
 
 lint: $(STAMP) ## ruff and mypy
@@ -48,7 +48,8 @@ bench: $(STAMP) ## time the code against its references; writes reports/performa
 	$(BIN)/python benchmarks/performance.py build/benchmarks.json reports/performance.md \
 		build/ipda_scaling.md
 
-reports: bench ## bench, then every other report: benchmarks/report_*.py
+reports: bench ## bench, then every other report: the study and benchmarks/report_*.py
+	$(BIN)/pikanid study --out reports
 	set -e; for script in $(sort $(wildcard benchmarks/report_*.py)); do \
 		$(BIN)/python $$script reports; done
 

@@ -100,8 +100,7 @@ def _run_on() -> str:
     to beat by much.
     """
     swing = pendulum.load()
-    whole = pendulum.joined([*datasets.single_pendulum("train"),
-                             *datasets.single_pendulum("held_out")], "whole")
+    whole = datasets.single_pendulum_excerpt("all")
     nominal = pk.NLS(starts=1).fit(pendulum.guess(swing.train), swing.train).fitted_model
     told = []
     for name, laws in (("nominal", ()), ("Coulomb + quadratic drag", (DRY, DRAG)),

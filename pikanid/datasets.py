@@ -1,8 +1,10 @@
 """Real recordings, fetched from their origin by commit and checked by SHA-256.
 
-A file is looked for in the folder that the environment variable ``PIKANID_DATA`` names (which is
-never written to), then in the user's cache folder, and then downloaded once.  Without any of
-these, `DatasetUnavailable` says what is missing and how to get it.
+Excerpts of two of them come with the package: `single_pendulum_excerpt` and
+`falling_balls_excerpt` need neither network nor folder.  Every other file is looked for in the
+folder that the environment variable ``PIKANID_DATA`` names (which is never written to), then in the
+user's cache folder, and then downloaded once.  Without any of these, `DatasetUnavailable` says what
+is missing and how to get it.
 
 The recordings belong to their authors: cite the papers named in the functions.
 """
@@ -22,9 +24,16 @@ import numpy as np
 from pikanid import alignment, errors, kinematics
 from pikanid import datasets_origins as origins
 from pikanid.channel import Channel
+from pikanid.datasets_excerpts import falling_balls_excerpt, single_pendulum_excerpt
 from pikanid.datasets_origins import Origin
 from pikanid.reading import csv, mat, spreadsheet
 from pikanid.recording import Recording
+
+__all__ = [
+    "BALLS", "SLOSH_MOTIONS", "falling_balls", "falling_balls_excerpt", "silverbox",
+    "single_pendulum", "single_pendulum_excerpt", "single_pendulum_free_swing", "slosh_lar",
+    "slosh_lar_forced",
+]
 
 FOLDER = "PIKANID_DATA"
 
@@ -39,19 +48,7 @@ _SILVERBOX_PARTS = {
     "all": (0, 131072),
 }
 
-BALLS = (
-    "Baseball",
-    "Blue Basketball",
-    "Green Basketball",
-    "Volleyball",
-    "Bowling Ball",
-    "Golf Ball",
-    "Tennis Ball",
-    "Whiffle Ball 1",
-    "Whiffle Ball 2",
-    "Yellow Whiffle Ball",
-    "Orange Whiffle Ball",
-)
+BALLS = origins.BALLS
 SLOSH_MOTIONS = tuple(origins.SLOSH_CHECKSUMS)
 _COMMANDED = 0.02  # [s] window of derivatives: a commanded pose has no noise
 
@@ -72,7 +69,7 @@ def single_pendulum(
         DatasetUnavailable: If the file is neither at hand nor to be had.
     """
     kinds = {"train": ("id",), "held_out": ("vad",), "all": ("id", "vad")}
-    _known("part", part, tuple(kinds))
+    origins.check_known("part", part, tuple(kinds))
     origin = origins.SINGLE_PENDULUM
     arrays = mat.arrays(_content(origin), origin.name)
     pieces = []
@@ -125,7 +122,7 @@ def silverbox(
     Raises:
         DatasetUnavailable: If the file is neither at hand nor to be had.
     """
-    _known("part", part, tuple(_SILVERBOX_PARTS))
+    origins.check_known("part", part, tuple(_SILVERBOX_PARTS))
     start, stop = _SILVERBOX_PARTS[part]
     origin = origins.SILVERBOX
     arrays = mat.arrays(_content(origin), origin.name)
@@ -152,11 +149,9 @@ def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:
     Raises:
         DatasetUnavailable: If the file is neither at hand nor to be had.
     """
-    plain = {_plain(name): name for name in BALLS}
-    _known("ball", _plain(ball), tuple(plain))
-    _known("drop", str(drop), ("1", "2"))
+    name = origins.ball_named(ball)
+    origins.check_known("drop", str(drop), ("1", "2"))
     origin = origins.FALLING_BALLS
-    name = plain[_plain(ball)]
     # The workbook ends in .xls and is of the newer kind inside.
     rows, _ = spreadsheet.cells(_content(origin), origin.name, "xlsx", name)
     table = np.array(rows[1:], dtype=float)
@@ -181,7 +176,7 @@ def slosh_lar(name: str = "LE_2D_0m_5s_900deg") -> Recording:
     Raises:
         DatasetUnavailable: If a file is neither at hand nor to be had.
     """
-    _known("motion", name, SLOSH_MOTIONS)
+    origins.check_known("motion", name, SLOSH_MOTIONS)
     motion, heights = origins.slosh(name)
     table = csv.read(_content(motion), motion.name, ";", ".")
     t, *pose = (column.values for column in table.columns)
@@ -267,12 +262,3 @@ def _checked(path: Path, origin: Origin) -> bytes:
     if hashlib.sha256(content).hexdigest() != origin.sha256:
         raise errors.DatasetUnavailable(errors.dataset_altered(str(path), origin.url))
     return content
-
-
-def _known(what: str, given: str, known: tuple[str, ...]) -> None:
-    if given not in known:
-        raise errors.BadSetting(errors.no_such_data(what, given, known))
-
-
-def _plain(name: str) -> str:
-    return "".join(letter for letter in name.casefold() if letter.isalnum())

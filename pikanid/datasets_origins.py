@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from urllib.parse import quote
 
+from pikanid import errors
+
 
 @dataclass(frozen=True)
 class Origin:
@@ -68,6 +70,20 @@ FALLING_BALLS = Origin(
     "data/Ball_drops_data.xls",
     "falling_balls/Ball_drops_data.xls",
     "942b2d68abfff3828ca323de491435d4ec27c3a22e62cee0cbdf52c2e8d1c0ed",
+)
+
+BALLS = (
+    "Baseball",
+    "Blue Basketball",
+    "Green Basketball",
+    "Volleyball",
+    "Bowling Ball",
+    "Golf Ball",
+    "Tennis Ball",
+    "Whiffle Ball 1",
+    "Whiffle Ball 2",
+    "Yellow Whiffle Ball",
+    "Orange Whiffle Ball",
 )
 
 # Checksums of the motion and of the heights of each run.
@@ -164,3 +180,31 @@ def slosh(name: str) -> tuple[Origin, Origin]:
             heights,
         ),
     )
+
+
+def ball_named(name: str) -> str:
+    """The name in `BALLS` that is meant; case and blanks do not matter.
+
+    Raises:
+        BadSetting: If there is none.
+
+    >>> ball_named("tennis_ball")
+    'Tennis Ball'
+    """
+    plain = {_plain(known): known for known in BALLS}
+    check_known("ball", _plain(name), tuple(plain))
+    return plain[_plain(name)]
+
+
+def check_known(what: str, given: str, known: tuple[str, ...]) -> None:
+    """Refuse what is not there.
+
+    Raises:
+        BadSetting: If `given` is not among the `known`.
+    """
+    if given not in known:
+        raise errors.BadSetting(errors.no_such_data(what, given, known))
+
+
+def _plain(name: str) -> str:
+    return "".join(letter for letter in name.casefold() if letter.isalnum())

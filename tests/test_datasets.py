@@ -79,6 +79,9 @@ def test_the_cache_is_used_without_network(
         lambda: datasets.silverbox("half"),  # type: ignore[arg-type]
         lambda: datasets.falling_balls("cannon ball"),
         lambda: datasets.falling_balls(drop=3),  # type: ignore[arg-type]
+        lambda: datasets.single_pendulum_excerpt("half"),  # type: ignore[arg-type]
+        lambda: datasets.falling_balls_excerpt("cannon ball"),
+        lambda: datasets.falling_balls_excerpt(drop=3),  # type: ignore[arg-type]
         lambda: datasets.slosh_lar("half"),
     ],
 )
@@ -95,6 +98,60 @@ def test_every_origin_is_pinned() -> None:
         assert len(origin.commit) == 40
         assert len(origin.sha256) == 64
         assert " " not in origin.url
+
+
+# --- what comes with the package -----------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("offline")
+def test_excerpts_need_no_network_and_no_folder() -> None:
+    train, other, whole = (datasets.single_pendulum_excerpt(part)
+                           for part in ("train", "held_out", "all"))
+    assert whole["theta"].uniform and len(whole["theta"]) == 5501
+    assert other.start - train.stop == pytest.approx(0.01)
+    for ball in datasets.BALLS:
+        for drop in (1, 2):
+            h = datasets.falling_balls_excerpt(ball, drop)["h"]  # type: ignore[arg-type]
+            assert 40 < len(h) < 65 and h.values[0] > 44 > 20 > h.values[-1]
+    assert datasets.falling_balls_excerpt("golf ball").name == "Golf Ball, drop 1"
+
+
+def test_excerpts_are_small_and_carry_licence_and_source() -> None:
+    folder = Path(datasets.__file__).parent / "excerpts"
+    sizes = {path.name: path.stat().st_size for path in folder.glob("*.csv")}
+    assert len(sizes) == 3 and sum(sizes.values()) < 150_000
+    readme = (folder / "README.md").read_text()
+    for origin in (origins.SINGLE_PENDULUM, origins.FALLING_BALLS):
+        assert all(x in readme for x in (origin.repository, origin.commit, origin.path))
+        licence = (folder / f"LICENSE-{origin.local.split('/')[0].removesuffix('_uw')}.txt")
+        assert licence.name in readme
+        assert "MIT License\n\nCopyright (c) 20" in licence.read_text()
+    assert all(name in readme for name in sizes)
+
+
+@pytest.mark.usefixtures("recordings_folder")
+@pytest.mark.parametrize("balls", [
+    ("Golf Ball",), pytest.param(datasets.BALLS, marks=pytest.mark.slow)])
+def test_excerpts_are_made_from_the_originals(balls: tuple[str, ...]) -> None:
+    import thin_recordings
+
+    folder = Path(datasets.__file__).parent / "excerpts"
+    made = thin_recordings.excerpts(balls)
+    assert set(made) == {path.name for path in folder.glob("*.csv")}
+    for name, text in made.items():
+        kept = (folder / name).read_text().splitlines()
+        if "ball,drop" in kept[0]:
+            kept = [kept[0], *(row for row in kept if row.split(",")[0] in balls)]
+        assert kept == text.splitlines()
+
+
+def test_thinning_measures_what_it_would_fold_back() -> None:
+    import thin_recordings
+
+    t = np.arange(50_000) / 1000.0
+    slow, fast = np.sin(2 * np.pi * 3.0 * t), 0.01 * np.sin(2 * np.pi * 80.0 * t)
+    assert thin_recordings.above(slow + fast, 1000.0, 10) == pytest.approx(0.01 / 2**0.5, rel=0.01)
+    assert thin_recordings.above(slow + fast, 1000.0, 5) < 1e-5
 
 
 # --- the recordings themselves -------------------------------------------------------------------

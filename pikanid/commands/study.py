@@ -15,20 +15,17 @@ EXAMPLES = """Examples:
 
   pikanid study --seeds 100 --out reports-100
 
-  PIKANID_DATA=recordings pikanid study
-
-The real recording is taken from the folder named in PIKANID_DATA, or downloaded once; without it
-the study says what is missing and goes on."""
+The real recording is an excerpt that comes with the package: no network is needed."""
 
 
 def study(
     out: Annotated[str, typer.Option(
-        "--out", "-o", metavar="FOLDER", help="folder of the report")] = "reports",
+        "--out", "-o", metavar="FOLDER", help="folder of the report")] = "build/study",
     seeds: Annotated[int, typer.Option(
         metavar="N", min=0, help="noisy recordings in each repetition; 0 for none")] = 20,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="write the report only")] = False,
 ) -> int:
-    """Compare the strategies on the slosh profile and on a real recording; write a report."""
+    """Compare the strategies on simulated and real data, diagnose the real one; write a report."""
     folder = _folder(out)
     from pikanid.reporting.console import console, working
     from pikanid.reporting.study_report import show, write

@@ -28,8 +28,9 @@ def figures(study: Study) -> Mapping[str, Figure]:
     made = {"slosh-trajectories": trajectories(study)}
     if study.spreads:
         made["slosh-errors"] = spread(study)
-    if study.swing is not None and any(r.predicted is not None for r in study.pendulum_fits):
+    if any(r.predicted is not None for r in study.pendulum_fits):
         made["pendulum"] = swing(study, study.swing)
+    made["pendulum-diagnosis"] = study.diagnosis.plot()
     return made
 
 

@@ -24,7 +24,13 @@ CAPTIONS = {
     "slosh-errors": "1 is the Cramér-Rao bound, below which no unbiased estimator can stay.",
     "pendulum": "The residual swings with the pendulum and grows where the model runs on without "
                 "data: physics is missing.",
+    "pendulum-diagnosis": "The diagnosis: when the mismatch acts, and the held-out recording "
+                          "before and after.",
 }
+DIAGNOSIS_TEXT = (
+    "`pikanid diagnose` on the same two parts, given the viscous pendulum and nothing else: what "
+    "was found, how it is modelled, and the RMSE on the held-out part before and after, where each "
+    "model's initial state is estimated from that part.")
 VERSIONS = ("pikanid", "numpy", "scipy", "sympy", "numba", "torch", "pykan")
 
 
@@ -38,15 +44,14 @@ def show(out: Console, study: Study) -> None:
         _head(out, f"Errors over {study.seeds} seeds, in units of the Cramér-Rao bound")
         out.print(sheets.spread(study).to_rich())
     _head(out, "Real recording: free swing of a pendulum arm, viscous pendulum; RMSE [rad]")
-    if study.missing:
-        out.print(f"Left out: {study.missing}", markup=False, soft_wrap=True)
-    else:
-        out.print(sheets.pendulum(study).to_rich())
+    out.print(sheets.pendulum(study).to_rich())
     reasons = sheets.reasons(study)
     if reasons:
         out.print()
     for text in reasons:
         out.print(f"Not usable: {text}", markup=False, soft_wrap=True)
+    _head(out, "What does the viscous pendulum leave out? A diagnosis of the real recording")
+    out.print(str(study.diagnosis), markup=False, highlight=False, soft_wrap=True)
 
 
 def _head(out: Console, text: str) -> None:
@@ -81,12 +86,10 @@ def text(study: Study, pictures: Mapping[str, str]) -> str:
     if study.spreads:
         parts += ["### Repeated seeds", _spread_text(study), sheets.spread(study).to_markdown(),
                   _picture("slosh-errors", pictures)]
-    parts += ["## Real recording: free swing of a pendulum arm"]
-    if study.missing:
-        parts += ["The recording was not at hand when this report was written."]
-    else:
-        parts += [_pendulum_text(study), sheets.pendulum(study).to_markdown(),
-                  _picture("pendulum", pictures)]
+    parts += ["## Real recording: free swing of a pendulum arm", _pendulum_text(study),
+              sheets.pendulum(study).to_markdown(), _picture("pendulum", pictures),
+              "### What the viscous pendulum leaves out", DIAGNOSIS_TEXT,
+              f"```text\n{study.diagnosis}\n```", _picture("pendulum-diagnosis", pictures)]
     unusable = [f"- {reason}" for reason in sheets.reasons(study)]
     if unusable:
         parts += ["## Not usable", "\n".join(unusable)]
@@ -121,9 +124,8 @@ def _spread_text(study: Study) -> str:
 
 
 def _pendulum_text(study: Study) -> str:
-    assert study.swing is not None
     train, held = study.swing.train, study.swing.held_out
-    return (f"K. Kaheman et al., arXiv 2205.06231; 1 kHz, every {pendulum.STRIDE}th sample used. "
+    return (f"K. Kaheman et al., arXiv 2205.06231; the excerpt at 100 Hz that the package ships. "
             f"Length, damping and the state at t = 0 are estimated on {train.start:.1f} s to "
             f"{train.stop:.1f} s. RMSE [rad], held-out: the fitted model runs on from t = 0 "
             f"through {held.start:.1f} s to {held.stop:.1f} s, data that it has not seen and "

@@ -8,7 +8,6 @@ first second and the model runs from there: this forgives the phase that the fir
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +15,12 @@ import numpy as np
 
 from pikanid import datasets, errors, systems
 from pikanid.estimate import Estimate
+from pikanid.mismatch import Diagnosis, diagnose
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.simulation import simulate
 from pikanid.strategies import strategy
 
-STRIDE = 10  # 1 kHz recorded, 100 Hz used: 130 samples a swing
 # The recording itself gives the guess of the initial state, so that one start is enough for NLS.
 SETTINGS: dict[str, dict[str, Any]] = {"nls": {"starts": 1}}
 FIRST = 1.0  # seconds of the held-out part that may serve to find its initial state
@@ -51,22 +50,9 @@ class Result:
 
 
 def load() -> Swing:
-    """The recording, thinned to 100 Hz.
-
-    Raises:
-        DatasetUnavailable: If it is neither at hand nor to be had.
-    """
-    return Swing(joined(datasets.single_pendulum("train"), "training"),
-                 joined(datasets.single_pendulum("held_out"), "held out"))
-
-
-def joined(pieces: Sequence[Recording], name: str) -> Recording:
-    """Pieces that follow each other without a gap as one recording of the angle."""
-    thin = [piece.decimate(STRIDE) for piece in pieces]
-    return Recording.from_arrays(
-        np.concatenate([piece["theta"].time for piece in thin]),
-        {"theta": np.concatenate([piece["theta"].values for piece in thin])},
-        {"theta": "rad"}, name=name)
+    """The excerpt that comes with the package: 100 Hz, which is 130 samples a swing."""
+    return Swing(datasets.single_pendulum_excerpt("train"),
+                 datasets.single_pendulum_excerpt("held_out"))
 
 
 def guess(recording: Recording) -> Model:
@@ -94,6 +80,13 @@ def fit(swing: Swing, name: str) -> Result:
     measured = swing.held_out["theta"].values
     return Result(name, found, "", rms(predicted - measured), restarted(found, swing.held_out),
                   predicted)
+
+
+def missing_physics(swing: Swing) -> Diagnosis:
+    """What the viscous pendulum leaves out, by the training part, and what that does on the
+    held-out part, whose initial state is estimated from it.
+    """
+    return diagnose(systems.pendulum(), swing.train, swing.held_out)
 
 
 def run_on(model: Model, swing: Swing) -> np.ndarray:
