@@ -37,8 +37,8 @@ FEW = 3  # cases of each set that thresholds inside fits are tried on: nothing c
 FOLDER = Path(api.__file__).parent
 PACKAGE = api.__package__
 # a threshold that is looked up nowhere else changes no result of what is remembered
-OUTSIDE = {"api", "case", "noise_level", "outliers", "preparation", "screen", "search", "symbols",
-           "verdict"}
+OUTSIDE = {"api", "case", "doubt", "noise_level", "outliers", "preparation", "screen", "search",
+           "symbols", "verdict"}
 REMEMBERED = ((noise, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
               (symbols, "name_curve"), (case, "residual_tests"), (case, "held_out"),
               (api, "force_shape"))
@@ -60,6 +60,7 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
             "growing": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED", "judge": "AGAIN",
             "least_squares": "PATIENCE", "tangent": "*", "whitened": "FINEST"},
     "number of threads": {"in_turn": "*"},
+    "far above rounding and far below what decides anything": {"decisions": "*"},
     "number of draws, points or knots": {
         "detect": "DRAWS BATCH", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
     "where fits begin": {"beginning": "SHARE", "channels": "LAGS", "late_inputs": "SHIFTS"},

@@ -10,7 +10,7 @@ from pikanid import errors
 from pikanid.mismatch.candidate import SYMBOLIC
 from pikanid.mismatch.experiments import TELLS_APART, NextExperiment, next_experiment
 from pikanid.mismatch.profiles import profiles
-from pikanid.mismatch.result import Explanation, Verdict
+from pikanid.mismatch.result import Explanation, Verdict, titles_apart
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 from pikanid.model_parts import Input
@@ -55,11 +55,12 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     """The profile that best tells the most probable hypotheses apart."""
     model = given[0].model
     driven = [i for i in model.inputs if i.default is None]
-    names = [e.title for e in given]
+    names = titles_apart(given)
     text = f"To tell {' from '.join(names)}: "
     if len(driven) != 1 or not rate > 0:
         return text + "let it swing freely from amplitudes at least three times apart, and long."
-    found = _best({e.title: e.model for e in given}, records, driven[0], rate, workers)
+    models = {name: e.model for name, e in zip(names, given, strict=True)}
+    found = _best(models, records, driven[0], rate, workers)
     if found is None:
         return text + "choose another excitation; of the usual ones none can be simulated with all."
     apart = f"{found.value:.2g} standard deviations apart"

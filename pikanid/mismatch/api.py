@@ -10,7 +10,9 @@ from pikanid import errors
 from pikanid.mismatch.advice import advice
 from pikanid.mismatch.case import SEARCHED, Case, note_outliers
 from pikanid.mismatch.catalogue import candidates as catalogue_of
+from pikanid.mismatch.decisions import below, smaller
 from pikanid.mismatch.detect import Detection
+from pikanid.mismatch.doubt import least_proof
 from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.explained import explanations
 from pikanid.mismatch.force_shape import ForceShape, force_shape
@@ -105,7 +107,7 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
     detection = case.test(case.base)
     if case.repeats is not None:
         detection = replace(detection, p_value=case.repeats.p_value)
-    if detection.p_value >= alpha:
+    if not smaller(detection.p_value, alpha):
         answer = Answer("none", (), ())
     else:
         search = case.begin_search()
@@ -125,14 +127,14 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
             ranked = search.grow(case.adequate)
         tell("confirmation")
         case.clear_later(ranked[0])
-        answer = _settled(case, ranked)
+        answer = _settled(case, ranked, alpha)
         for _ in range(ASKED):
             before = {h.fit for h in search.ranked()}
             if not search.closer(answer.given):
                 break
             # one that is better has rivals of its own
             known = search.ranked()[0].fit in before
-            answer = _settled(case, search.ranked() if known else search.grow(case.adequate))
+            answer = _settled(case, search.ranked() if known else search.grow(case.adequate), alpha)
     shape = None
     if answer.verdict != "none":
         shape = force_shape(case.base, case.sites[0], case.candidates)
@@ -141,7 +143,7 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
         search = case.search
         search.offer(symbolic_candidates(shape, case.sites[0]))
         answer = with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
-                               case.later is not None, case.proves)
+                               case.later is not None, case.proves, alpha)
     mend = None
     if shape is not None and answer.verdict == "unnamed" and case.later is not None:
         mend = patch(case.base, case.model, shape, case.sites[0], case.records, case.later,
@@ -149,9 +151,9 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
     return replace(_diagnosis(case, detection, answer, shape, alpha), patch=mend)
 
 
-def _settled(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
+def _settled(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
     return settle(ranked, case.search.scale(), case.test, case.predicted, case.later is not None,
-                  case.proves, case.ahead)
+                  case.proves, case.ahead, alpha)
 
 
 def _several(recordings: Recordings) -> tuple[Recording, ...]:
@@ -167,6 +169,7 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     else:
         train, later = set_aside(train, model, notes)
     model = held_as_recorded(model, train)
+    sites(model, train)  # a model in which nothing can be looked for is refused before any fit
     tell("nominal fit")
     together = oversampling(model, train)
     if together > 1:
@@ -211,6 +214,12 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
+    if case.proves and (base := case.predicted(case.base)) and below(
+            base.motion, least_proof(alpha)):
+        case.notes.append(
+            "The held-out recording is at rest, or too short: all that moves in it is worth "
+            f"{base.motion:.2g} of chi-squared, and {least_proof(alpha):.0f} are needed to confirm "
+            "anything.")
     levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, case.sites[0])
     return Diagnosis(

@@ -9,6 +9,7 @@ import numpy as np
 
 from pikanid.estimate import Estimate
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.decisions import smaller
 from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.hypothesis import Hypothesis
@@ -150,7 +151,8 @@ class Case:
             return True
         old, new, nominal = (self.predicted(h) for h in (fewer, more, self.base))
         return old is None or nominal is None or (
-            new is not None and new.rmse < min(BETTER * old.rmse, old.rmse - WORTH * nominal.rmse))
+            new is not None and smaller(
+                new.rmse, min(BETTER * old.rmse, old.rmse - WORTH * nominal.rmse)))
 
 
 def _same(one: Records, other: Records) -> bool:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pikanid.mismatch.doubt import Predict
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.result import Explanation, NamedEffect, values_of
-from pikanid.mismatch.verdict import Answer, Predict, Test, criterion
+from pikanid.mismatch.verdict import Answer, Test, criterion
 
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict
@@ -33,6 +34,19 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict
 
     given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
     best = answer.given[0].score(scale) if answer.given else pool[0].score(scale)
-    others = tuple(one(h, 0.0, answer.reasons.get(
-        h.key, f"fits worse by {h.score(scale) - best:.0f}")) for h in answer.others)
+    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(h.score(scale) - best))
+                   for h in answer.others)
     return given, others
+
+
+def _behind(gap: float) -> str:
+    """Why a hypothesis is not given whose criterion exceeds that of the first one given by `gap`.
+
+    >>> _behind(12.3)
+    'chi-squared with the penalty for its parameters is higher by 12'
+    >>> _behind(-0.2)
+    'explains the recording no better than what is given'
+    """
+    if gap < 0.5:
+        return "explains the recording no better than what is given"
+    return f"chi-squared with the penalty for its parameters is higher by {gap:.0f}"

@@ -47,6 +47,12 @@ class Hypothesis:
         """Identifies this fit of the effects: another one may find a lower χ²."""
         return self.key, self.minimum.chi2
 
+    def place(self) -> tuple[int, tuple[str, ...]]:
+        """Its place among hypotheses that a criterion does not tell apart: fewest effects first,
+        then by name.
+        """
+        return len(self.effects), tuple(sorted(self.key))
+
     @property
     def known(self) -> bool:
         """Whether all effects are entries of the catalogue."""

@@ -39,6 +39,7 @@ class HeldOut:
             errors to where they suit this recording best.
         rest: (N,) whitened residual with that forgiveness.
         inert: Names of parameters that hardly act there: a limit that is not met.
+        motion: χ² of the whole predicted motion about its mean: what can be seen there at all.
         residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
         known: Tests made so far.
     """
@@ -56,6 +57,7 @@ class HeldOut:
     residuals: tuple[tuple[int, str, np.ndarray, np.ndarray], ...]
     rest: np.ndarray
     inert: frozenset[str]
+    motion: float
     known: dict[str, Detection | None] = field(default_factory=dict, repr=False)
 
     # cached properties would let threads wait for each other
@@ -127,7 +129,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     return HeldOut(_rmse(gaps), tests, together, chi2, chi2 + _room(found.J, shared, fit),
                    samples.t, samples.y, predicted, moved, _rmse(closer),
                    tuple(_residuals(whitened, gaps)), found.r[: whitened.rows],
-                   _inert(whitened, found))
+                   _inert(whitened, found), _motion(whitened, gaps))
 
 
 def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared: list[int],
@@ -173,6 +175,19 @@ def _inert(whitened: Whitened, found: Minimum) -> frozenset[str]:
     acts = np.linalg.norm(found.J[: whitened.rows], axis=0) * np.abs(found.theta)
     free = whitened.problem.free
     return frozenset(f.name for f, size in zip(free, acts, strict=True) if size < 1)
+
+
+def _motion(whitened: Whitened, gaps: Sequence[np.ndarray]) -> float:
+    """χ² of what is predicted about the mean of each output, from the gaps to what is measured."""
+    total = 0.0
+    for r, gap in enumerate(gaps):
+        moved, first = gap + whitened.measured(r), 0
+        for s in whitened.problem.experiments[r].samples:
+            part = slice(first, first + len(s.t))
+            moved[part] -= moved[part].mean()
+            first += len(s.t)
+        total += float(np.sum(whitened.whiten(r, moved) ** 2))
+    return total
 
 
 def _shown(whitened: Whitened, theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:

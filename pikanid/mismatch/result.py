@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -166,8 +166,8 @@ class Diagnosis:
             return (f"The model explains the recording: nothing beyond noise (p = "
                     f"{self.p_value:.2g}).")
         head = f"Something is missing in the model (p = {self.p_value:.1g}): "
-        titles = [h.title for h in self.hypotheses]
-        if self.verdict == "named":
+        titles = list(dict.fromkeys(titles_apart(self.hypotheses)))
+        if self.verdict == "named" or (self.verdict == "set" and len(titles) == 1):
             return head + f"{titles[0]}, confirmed on the held-out recording."
         if self.verdict == "set":
             return head + "one of " + "; or ".join(titles) + ", which these recordings cannot " \
@@ -224,6 +224,13 @@ class Diagnosis:
 
         first, *rest = lines_of(self)
         return f"<b>{escape(first)}</b><pre>{escape(chr(10).join(rest))}</pre>"
+
+
+def titles_apart(given: Sequence[Explanation]) -> list[str]:
+    """The title of each; of hypotheses that share one, with what they add to the model."""
+    titles = [h.title for h in given]
+    return [t if titles.count(t) == 1 else f"{t} ({'; '.join(e.expression for e in h.effects)})"
+            for t, h in zip(titles, given, strict=True)]
 
 
 def _entry(v: Value) -> dict[str, Any]:

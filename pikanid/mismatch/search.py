@@ -11,6 +11,7 @@ import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.closest import Closest
+from pikanid.mismatch.decisions import below, in_order
 from pikanid.mismatch.descent import Start
 from pikanid.mismatch.growing import hits, lost
 from pikanid.mismatch.hypothesis import FAR, Hypothesis, fitted
@@ -154,7 +155,7 @@ class Search:
             for h in self.ranked()[:NEAR]:
                 # fewer effects that explain almost as much may do with another one
                 if 0 < len(h.effects) < len(best.effects) and not self.tired and not adequate(h) \
-                        and h.score(self.scale()) < best.score(self.scale()) + 2 * CLOSE:
+                        and below(h.score(self.scale()), best.score(self.scale()) + 2 * CLOSE):
                     self._extend(h, MORE)
             self._simplify()
         # however tired, no name without the laws that keep wrong ones away, of its parts as well
@@ -168,7 +169,7 @@ class Search:
         """The hypotheses that score about as well as the best."""
         scale, ranked = self.scale(), self.ranked()
         for h in ranked[:NEAR]:
-            if h.score(scale) < ranked[0].score(scale) + CLOSE and not self.tired:
+            if below(h.score(scale), ranked[0].score(scale) + CLOSE) and not self.tired:
                 yield h
 
     def _simplify(self) -> None:
@@ -228,7 +229,8 @@ class Search:
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
-        return sorted(self.fits.values(), key=partial(Hypothesis.score, scale=self.scale()))
+        return in_order(self.fits.values(), partial(Hypothesis.score, scale=self.scale()),
+                        Hypothesis.place)
 
     def scale(self) -> float:
         """What χ² counts for."""
@@ -285,7 +287,7 @@ class Search:
             if found and hits(found.effects) and lost(found.minimum.chi2, found.whitened.rows):
                 self.astray.add(key)
             if found and (key not in self.fits
-                          or found.minimum.chi2 < self.fits[key].minimum.chi2 - EQUAL):
+                          or below(found.minimum.chi2, self.fits[key].minimum.chi2 - EQUAL)):
                 self.fits[key] = found
 
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from pikanid.mismatch.decisions import in_order
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.least_squares import repeated
 
@@ -16,7 +17,7 @@ def what_counts(fits: Iterable[Hypothesis]) -> float:
     counted by the number of independent rows instead, N / Σ ρ_k² (G. V. Bayley and J. M.
     Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).
     """
-    closest = min(fits, key=lambda h: h.minimum.chi2)
+    closest = in_order(fits, lambda h: h.minimum.chi2, Hypothesis.place)[0]
     freedom = max(closest.whitened.rows - len(closest.minimum.theta), 1)
     level = max(1.0, closest.minimum.chi2 / freedom)
     return level * repeated(closest.minimum.r) ** (1 - 1 / level)

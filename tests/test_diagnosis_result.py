@@ -1,0 +1,41 @@
+"""A diagnosis in words: what its headline says of hypotheses that share a title."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import pytest
+
+from pikanid.estimate import Estimate
+from pikanid.mismatch.explained import _behind
+from pikanid.mismatch.result import Diagnosis, Explanation, NamedEffect, Verdict, Where
+from pikanid.systems import sloshing
+
+
+def explanation(name: str, expression: str, probability: float = 0.5) -> Explanation:
+    effect = NamedEffect((name.replace(" ", "_"),), name, expression, {})
+    return Explanation((effect,), probability, sloshing(), 0.0, None, None)
+
+
+def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:
+    nothing = cast(Estimate, None)
+    return Diagnosis(verdict, 1e-9, 0.01, Where("dynamics", "v", (), (), None), given, (), nothing,
+                     nothing, None)
+
+
+@pytest.mark.parametrize("verdict", ["set", "unconfirmed"])
+def test_no_headline_says_the_same_twice(verdict: Verdict) -> None:
+    forth = explanation("friction in one direction", "-c*(sign(v) + 1)/2")
+    back = explanation("friction in one direction", "-c*(sign(v) - 1)/2")
+    said = diagnosis(verdict, forth, back).sentence()
+    assert "(-c*(sign(v) + 1)/2); or" in said and "(-c*(sign(v) - 1)/2)" in said
+    # what adds the same to the model is one hypothesis, whatever it is called inside
+    said = diagnosis(verdict, forth, forth).sentence()
+    assert said.count("friction in one direction") == 1 and "one of" not in said
+    said = diagnosis(verdict, forth, explanation("backlash", "-b")).sentence()
+    assert "friction in one direction; or backlash" in said
+
+
+@pytest.mark.parametrize("gap", [-10.0, -0.4, 0.0, 0.4])
+def test_what_fits_no_worse_is_not_said_to_fit_worse(gap: float) -> None:
+    assert "higher" not in _behind(gap) and "0" not in _behind(gap)

@@ -1,0 +1,78 @@
+"""What held-out recordings could have refuted, on hypotheses fitted to simulated ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.api import _opened
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.doubt import least_proof, why_not
+from pikanid.mismatch.hypothesis import Hypothesis, fitted
+from pikanid.recording import Recording
+from pikanid.strategies.nls import NLS
+
+SIGMA = 0.002
+
+
+@pytest.fixture(scope="module")
+def hypotheses() -> tuple[Case, list[Hypothesis]]:
+    """A cubic spring, found in a recording; held out, the same system in another motion."""
+    case = _opened(pk.systems.sloshing(), (moved(1),), (moved(2),), None, lambda text: None)
+    effect = next(c for c in case.candidates if c.key == "cubic_stiffness")
+    found = fitted(case.model, [effect], case.records, [{"k3": 200.0}], 30)
+    assert found is not None
+    return case, [found, case.base]
+
+
+def moved(seed: int, drive: float = 1.0) -> Recording:
+    truth = pk.systems.sloshing().with_term(
+        "theta_dot", "-k3*theta**3", [pk.Parameter("k3", 200.0)])
+    moves = pk.excitation.planar_moves(4, 6.0, seed=seed)
+    moves = moves.with_channels(*(replace(moves[n], values=drive * moves[n].values)
+                                  for n in moves.names))
+    return pk.simulate(truth, moves, sigma=SIGMA, seed=seed)
+
+
+def doubt(case: Case, ranked: list[Hypothesis], later: Recording) -> tuple[str, float]:
+    held = replace(case.records, recordings=(later,))
+    other = replace(case, later=held, predictions={})
+    predicted = other.predicted(case.base)
+    assert predicted is not None
+    return why_not(ranked[0], ranked, other.predicted, 1.0, 0.01), predicted.motion
+
+
+def test_another_motion_proves_a_spring(hypotheses: tuple[Case, list[Hypothesis]]) -> None:
+    said, motion = doubt(*hypotheses, moved(2))
+    assert said == "" and motion > 1e5
+
+
+def test_what_is_at_rest_or_short_proves_nothing(
+        hypotheses: tuple[Case, list[Hypothesis]]) -> None:
+    for later in (moved(2, 0.0), moved(2).window(0.0, 0.045)):
+        said, motion = doubt(*hypotheses, later)
+        assert "could not have refuted cubic stiffness" in said
+        assert motion < 100
+    assert doubt(*hypotheses, moved(2, 0.0))[1] < least_proof(0.01)
+
+
+def test_a_small_motion_bends_no_spring(hypotheses: tuple[Case, list[Hypothesis]]) -> None:
+    """It moves far more than its noise, but a cubic spring does not show in it."""
+    said, motion = doubt(*hypotheses, moved(2, 0.1))
+    assert "could not have refuted cubic stiffness" in said and motion > 1e3
+
+
+def test_a_first_order_model_is_refused_before_any_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits: list[object] = []
+    monkeypatch.setattr(NLS, "fit", lambda *given: fits.append(given))
+    decay = pk.Model.from_dict({
+        "name": "decay", "states": {"x": {"initial": 1.0}},
+        "parameters": {"k": {"guess": 0.5}}, "equations": {"x": "-k*x"},
+        "outputs": {"x": {"expression": "x"}}})
+    t = np.linspace(0, 1, 50)
+    with pytest.raises(pk.errors.BadModel, match="second-order"):
+        pk.diagnose(decay, Recording.from_arrays(t, {"x": np.exp(-t)}))
+    assert not fits
