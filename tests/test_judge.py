@@ -11,9 +11,9 @@ import pikanid as pk
 from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.hypothesis import extended, fitted
-from pikanid.mismatch.judge import _from_levels, _room, held_out
+from pikanid.mismatch.judge import _from_levels, held_out
 from pikanid.mismatch.least_squares import minimise
-from pikanid.mismatch.prior import Prior
+from pikanid.mismatch.prior import Prior, room
 from pikanid.mismatch.whitened import Whitened
 
 
@@ -27,23 +27,23 @@ def test_uncertainty_costs_how_much_narrower_a_recording_makes_it() -> None:
     later = rng.standard_normal((40, 2))
     J = np.vstack([later, root])
     expected = np.log(np.linalg.det(root.T @ root + later.T @ later) / np.linalg.det(root.T @ root))
-    assert _room(J, [0, 1], prior(root)) == pytest.approx(expected, rel=1e-9)
+    assert room(J, [0, 1], prior(root)) == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_a_recording_has_for_itself_costs_the_same_in_any_unit() -> None:
     root, rng = np.diag([2.0]), np.random.default_rng(1)
     J = np.vstack([rng.standard_normal((40, 3)), np.zeros((1, 3))])
     J[-1, 0] = 2.0
-    one = _room(J, [0], prior(root))
+    one = room(J, [0], prior(root))
     J[:, 1:] *= [57.3, 1e-3]
-    assert _room(J, [0], prior(root)) == pytest.approx(one, rel=1e-9)
+    assert room(J, [0], prior(root)) == pytest.approx(one, rel=1e-9)
     # two more parameters of its own cost twice the logarithm of its rows
-    assert one - _room(J[:, :1], [0], prior(root)) == pytest.approx(2 * np.log(41), abs=1.0)
+    assert one - room(J[:, :1], [0], prior(root)) == pytest.approx(2 * np.log(41), abs=1.0)
 
 
 def test_a_law_that_tells_nothing_far_from_its_estimates_gains_nothing_there() -> None:
     J = np.zeros((41, 1))  # as of a limit that is never met
-    assert _room(J, [0], prior(np.array([[3.0]]))) == 0.0
+    assert room(J, [0], prior(np.array([[3.0]]))) == 0.0
 
 
 def opened(size: float) -> Case:

@@ -15,7 +15,7 @@ from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.growing import besides, grown, rough
 from pikanid.mismatch.hypothesis import Hypothesis, extended
 from pikanid.mismatch.least_squares import Minimum, held, minimise
-from pikanid.mismatch.prior import Prior, elsewhere, of_fit
+from pikanid.mismatch.prior import Prior, elsewhere, of_fit, room
 from pikanid.mismatch.remainder import residual_tests
 from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
@@ -126,7 +126,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     worse = max(float(np.sum(left[whitened.rows:] ** 2)) + prior.constant, 0.0)
     chi2 = float(np.sum(left[: whitened.rows] ** 2)) + worse
     samples = whitened.problem.experiments[0].samples[0]
-    return HeldOut(_rmse(gaps), tests, together, chi2, chi2 + _room(found.J, shared, fit),
+    return HeldOut(_rmse(gaps), tests, together, chi2, chi2 + room(found.J, shared, fit),
                    samples.t, samples.y, predicted, moved, _rmse(closer),
                    tuple(_residuals(whitened, gaps)), found.r[: whitened.rows],
                    _inert(whitened, found), _motion(whitened, gaps))
@@ -282,24 +282,3 @@ def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> 
                 other = minimise(whitened.residual, theta, problem.lower, problem.upper, 25)
                 found = min(found, other or found, key=lambda m: m.chi2)
     return found
-
-
-def _room(J: np.ndarray, shared: Sequence[int], fit: Prior) -> float:
-    """What the parameters' uncertainty costs of the probability density of a recording.
-
-    Shared ones: the logarithm of how much narrower the recording makes what a fit has left of them.
-    Others know nothing before, and cost what the recording tells of them beyond one of its rows.
-    """
-    own = [k for k in range(J.shape[1]) if k not in shared]
-    q, _ = np.linalg.qr(J[:, own])
-    known = J[:, shared] - q @ (q.T @ J[:, shared])
-    # far from the estimates a law may tell nothing: no recording makes that uncertainty wider
-    return max(_volume(known) - _volume(fit.root), 0.0) + len(own) * float(np.log(len(J)))
-
-
-def _volume(J: np.ndarray) -> float:
-    """ln det JᵀJ."""
-    if J.shape[1] == 0:
-        return 0.0
-    return float(2 * np.sum(np.log(np.maximum(np.abs(np.diag(np.linalg.qr(J, mode="r"))), 1e-300))))
-

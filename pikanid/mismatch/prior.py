@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,3 +81,24 @@ def _linearised(theta: np.ndarray, J: np.ndarray, r: np.ndarray, inside: tuple[i
     q, root = np.linalg.qr(rest)
     z = q.T @ left
     return Prior(root, theta[shared], z, float(left @ left - z @ z) - least, theta, follow, inside)
+
+
+def room(J: np.ndarray, shared: Sequence[int], fit: Prior) -> float:
+    """What the parameters' uncertainty costs of the probability density of a recording.
+
+    Shared ones: the logarithm of how much narrower the recording makes what a fit has left of them.
+    Others know nothing before, and cost what the recording tells of them beyond one of its rows.
+    """
+    own = [k for k in range(J.shape[1]) if k not in shared]
+    q, _ = np.linalg.qr(J[:, own])
+    known = J[:, shared] - q @ (q.T @ J[:, shared])
+    # far from the estimates a law may tell nothing: no recording makes that uncertainty wider
+    return max(_volume(known) - _volume(fit.root), 0.0) + len(own) * float(np.log(len(J)))
+
+
+def _volume(J: np.ndarray) -> float:
+    """ln det JᵀJ."""
+    if J.shape[1] == 0:
+        return 0.0
+    return float(2 * np.sum(np.log(np.maximum(np.abs(np.diag(np.linalg.qr(J, mode="r"))), 1e-300))))
+

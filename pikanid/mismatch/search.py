@@ -229,8 +229,8 @@ class Search:
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
-        return in_order(self.fits.values(), partial(Hypothesis.score, scale=self.scale()),
-                        Hypothesis.place)
+        scale = self.scale()
+        return in_order(self.fits.values(), lambda h: h.score(scale), Hypothesis.place)
 
     def scale(self) -> float:
         """What χ² counts for."""
@@ -243,8 +243,7 @@ class Search:
                   and c.key not in hypothesis.key and (not c.twin or c.twin not in groups)
                   and not (c.absent and hypothesis.far)]
         screen = Screen(hypothesis, others)
-        if hypothesis.far:
-            least = TELLING * hypothesis.minimum.chi2
+        least = TELLING * hypothesis.minimum.chi2 if hypothesis.far else least
         bent = any(e.channel == "input" for e in hypothesis.effects)
         jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
                            for candidate, starts in screen.singles(
@@ -293,8 +292,7 @@ class Search:
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])
                 and (again or frozenset(e.key for e in job[0]) not in self.fits)
                 and signature(job) not in self.begun]  # from there it would end there again
-        in_turn(jobs,
-                lambda: max(self._closest_chi2(), beside), work, take,
+        in_turn(jobs, lambda: max(self._closest_chi2(), beside), work, take,
                 lambda: always or not self.tired, self.workers,
                 lambda result, chi2: result[1].stands(chi2))
 
