@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from pikanid.cache_jit import cached_jit
 
 
-@njit(cache=True)
+@cached_jit()
 def play(time: np.ndarray, values: np.ndarray, slopes: np.ndarray, half: float
          ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Carrier, its slope and the side of contact, from each knot (K,) on, and how fast that knot
@@ -49,7 +50,7 @@ def play(time: np.ndarray, values: np.ndarray, slopes: np.ndarray, half: float
     return knots[:count], carriers[:count], rates[:count], sides[:count], moves[:count]
 
 
-@njit(cache=True)
+@cached_jit()
 def limited(knots: np.ndarray, carriers: np.ndarray, rates: np.ndarray, sides: np.ndarray,
             moves: np.ndarray, half: float, most: float
             ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -19,7 +19,7 @@ PACKAGE = ROOT / "pikanid"
 # Rows from the ground up: a module may import from its own row and from the rows before it.
 # A name also covers what continues it with an underscore: "model" covers model_parts.
 ROWS = (
-    ("errors", "version"),
+    ("errors", "version", "cache"),
     ("units", "expressions", "expression_functions"),
     ("approximators",),
     ("model", "channel", "resampling", "kinematics", "alignment", "reading", "writing", "recording",

@@ -11,14 +11,11 @@ vanishes, so that each step sees a smooth right-hand side.
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 from numba import njit
 from scipy.integrate import DOP853
 
+from pikanid.cache_jit import cached_jit
 from pikanid.concealed import equations as eq
 from pikanid.concealed import tank_equations
 
@@ -214,80 +211,61 @@ def _switch(which, kind, t, x, n, row, drive, p, mode, u, dx):
             mode[STUCK], mode[HELD] = 0, 0
 
 
-def _source_digest() -> int:
-    folder = Path(__file__).parent
-    text = b"".join((folder / name).read_bytes() for name in ("equations.py", "tank_equations.py"))
-    return int.from_bytes(hashlib.sha256(text).digest()[:7], "big")
+@cached_jit()
+def integrate(kind, p, drive, stops, segments, x0, reverses, states):
+    """Integrate from stops[0] through all stops.
 
+    Args: kind RIG or TANK; p its settings; drive (K, 9): knot [s], four values at the knot,
+    four slopes; stops (M,) rising [s]; segments (M,) row of `drive` that holds up to each
+    stop; x0 (n,); `reverses`: whether θ' = 0 is an event; states (M, n) result.
 
-def _compiled(digest: int) -> Callable[..., int]:
-    """`integrate`, compiled once for all processes.
-
-    Numba's cache looks at the file of the cached function only; the digest of the other files,
-    being part of the closure, makes it compile anew when one of them changes.
+    Returns the number of events, or -1 where events or steps do not end or the state is not
+    finite.
     """
-
-    @njit(cache=True)
-    def integrate(kind, p, drive, stops, segments, x0, reverses, states):
-        """Integrate from stops[0] through all stops.
-
-        Args: kind RIG or TANK; p its settings; drive (K, 9): knot [s], four values at the knot,
-        four slopes; stops (M,) rising [s]; segments (M,) row of `drive` that holds up to each
-        stop; x0 (n,); `reverses`: whether θ' = 0 is an event; states (M, n) result.
-
-        Returns the number of events, or -1 where events or steps do not end or the state is not
-        finite.
-        """
-        n = len(x0) if digest else 0
-        x, x_new, u, dx = x0.copy(), np.empty(n), np.empty(4), np.empty(n)
-        stages = np.empty((STAGES, n))
-        mode = np.zeros(5, dtype=np.int64)
-        mode[SIGN], mode[MEMORY_SIGN] = 1, 1
-        t, h_next, events, steps = stops[0], np.inf, 0, 0
-        states[0] = x
-        for m in range(1, len(stops)):
-            row = segments[m]
-            if reverses and x[1] == 0.0:
-                _settle(kind, t, x, n, row, drive, p, mode, u, dx)
-            while t < stops[m]:
-                left = stops[m] - t
-                h = min(h_next, left)
-                error = _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new)
-                steps += 1
-                if not error <= 1.0:
-                    if h < 1e-15 or error != error or steps > MOST_STEPS:
-                        return -1
-                    h_next = h * max(0.2, 0.9 * error ** (-1.0 / 8.0))
-                    continue
-                grow = 5.0 if error < 1e-6 else min(5.0, 0.9 * error ** (-1.0 / 8.0))
-                h_next = max(h * grow, h_next if h == left else 0.0)
-                broken = _broken(kind, t + h, x_new, n, row, drive, p, mode, reverses, NONE, u, dx)
-                if broken == NONE:
-                    t = stops[m] if h == left else t + h
-                    x[:] = x_new
-                    continue
-                for _ in range(4):  # two guards may meet: do not pass the turn to and fro for ever
-                    h = _locate(broken, kind, t, h, x, n, row, drive, p, mode, u, stages, x_new, dx)
-                    _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new)
-                    earlier = _broken(
-                        kind, t + h, x_new, n, row, drive, p, mode, reverses, broken, u, dx)
-                    if earlier == NONE or h == 0.0:
-                        break
-                    broken = earlier
-                events += 1
-                if events > MOST_EVENTS:
+    n = len(x0)
+    x, x_new, u, dx = x0.copy(), np.empty(n), np.empty(4), np.empty(n)
+    stages = np.empty((STAGES, n))
+    mode = np.zeros(5, dtype=np.int64)
+    mode[SIGN], mode[MEMORY_SIGN] = 1, 1
+    t, h_next, events, steps = stops[0], np.inf, 0, 0
+    states[0] = x
+    for m in range(1, len(stops)):
+        row = segments[m]
+        if reverses and x[1] == 0.0:
+            _settle(kind, t, x, n, row, drive, p, mode, u, dx)
+        while t < stops[m]:
+            left = stops[m] - t
+            h = min(h_next, left)
+            error = _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new)
+            steps += 1
+            if not error <= 1.0:
+                if h < 1e-15 or error != error or steps > MOST_STEPS:
                     return -1
-                t += h
+                h_next = h * max(0.2, 0.9 * error ** (-1.0 / 8.0))
+                continue
+            grow = 5.0 if error < 1e-6 else min(5.0, 0.9 * error ** (-1.0 / 8.0))
+            h_next = max(h * grow, h_next if h == left else 0.0)
+            broken = _broken(kind, t + h, x_new, n, row, drive, p, mode, reverses, NONE, u, dx)
+            if broken == NONE:
+                t = stops[m] if h == left else t + h
                 x[:] = x_new
-                if broken == REVERSAL and h == 0.0:
-                    mode[SIGN] = -mode[SIGN]
-                else:
-                    _switch(broken, kind, t, x, n, row, drive, p, mode, u, dx)
-            states[m] = x
-        return events
-
-    kernel: Callable[..., int] = integrate
-    return kernel
-
-
-integrate = _compiled(_source_digest())
+                continue
+            for _ in range(4):  # two guards may meet: do not pass the turn to and fro for ever
+                h = _locate(broken, kind, t, h, x, n, row, drive, p, mode, u, stages, x_new, dx)
+                _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new)
+                earlier = _broken(
+                    kind, t + h, x_new, n, row, drive, p, mode, reverses, broken, u, dx)
+                if earlier == NONE or h == 0.0:
+                    break
+                broken = earlier
+            events += 1
+            if events > MOST_EVENTS:
+                return -1
+            t += h
+            x[:] = x_new
+            if broken == REVERSAL and h == 0.0:
+                mode[SIGN] = -mode[SIGN]
+            else:
+                _switch(broken, kind, t, x, n, row, drive, p, mode, u, dx)
+        states[m] = x
+    return events

@@ -6,10 +6,11 @@ Imported where it is used: numba takes its time.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from pikanid.cache_jit import cached_jit
 
 
-@njit(cache=True)
+@cached_jit()
 def follow(A: np.ndarray, F: np.ndarray, h: np.ndarray, start: np.ndarray, parts: int
            ) -> np.ndarray:
     """Many linear systems that share their matrix, X' = A(t) X + F(t): X (L, n, m) by the classical
@@ -68,7 +69,7 @@ def follow(A: np.ndarray, F: np.ndarray, h: np.ndarray, start: np.ndarray, parts
     return out
 
 
-@njit(cache=True)
+@cached_jit()
 def lagged(t: np.ndarray, y: np.ndarray, tau: float, held: bool = False) -> np.ndarray:
     """A first-order lag tau of y (L,) at times t; of a held signal the mean over each step."""
     out = np.empty(len(y))
@@ -89,7 +90,7 @@ def lagged(t: np.ndarray, y: np.ndarray, tau: float, held: bool = False) -> np.n
     return out
 
 
-@njit(cache=True)
+@cached_jit()
 def bouc_wen(q: np.ndarray) -> np.ndarray:
     """Bouc and Wen's z along q (L,), q in units of the yield displacement: dz = dq (1 - sgn(dq) z)
     when loaded further, dz = dq when unloaded; exact along straight lines.

@@ -1,21 +1,15 @@
 """Compiled sums for the normal equations of local bases.
 
-Compiled once and kept on disk by numba, which is why this module is imported only where it is used.
+Compiled once and kept on disk, which is why this module is imported only where it is used.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
-
 import numpy as np
-from numba import njit
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+from pikanid.cache_jit import cached_jit
 
-
-def _compiled(function: _Function) -> _Function:
-    return cast(_Function, njit(cache=True, error_model="numpy", nogil=True)(function))
+_compiled = cached_jit(error_model="numpy", nogil=True)
 
 
 @_compiled

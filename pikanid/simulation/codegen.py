@@ -24,6 +24,7 @@ import math
 import numpy as np
 from numba import njit
 
+from pikanid.cache_jit import cached_jit
 from pikanid.simulation.support import (
     Seen, log_abs, positive_power, power_slope, sgn, solve_small, spline_basis, work_dtype)
 

@@ -8,7 +8,6 @@ the compiled models.
 from __future__ import annotations
 
 import functools
-import hashlib
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from pikanid.cache import kept, named, processor, sources
 from pikanid.simulation import tape as ops
-from pikanid.simulation.compiled import kept
 from pikanid.simulation.native_step import look, step
 from pikanid.simulation.native_text import Writer, blocks, splat
 from pikanid.simulation.tape import GROUPS, Tape
@@ -55,14 +54,15 @@ def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
     """
     from llvmlite import binding
 
-    parts = [_version(), tape.sizes, active, moving_inputs, *(
+    writers = (Path(__file__).with_name(f"{name}.py") for name in
+               ("tape", "native_tape", "native_step", "native_text"))
+    name = named("object", sources(*writers), tape.sizes, active, moving_inputs, *(
         (name, found.tolist()) for table in (tape.code, tape.outputs)
-        for name, found in table.items())]
-    digest = hashlib.sha256(repr(parts).encode()).hexdigest()[:24]
+        for name, found in table.items()))
     with _lock:
         binding.initialize_native_target()
         binding.initialize_native_asmprinter()
-        code = kept(f"tape_{digest}.o", lambda: _compiled(_text(tape, active, moving_inputs)))
+        code = kept(name, lambda: _compiled(_text(tape, active, moving_inputs)))
         machine = binding.Target.from_default_triple().create_target_machine()
         engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
@@ -90,24 +90,13 @@ def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:
 
 
 def _compiled(text: str) -> bytes:
-    """Object code for this machine."""
+    """Object code for the processor that numba compiles for, too."""
     from llvmlite import binding
 
-    machine = binding.Target.from_default_triple().create_target_machine(
-        opt=1, cpu=binding.get_host_cpu_name(),
-        features=binding.get_host_cpu_features().flatten())
+    triple, cpu, features = processor()
+    machine = binding.Target.from_triple(triple).create_target_machine(
+        opt=1, cpu=cpu, features=features)
     return bytes(machine.emit_object(binding.parse_assembly(text)))
-
-
-@functools.cache
-def _version() -> str:
-    """What object code depends on beside a tape: the writers, LLVM and the processor."""
-    from llvmlite import __version__, binding
-
-    here = Path(__file__).parent
-    writers = ("tape", "native_tape", "native_step", "native_text")
-    return "\n".join([*((here / f"{n}.py").read_text() for n in writers), __version__,
-                      binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
 
 
 def _reached(tape: Tape, seeds: set[int]) -> set[int]:

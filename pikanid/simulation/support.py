@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
 
+from pikanid.cache_jit import cached_jit
 from pikanid.simulation.layout import STEEP, Seen, work_dtype
 
 # generated models find everything they need in this module
@@ -20,8 +20,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 def kernel(function: _Function) -> _Function:
     """Compile a function that allocates nothing, without numba's reference counting."""
-    options: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-    return cast(_Function, njit(**options)(function))
+    return cached_jit(error_model="numpy", _nrt=False)(function)
 
 
 @kernel

@@ -7,18 +7,15 @@ and serve every model; its formulas become machine code in a few milliseconds.
 from __future__ import annotations
 
 import functools
-import hashlib
-import sys
 import threading
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from pikanid.simulation.bound_tape import BoundTape, bound
-from pikanid.simulation.compiled import Method, kernel_text, written
+from pikanid.simulation.compiled import Method, generated, kernel_text
 from pikanid.simulation.native_tape import FUNCTIONS, Native, native
 from pikanid.simulation.simulator import Simulator
 from pikanid.simulation.structure import Structure
@@ -27,14 +24,14 @@ from pikanid.simulation.tape import GROUPS, Tape, can_run, tape
 _NAMES = [name.upper() for name in FUNCTIONS]
 _HEADER = f'''"""Integrators of tapes; generated from the kernels."""
 import numpy as np
-from numba import njit
 
+from pikanid.cache_jit import cached_jit
 from pikanid.simulation.native_call import call_look, call_native, call_step
 from pikanid.simulation.support import solve_small
 
 
 def called(function):
-    return njit(cache=True, error_model="numpy", _nrt=False)(function)
+    return cached_jit(error_model="numpy", _nrt=False)(function)
 
 
 {", ".join(name.upper() for name in GROUPS)} = range({len(GROUPS)})
@@ -114,20 +111,10 @@ def machine(program: Tape) -> Machine:
 
 @functools.cache
 def _kernel(hybrid: bool) -> ModuleType:
-    import importlib.util
-
     kind = "hybrid" if hybrid else "smooth"
-    name = f"pikanid_tape_{kind}"
-    spec = importlib.util.spec_from_file_location(name, written(f"tape_{kind}", _source(kind)))
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    return generated(f"tape_{kind}", _source(kind))
 
 
 def _source(kind: str) -> str:
     parts = ["tape", *(["tape_signs"] if kind == "hybrid" else []), f"tape_{kind}"]
-    # numba keeps integrators by their own text, but how they call machine code is part of them
-    calls = hashlib.sha256(Path(__file__).with_name("native_call.py").read_bytes()).hexdigest()
-    return "\n\n".join([_HEADER.rstrip("\n") + "\n", *map(kernel_text, parts), f"# {calls}\n"])
+    return "\n\n".join([_HEADER.rstrip("\n") + "\n", *map(kernel_text, parts)])

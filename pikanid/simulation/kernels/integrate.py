@@ -102,7 +102,7 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
 WORK = work_dtype(N, M, P, Q, K, STAGES, *BUFFERS)
 
 
-@njit(cache=True, error_model="numpy")
+@cached_jit(error_model="numpy")
 def integrate(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, first, output,
               row, inside, X, Y, J):
     """`run` with its scratch; the only function of a model that Python calls.

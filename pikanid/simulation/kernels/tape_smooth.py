@@ -35,7 +35,7 @@ def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, ou
     return 0, L - 1
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@cached_jit(error_model="numpy", nogil=True)
 def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, first, output,
                    row, inside, X, Y, J):
     """`run_tape` with its scratch; the only function that Python calls."""
