@@ -49,9 +49,10 @@ def _module(structure: Structure, method: Method) -> types.ModuleType:
     model = structure.model
     source = compiler._source(model, method)
     source = source.replace("from numba import njit\n", "")
+    source = source.replace("from pikanid.cache_jit import cached_jit\n", "")
     source = source.replace("np.zeros(1, WORK)", "[fields_of(WORK)]")
     made = types.ModuleType("interpreted")
-    made.__dict__.update(njit=_plain, fields_of=_fields)
+    made.__dict__.update(njit=_plain, cached_jit=_plain, fields_of=_fields)
     exec(compile(source, f"<{model.name}>", "exec"), made.__dict__)
     for name in ("solve_small", "positive_power", "power_slope", "log_abs", "sgn", "spline_basis"):
         setattr(made, name, getattr(support, name).py_func)

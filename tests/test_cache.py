@@ -182,7 +182,7 @@ def test_machine_code_is_found_again_and_never_that_of_another_callee(folder: Pa
 
 
 def test_machine_code_depends_on_all_that_it_is_made_from() -> None:
-    pair, turned = namedtuple("P", "a b"), namedtuple("P", "b a")  # noqa: PYI024
+    pair, turned = namedtuple("P", "a b"), namedtuple("P", "b a")
     made = [adding(1.0), adding(1), adding(np.array([1.0])), adding(np.array([2.0])),
             adding((1.0,)), adding(pair(1.0, 2.0)), adding(pair), adding(turned),
             adding(np.dtype("f4")), adding(1.0, error_model="numpy"),

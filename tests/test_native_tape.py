@@ -9,6 +9,7 @@ import interpreted
 import numpy as np
 import pytest
 from llvmlite import binding
+from numba.core import config
 from test_translated import recorded, values
 
 from pikanid import systems
@@ -99,7 +100,7 @@ def test_what_has_been_translated_is_kept(
     assert native(program, (0, 1), False) is native(program, (0, 1), False)
     native.cache_clear()
     native(program, (0, 1), False)
-    (file,) = (tmp_path / "compiled").glob("*.o")
+    (file,) = (tmp_path / "compiled").glob("object_*")
     content = file.read_bytes()
     monkeypatch.setattr(binding.TargetMachine, "emit_object", None)  # not translated once more
     native.cache_clear()
@@ -114,11 +115,32 @@ def test_a_spoilt_file_is_written_anew(
     program = tape(Structure(simulator_of("-a*abs(theta_dot)*theta_dot").model))
     native.cache_clear()
     native(program, (0, 1), False)
-    (file,) = (tmp_path / "compiled").glob("*.o")
+    (file,) = (tmp_path / "compiled").glob("object_*")
     file.write_bytes(content)
     native.cache_clear()
     assert native(program, (0, 1), False).addresses.all()
     assert len(file.read_bytes()) > len(content)
+
+
+def test_it_is_made_for_the_processor_that_numba_is_told(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PIKANID_CACHE", str(tmp_path))
+    program = tape(Structure(simulator_of("-a*abs(theta_dot)*theta_dot").model))
+    asked = []
+    create = binding.Target.create_target_machine
+
+    def noted(target: binding.Target, **options: object) -> object:
+        asked.append(options.get("cpu"))
+        return create(target, **options)
+
+    monkeypatch.setattr(binding.Target, "create_target_machine", noted)
+    for name in (None, "generic"):
+        monkeypatch.setattr(config, "CPU_NAME", name)
+        native.cache_clear()
+        native(program, (0, 1), False)
+    native.cache_clear()
+    assert [cpu for cpu in asked if cpu] == [binding.get_host_cpu_name(), "generic"]
+    assert len(list((tmp_path / "compiled").glob("object_*"))) == 2
 
 
 def test_threads_have_registers_of_their_own() -> None:
