@@ -15,7 +15,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 PYTEST := $(ONE_THREAD) $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help venv study lint test test-all bench reports notebooks clean
+.PHONY: help venv study lint test test-all mutants bench reports notebooks clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' Makefile | expand -t 14
@@ -41,6 +41,12 @@ test: lint ## lint, then the quick tests (minutes)
 test-all: lint ## lint, then all tests, the slow ones too
 	$(PYTEST) -m ""
 
+mutants: $(STAMP) ## wrong lines that the tests see: mutmut on a sample, to reports/mutants.md
+	mkdir -p reports
+	$(BIN)/python benchmarks/mutants.py run $(JOBS)
+	$(BIN)/python benchmarks/mutants.py again $(JOBS)
+	$(BIN)/python benchmarks/mutants.py report reports
+
 bench: $(STAMP) ## time the code against its references; writes reports/performance.md
 	mkdir -p build reports
 	$(BIN)/python -m pytest benchmarks -m "" --benchmark-only --benchmark-json build/benchmarks.json
@@ -57,5 +63,5 @@ notebooks: $(STAMP) ## execute every notebook from top to bottom
 	$(BIN)/python -m pytest --nbmake --nbmake-timeout=300 notebooks
 
 clean: ## remove the environment, builds and caches
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) build mutants dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

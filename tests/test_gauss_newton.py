@@ -102,6 +102,22 @@ def test_sandwich_and_effective_parameters(name: str) -> None:
     assert used == pytest.approx(np.trace(data @ bread @ data.T), rel=1e-6)
 
 
+def test_covariance_grows_as_the_variance_of_the_noise() -> None:
+    """A hundred million times the variance and as much less physics: the same point, less sure."""
+    sharp = slosh(0.1, stride=4)
+    blunt = sharp.with_sigma(theta=1e4 * float(sharp["theta"].sigma))
+    found = []
+    for recording, lam in ((sharp, LAM), (blunt, 1e-8 * LAM)):
+        functional = collocated(guessed(), recording, intervals=10)
+        system = BandedSystem(functional)
+        at = system.linearise(random_point(functional), lam)
+        step = system.step(at, -WIDE[:2], WIDE[:2])
+        found.append(theta_covariance(system, at, step, [1.0]))
+    assert np.diag(step.schur).min() < 1.0  # little is known, yet something
+    for less, more in zip(*found, strict=True):
+        assert np.allclose(more, 1e8 * less, rtol=1e-6)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_reduced_matrix_at_a_large_lambda(name: str) -> None:
     """What the normal equations leave of it has lost its digits; an orthogonal reduction keeps."""

@@ -1,0 +1,257 @@
+"""Do the tests see a wrong line?  mutmut plants them, one at a time, in a sample of the code.
+
+Usage: python benchmarks/mutants.py run [JOBS [PATTERN...]]
+       python benchmarks/mutants.py again [JOBS] [PATTERN [TESTS...]]
+       python benchmarks/mutants.py report FOLDER
+
+`run` makes the mutants of the sample below mutants/ and tries those that have no verdict, so an
+interrupted run goes on.  `again` tries survivors in processes of their own, where a mutant is there
+when modules are imported, with more of the tests that reach them.  `report` writes
+FOLDER/mutants.md.  Whether a mutation belongs to the sample depends on SEED, its file, function and
+number in the function only; the shares make the rooms' samples about as large as TARGET says.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from fnmatch import fnmatch
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+WORK, MUTANTS = ROOT / "build" / "mutants", ROOT / "mutants"
+REASONS = ROOT / "benchmarks" / "mutants_survivors.toml"
+SEED = 1
+# Share of each room's mutations; "objective" is what builds residuals and judges them.
+SHARES = {"discrepancy": 0.021, "equivalence": 0.028, "mismatch": 0.0095, "noise": 0.05,
+          "objective": 0.035, "optimise": 0.021, "simulation": 0.016, "symbolic": 0.018,
+          "uncertainty": 0.065}
+OBJECTIVE = ("adequacy.py", "functional*.py", "held*.py", "problem.py", "shooting.py")
+UNCERTAINTY = ("information.py", "profile_likelihood.py", "uncertainty.py")
+
+
+def room(path: str) -> str:
+    """The room of a file, as in CONTRIBUTING."""
+    inside = Path(path).relative_to("pikanid")
+    if len(inside.parts) > 1:
+        return inside.parts[0]
+    for name, patterns in (("objective", OBJECTIVE), ("uncertainty", UNCERTAINTY),
+                           ("noise", ("noise*.py",))):
+        if any(fnmatch(inside.name, p) for p in patterns):
+            return name
+    raise ValueError(f"{path} belongs to no room of this report")
+
+
+def in_sample(path: str, function: str, number: int) -> bool:
+    """Whether mutation `number` of a function is tried."""
+    digest = hashlib.sha256(f"{SEED} {path} {function} {number}".encode()).digest()
+    return int.from_bytes(digest[:8]) < SHARES.get(room(path), 0.0) * 2.0**64
+
+
+def idle(node: Any, mutated: Any) -> bool:
+    """Changes that no run of the package can show: the check of `zip`, the type of a `cast`."""
+    import libcst as cst
+
+    if not isinstance(node, cst.Call) or not isinstance(mutated, cst.Call):
+        return False
+    if isinstance(node.func, cst.Name) and node.func.value == "cast":
+        return True
+    return [_value(a) for a in node.args if not _strict(a)] == [
+        _value(a) for a in mutated.args if not _strict(a)]
+
+
+def _strict(argument: Any) -> bool:
+    return argument.keyword is not None and argument.keyword.value == "strict"
+
+
+def _value(argument: Any) -> int:
+    return id(argument.value)
+
+
+def only_the_sample() -> None:
+    """Let mutmut make no other mutants than those of the sample."""
+    from mutmut.mutation import file_mutation
+
+    make = file_mutation.create_mutations
+
+    def sampled(filename: str, *arguments: Any) -> Any:
+        module, mutations, *rest = make(filename, *arguments)
+        seen: Counter[str] = Counter()
+        kept = []
+        for mutation in mutations:
+            function = mutation.contained_by_top_level_function
+            name = getattr(getattr(function, "name", None), "value", None)
+            if name is None or idle(mutation.original_node, mutation.mutated_node):
+                continue
+            seen[name] += 1
+            if in_sample(filename, name, seen[name]):
+                kept.append(mutation)
+        return module, kept, *rest
+
+    file_mutation.create_mutations = sampled
+
+
+def prepare() -> None:
+    """Surroundings of every test process; results of another sample are dropped."""
+    os.chdir(ROOT)
+    os.environ |= {"MUTANTS_WORK": str(WORK), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+                   "MKL_NUM_THREADS": "1"}
+    WORK.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(WORK / "scratch", ignore_errors=True)
+    sample, note = json.dumps([SEED, SHARES]), WORK / "sample.json"
+    if not note.exists() or note.read_text() != sample:
+        shutil.rmtree(MUTANTS, ignore_errors=True)
+        note.write_text(sample)
+
+
+def run(jobs: int, patterns: Sequence[str] = ()) -> None:
+    """Every mutant of the sample that has no verdict and is asked for."""
+    prepare()
+    only_the_sample()
+    from mutmut.__main__ import _run
+
+    left = [name for _, name, verdict in verdicts() if verdict == "not checked"
+            and any(fnmatch(name, p) for p in patterns)]
+    _run(left or patterns, jobs)
+
+
+def verdicts() -> Iterator[tuple[Any, str, str]]:
+    """Each mutant: mutmut's data of its file, its name and its verdict."""
+    from mutmut.mutation.data import SourceFileMutationData
+    from mutmut.stats import status_by_exit_code
+    from mutmut.utils.file_utils import walk_mutatable_files
+
+    for path in sorted(walk_mutatable_files()):
+        data = SourceFileMutationData(path=path)
+        data.load()
+        for name, code in data.exit_code_by_key.items():
+            yield data, name, status_by_exit_code[code]
+
+
+def again(jobs: int, pattern: str = "*", tests: Sequence[str] = ()) -> None:
+    """Survivors once more, each in a process of its own."""
+    prepare()
+    from mutmut.__main__ import tests_for_mutant_names
+    from mutmut.stats import load_stats
+    from mutmut.utils.file_utils import copy_also_copy_files
+
+    load_stats()
+    copy_also_copy_files()
+    alive = [(data, name) for data, name, verdict in verdicts()
+             if verdict in ("survived", "no tests") and fnmatch(name, pattern)]
+
+    def once(found: tuple[Any, str]) -> tuple[Any, str, int]:
+        data, name = found
+        return data, name, _in_a_process(name, tests or sorted(tests_for_mutant_names([name])))
+
+    with ThreadPoolExecutor(jobs) as pool:
+        for data, name, code in pool.map(once, alive):
+            print(f"{code:4d}  {name}", flush=True)
+            data.load()
+            data.exit_code_by_key[name] = 33 if code == 5 else code
+            data.save()
+
+
+def _in_a_process(name: str, tests: Sequence[str]) -> int:
+    if not tests:
+        return 5
+    environment = os.environ | {
+        "MUTANT_UNDER_TEST": name, "PYTHONPATH": f"{MUTANTS}{os.pathsep}{ROOT / 'benchmarks'}",
+        "PY_IGNORE_IMPORTMISMATCH": "1", "MUTANTS_BUDGET": os.environ.get("MUTANTS_BUDGET", "60")}
+    words = [sys.executable, "-m", "pytest", "--rootdir=.", "-x", "-q", "--tb=no",
+             "-p", "mutants_session", "-p", "no:cacheprovider", *tests]
+    return subprocess.run(words, cwd=MUTANTS, env=environment, stdout=subprocess.DEVNULL,
+                          stderr=subprocess.DEVNULL, check=False).returncode
+
+
+def change(data: Any, name: str) -> str:
+    """What a mutant alters: lines of before, an arrow, lines of after."""
+    from mutmut.mutation.diff_apply import get_diff_for_mutant
+
+    lines = get_diff_for_mutant(name, path=data.path).splitlines()[3:]
+    before, after = ([line[1:].strip() for line in lines if line.startswith(sign)]
+                     for sign in "-+")
+    return f"{' '.join(before)} → {' '.join(after)}"
+
+
+def place(name: str) -> str:
+    """module.function or module.Class.method of a mutant."""
+    module, _, function = name.partition("__mutmut_")[0].rpartition(".x")
+    return f"{module}.{function[1:].replace('ǁ', '.')}"
+
+
+def report(folder: str) -> None:
+    """Write FOLDER/mutants.md from mutmut's verdicts and the reasons given for survivors."""
+    prepare()
+    from provenance import provenance
+
+    from pikanid.reporting.sheet import Sheet
+
+    reasons = tomllib.loads(REASONS.read_text(encoding="utf-8"))
+    counts: dict[str, Counter[str]] = {}
+    alive = []
+    for data, name, verdict in verdicts():
+        own = counts.setdefault(room(str(data.path)), Counter())
+        own[verdict if verdict in GROUPS else "crashed"] += 1
+        if verdict in ("survived", "no tests"):
+            key = f"{place(name)}: {change(data, name)}"
+            alive.append((place(name), f"`{change(data, name)}`", reasons.get(key, "open")))
+    rows = [(name, *_row(counts[name])) for name in sorted(counts)]
+    rows.append(("all", *_row(sum(counts.values(), Counter()))))
+    sheet = Sheet(("room", *HEADERS), tuple(rows), HEADERS)
+    left = Sheet(("where", "before → after", "why it lives"), tuple(sorted(alive)))
+    (Path(folder) / "mutants.md").write_text(TEXT.format(
+        tool=version("mutmut"), seed=SEED, provenance=provenance(), sheet=sheet.to_markdown(),
+        shares=", ".join(f"{name} {share:.1%}" for name, share in SHARES.items()),
+        left=left.to_markdown()), encoding="utf-8")
+
+
+def _row(found: Counter[str]) -> tuple[str, ...]:
+    total = found.total()
+    dead = total - found["survived"] - found["no tests"] - found["not checked"]
+    return (str(total), *(str(found[g]) for g in GROUPS), f"{dead / max(total, 1):.1%}")
+
+
+GROUPS = ("killed", "timeout", "crashed", "survived", "no tests", "not checked")
+HEADERS = ("mutants", *GROUPS, "dead")
+TEXT = """# Wrong lines that the tests see
+
+Written by `benchmarks/mutants.py` (`make mutants`) with mutmut {tool}; {provenance}. Seed {seed}; \
+share of each room's mutations that is tried: {shares}.
+
+mutmut changes one thing in one function (an operator, a number, a condition, an argument, an \
+assignment) and runs the quick tests that reach the function. A mutant is dead when a test fails \
+(killed), never ends (timeout) or takes the interpreter down (crashed).
+
+{sheet}
+
+Not mutated: functions with a decorator other than `staticmethod` and `classmethod` (properties, \
+cached values, functions that numba compiles), the kernels' texts, statements outside functions, \
+drawings, the `strict` flag of `zip` and the type in a `cast`. Left out of the tests: slow ones, \
+docstrings' examples, and those about source text, installation, files, the command line and \
+networks' training.
+
+## Survivors
+
+{left}
+"""
+
+
+if __name__ == "__main__":
+    what, *words = sys.argv[1:]
+    if what == "run":
+        run(int(words[0]) if words else 2, words[1:])
+    elif what == "again":
+        again(int(words[0]) if words else 2, *words[1:2], tests=words[2:])
+    elif what == "report":
+        report(words[0])

@@ -1,0 +1,90 @@
+"""A pytest plugin for runs on mutants: few tests, the likeliest first, and nothing shared.
+
+mutmut names the mutant in MUTANT_UNDER_TEST and passes every test that reaches the function.  Here
+they are put in order (the file named after the module first, then the fastest) and cut where their
+time exceeds MUTANTS_BUDGET seconds, so that a survivor costs seconds, too.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+
+WORK = Path(os.environ["MUTANTS_WORK"])
+BUDGET = float(os.environ.get("MUTANTS_BUDGET", "15"))
+MEMORY = 6 << 30
+# Tests about the source text, the installation or other programs; mutants are none of theirs.
+LEFT_OUT = ("architecture", "readme", "concealed", "plots", "datasets", "interrupts", "public_api",
+            "no_traces", "study", "cli.py", "compiled_cache", "diagnosis_memory", "kan_",
+            "pinn", "pikan", "reading", "mlp", "excitation", "slosh_recording", "units")
+_durations: dict[str, float] = {}
+
+
+def mutant() -> str:
+    """The mutant's name; empty while mutmut collects or runs the tests of the code as it is."""
+    name = os.environ.get("MUTANT_UNDER_TEST", "")
+    return name if "__mutmut_" in name else ""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """A cache of compiled models for each mutant: what one has spoilt is not found by the next."""
+    template, own = WORK / "cache", WORK / "scratch" / str(os.getpid())
+    if mutant():
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+        own.mkdir(parents=True, exist_ok=True)
+        if template.is_dir() and not mutant().startswith("pikanid.simulation."):
+            shutil.copytree(template, own, dirs_exist_ok=True)
+    os.environ["PIKANID_CACHE"] = str(own if mutant() else template)
+    known = Path("mutmut-stats.json")
+    if known.exists():
+        _durations.update(json.loads(known.read_text())["duration_by_test"])
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the mutant's cache."""
+    if mutant():
+        shutil.rmtree(WORK / "scratch" / str(os.getpid()), ignore_errors=True)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Test files that see no mutant of the sample, or not those that are asked for."""
+    name, only = collection_path.name, os.environ.get("MUTANTS_FILES")
+    if not name.startswith("test_"):
+        return None
+    out = any(word in name for word in LEFT_OUT)
+    return True if out or (only and not any(w in name for w in only.split(","))) else None
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Order, and cut at the budget."""
+    if os.environ.get("MUTANT_UNDER_TEST", "") in ("stats", "list_all_tests", "fail"):
+        return
+    parts = mutant().partition(".x")[0].split(".")
+    items.sort(key=lambda i: (i.path.stem.removeprefix("test_") not in parts, _time(i)))
+    spent = 0.0
+    for n, item in enumerate(items):
+        spent += _time(item)
+        if n > 0 and spent > BUDGET:
+            config.hook.pytest_deselected(items=items[n:])
+            del items[n:]
+            break
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Processor seconds, not those of the clock: other programs run beside."""
+    if mutant():
+        _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+        wanted = int(time.process_time() + 10 * _time(item) + 20)
+        limit = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, hard))
+
+
+def _time(item: pytest.Item) -> float:
+    return _durations.get(item.nodeid, 0.1)
