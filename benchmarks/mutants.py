@@ -8,7 +8,7 @@ Usage: python benchmarks/mutants.py run [JOBS [PATTERN...]]
 interrupted run goes on.  `again` tries survivors in processes of their own, where a mutant is there
 when modules are imported, with more of the tests that reach them.  `report` writes
 FOLDER/mutants.md.  Whether a mutation belongs to the sample depends on SEED, its file, function and
-number in the function only; the shares make the rooms' samples about as large as TARGET says.
+number in the function only, so edits elsewhere do not move it.
 """
 
 from __future__ import annotations
