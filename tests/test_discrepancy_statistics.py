@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom, multivariate_normal
+from scipy.stats import binom, chi2, multivariate_normal
 
-from pikanid.discrepancy.bands import posterior, simultaneous_factor, wald
+from pikanid.discrepancy.bands import (
+    _smoothest,
+    holm,
+    posterior,
+    simultaneous_factor,
+    wald,
+)
 from pikanid.discrepancy.edges import EdgePlan
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import Gauge, Visited, fix_gauges
@@ -178,3 +185,48 @@ def test_gauge_leaves_a_step_alone() -> None:
     assert isinstance(gauge, Gauge)
     assert replace(plan(True), step=False).size == plan(True).size - 1
     np.testing.assert_allclose(gauge.removed[-1], 0.0, atol=1e-12)
+
+
+def test_holm_is_the_closure_of_bonferroni() -> None:
+    """A test is significant where no set of tests that holds it passes as a whole at α (R. Marcus,
+    E. Peritz and K. R. Gabriel, Biometrika 63, 1976).
+    """
+    rng, partly = np.random.default_rng(0), 0
+    for count in (1, 2, 3, 5):
+        for p in rng.uniform(0.0, 0.06, (40, count)):
+            sets = [s for size in range(1, count + 1)
+                    for s in itertools.combinations(range(count), size)]
+            closed = [all(min(p[list(s)]) <= 0.05 / len(s) for s in sets if k in s)
+                      for k in range(count)]
+            assert holm(p.tolist(), 0.05) == closed
+            partly += 0 < sum(closed) < count
+    assert partly > 20
+    # without correction, or with Bonferroni's, these would be others
+    assert holm([0.04, 0.024, 0.015, 0.005], 0.05) == [True] * 4
+    assert holm([0.04, 0.03, 0.015, 0.005], 0.05) == [False, False, True, True]
+
+
+def test_false_alarms_of_several_tests_together_are_as_stated() -> None:
+    p = np.random.default_rng(1).uniform(size=(2000, 5))
+    alarms = sum(any(holm(row.tolist(), 0.05)) for row in p)
+    expected = 1 - 0.99**5
+    assert binom.ppf(0.001, 2000, expected) <= alarms <= binom.ppf(0.999, 2000, expected)
+
+
+@pytest.mark.parametrize(("freedom", "count"), [(0.0, 3), (4.6, 5), (40.0, 8)])
+def test_wald_is_the_fall_of_chi_square_beside_what_the_gauge_takes_out(
+        freedom: float, count: int) -> None:
+    """By two linear regressions: with the tested functions, and without them."""
+    gauges = fix_gauges((plan(),), visited())
+    noise = np.random.default_rng(7).normal(size=400)
+    y = 0.012 * visited().arguments[:, 0] ** 3 / SIGMA + noise
+    columns = [design() @ np.vstack([np.zeros((2, part.shape[1])), part])
+               for part in (gauges[0].removed, _smoothest(gauges[0], count))]
+    alone = np.hstack([design()[:, :2], columns[0]])
+    fall = [float(np.sum((y - X @ np.linalg.lstsq(X, y, rcond=None)[0]) ** 2))
+            for X in (alone, np.hstack([alone, columns[1]]))]
+    p, tested = wald(linear_fit(y), [0], gauges, [freedom])
+    assert tested == count
+    # priors on offset and coefficients are weak, but there; one degree more or less were 15 %
+    assert chi2.isf(p, count) == pytest.approx(fall[0] - fall[1], rel=0.03)
+    assert 1e-8 < p < 0.5

@@ -20,9 +20,10 @@ from pikanid.equivalence import (  # noqa: E402
     compare,
     run_checks,
 )
-from pikanid.equivalence.checks import settings  # noqa: E402
+from pikanid.equivalence.checks import apart, compare_paths, settings  # noqa: E402
 from pikanid.equivalence.ipda import IpdaObjective  # noqa: E402
 from pikanid.equivalence.network import NetworkLoss  # noqa: E402
+from pikanid.equivalence.optimisers import Path as Iterates  # noqa: E402
 from pikanid.equivalence.setting import motion  # noqa: E402
 from pikanid.equivalence.systems import SYSTEMS  # noqa: E402
 
@@ -48,13 +49,16 @@ def rows(report: EquivalenceReport, check: str, quantity: str | None = None) -> 
 )
 def test_terms_agree(report: EquivalenceReport, quantity: str) -> None:
     limit = 1e-10 if "gradient" in quantity else 1e-12
-    assert max(r.difference for r in rows(report, "shallow KAN", quantity)) <= limit
+    found = rows(report, "shallow KAN", quantity)
+    assert max(r.difference for r in found) <= limit
+    assert {r.tolerance for r in found} == {limit}  # what the report itself asks for
 
 
 @pytest.mark.parametrize("optimiser", ["L-BFGS", "Adam", "Levenberg-Marquardt"])
 def test_optimisers_walk_the_same_path(report: EquivalenceReport, optimiser: str) -> None:
     found = rows(report, "shallow KAN", f"20 iterates of {optimiser}")
     assert len(found) == 6 and max(r.difference for r in found) <= 1e-8
+    assert {r.tolerance for r in found} == {1e-8}
 
 
 def test_minimisers_agree(report: EquivalenceReport) -> None:
@@ -122,6 +126,43 @@ def test_a_wrong_formula_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     monkeypatch.setitem(SYSTEMS, "sloshing", wrong)
     assert not all(check.passed for check in compare(setting))
+
+
+@pytest.mark.parametrize("quantity", [
+    "loss", "gradient in c", "gradient in p", "Jacobian", "Gauss-Newton matrix"])
+def test_every_term_notices_a_parameter_off_by_ten_parts_in_a_billion(
+        quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    setting = Setting("duffing", "state", grid=5, weight=1.0)
+    right = SYSTEMS["duffing"]
+    monkeypatch.setitem(SYSTEMS, "duffing", dataclasses.replace(
+        right, torch=lambda x, v, u, p: right.torch(x, v, u, p * (1.0 + 1e-8))))
+    (found,) = (check for check in compare(setting) if check.quantity == quantity)
+    assert not found.passed and found.difference < 1e-6
+
+
+def test_paths_notice_a_parameter_off_by_a_ten_thousandth(monkeypatch: pytest.MonkeyPatch) -> None:
+    setting = Setting("duffing", "state", grid=4, samples=21, collocation=31, weight=1.0)
+    assert all(check.passed for check in compare_paths(setting, quick=True))
+    right = SYSTEMS["duffing"]
+    monkeypatch.setitem(SYSTEMS, "duffing", dataclasses.replace(
+        right, torch=lambda x, v, u, p: right.torch(x, v, u, p * (1.0 + 1e-4))))
+    found = compare_paths(setting, quick=True)
+    assert len(found) >= 3 and not any(check.passed for check in found)
+
+
+def test_paths_are_apart_where_curves_or_parameters_are() -> None:
+    basis = np.eye(4)[:, :3]
+    z = np.arange(1.0, 15.0).reshape(2, 7)  # two iterates: three rows of two outputs, a parameter
+    path = Iterates(z, True)
+    assert apart(path, path, basis, 2) == 0.0
+    for k, scale in ((6, 14.0), (4, 13.0)):
+        moved = z.copy()
+        moved[1, k] += 0.5
+        found = apart(path, Iterates(moved, True), basis, 2)
+        assert found == pytest.approx(0.5 / max(scale, z[1, k] + 0.5))
+    longer = Iterates(np.vstack([z, z[1:]]), True)
+    assert apart(path, longer, basis, 2) == 0.0
+    assert apart(path, dataclasses.replace(longer, converged=False), basis, 2) == np.inf
 
 
 @pytest.mark.parametrize("system", SYSTEMS)

@@ -15,6 +15,7 @@ pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 from pikanid.approximators import LinearApproximator, local_rows  # noqa: E402
 from pikanid.approximators.kan import ShallowKAN, build_kan  # noqa: E402
 from pikanid.approximators.kan.bases import silu  # noqa: E402
+from pikanid.approximators.kan.build import read, write  # noqa: E402
 
 pytestmark = pytest.mark.kan
 
@@ -190,3 +191,20 @@ def test_bad_use_is_explained() -> None:
     shallow.kan.fix_symbolic(0, 0, 0, "x", fit_params_bool=False, verbose=False)
     with pytest.raises(errors.BadSetting, match="symbolic"):
         ShallowKAN(shallow.kan)
+
+
+@pytest.mark.parametrize("base", ["zero", "silu"])
+def test_a_masked_output_is_zero_whatever_its_coefficients_are(base: str) -> None:
+    shallow = shallow_kan(outputs=3, base=base)
+    edges = shallow.kan.act_fun[0]
+    rng = np.random.default_rng(1)
+    write(edges.scale_sp, rng.uniform(0.5, 2.0, (1, 3)))
+    write(edges.mask, np.array([[1.0, 0.0, 1.0]]))
+    t, c = times(), shallow.coefficients
+    assert not c[:, 1].any() and c[:, [0, 2]].any(axis=0).all()
+    np.testing.assert_allclose(shallow.values(t, c), shallow.forward(t), atol=1e-12)
+    before = read(edges.coef)[0, [0, 2]]
+    shallow.set_coefficients(np.column_stack([c[:, 0], np.ones(len(c)), 2 * c[:, 2]]))
+    np.testing.assert_allclose(read(edges.coef)[0, [0, 2]], before * [[1.0], [2.0]])
+    np.testing.assert_allclose(shallow.coefficients, c * [1.0, 0.0, 2.0], atol=1e-12)
+    assert not shallow.forward(t)[:, 1].any()

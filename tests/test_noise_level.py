@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pikanid.channel import Channel
-from pikanid.mismatch.noise_level import Level, _still, first_level, refined
+from pikanid.mismatch.noise_level import Level, _still, _whittle, first_level, refined
 from pikanid.recording import Recording
 
 T = np.arange(1000) * 0.01
@@ -159,3 +159,54 @@ def test_no_explanation_makes_sure_noise_louder() -> None:
     y = coloured(0.0, 11) + np.sin(2 * t) + np.sin(3.1 * t) + np.sin(4.3 * t)
     level = refined(Level(1.0, 0.0, 0.0, 0.01, ""), Channel("y", t, y), t, y, 8.0, None, True)
     assert (level.sigma, level.rho) == (pytest.approx(1.0, abs=0.05), 0.0)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, -0.4, 0.95])
+def test_whitening_is_the_inverse_covariance_over_gaps_too(rho: float) -> None:
+    """wᵀw = rᵀΣ⁻¹r with Σ_jk = σ²·ρ^|j - k|, j and k the samples' numbers on the grid."""
+    at = np.delete(np.arange(40), [3, 11, 12, 13, 30])
+    sigma, r = 0.3, np.random.default_rng(0).normal(size=(35, 3))
+    level = Level(sigma, rho, 0.1, 0.01, "")
+    covariance = sigma**2 * np.sign(rho) ** np.abs(np.subtract.outer(at, at)) * np.abs(rho) ** (
+        np.abs(np.subtract.outer(at, at)))
+    white = level.whiten(r, 5.0 + 0.01 * at)
+    np.testing.assert_allclose(white.T @ white, r.T @ np.linalg.solve(covariance, r), rtol=1e-9)
+    np.testing.assert_allclose(level.whiten(r[:, 1], 5.0 + 0.01 * at), white[:, 1])
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.7])
+def test_a_sigma_that_is_given_stays_and_its_colour_is_read(rho: float) -> None:
+    t = np.arange(2001) * 0.01
+    level = Level(1.0, 0.0, 0.0, 0.01, "given")
+    found = refined(level, Channel("y", t, t), t, coloured(rho, 1), 5.0, None)
+    assert (found.sigma, found.source) == (1.0, "given")
+    assert found.rho == pytest.approx(rho, abs=0.15)
+    for given in (0.9, 1.0, 1.1):
+        assert _whittle(spectra_of(rho), given)[0] == pytest.approx(given)
+    free, alone, _ = _whittle(spectra_of(rho), None)
+    assert free == pytest.approx(1.0, rel=0.1) and alone == pytest.approx(rho, abs=0.1)
+
+
+def spectra_of(rho: float) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """The periodogram of 2000 samples of AR(1) noise of unit variance."""
+    p = np.abs(np.fft.rfft(coloured(rho, 2)[:2000])) ** 2 / 2000
+    return [(np.linspace(0, np.pi, len(p))[1:-1], p[1:-1], 1.0)]
+
+
+def test_the_standard_error_of_a_power_is_one_over_the_root_of_its_ordinates() -> None:
+    """And σ² of white noise is the mean of the ordinates, up to those that are no noise."""
+    spectra = spectra_of(0.0)
+    sigma, rho, spread = _whittle(spectra, None)
+    assert rho == 0.0 and sigma == pytest.approx(np.sqrt(np.mean(spectra[0][1])), rel=0.01)
+    assert 1 / np.sqrt(999) <= spread < 4 / np.sqrt(999)
+
+
+def test_what_a_recording_states_is_taken() -> None:
+    stated = Recording.from_arrays(T, {"y": MOVING}, sigma={"y": np.linspace(0.1, 0.3, 1000)})
+    level = first_level(stated, "y", None)
+    assert level.sigma == pytest.approx(0.2) and (level.rho, level.spread) == (0.0, 0.0)
+    assert level.source == "given" and level.interval == pytest.approx(0.01)
+    y = MOVING + 0.01 * coloured(0.6, 3)[:1000]
+    read = first_level(Recording.from_arrays(T, {"y": y}), "y", (0.0, 1.99))
+    assert read.sigma == pytest.approx(0.01, rel=0.3) and read.rho == pytest.approx(0.6, abs=0.2)
+    assert 0.1 < read.spread < 0.6 and read.stretch == pytest.approx((0.0, 1.99))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.stats import binom
 
 from pikanid import errors
 from pikanid.approximators.bspline import BSpline
+from pikanid.expressions import symbol
 from pikanid.symbolic import name_edge
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import fit_form
@@ -200,3 +202,47 @@ def test_curve_that_knows_little_is_offered_little() -> None:
     assert fit_form(full, curve) is None
     fit = fit_form(FORMS["cubic"], curve)
     assert fit is not None and fit.amplitudes[0] == pytest.approx(1.0)
+
+
+POWERS = {"abs_power": lambda x, n: np.abs(x) ** n,
+          "signed_power": lambda x, n: np.sign(x) * np.abs(x) ** n,
+          "log_abs": lambda x: np.log(np.abs(x))}
+
+
+@pytest.mark.parametrize("scale", [0.2, 1.0, 3.0])
+def test_forms_agree_where_the_data_cannot_tell_them_apart(scale: float) -> None:
+    """Within three standard deviations of the whole curve: Σ ((f - g)/σ)² ≤ 9."""
+    x = np.linspace(-1.0, 1.0, 60)
+    y = np.sin(1.2 * x)
+    edge = name_edge(x, y, sigma=0.05 / scale)
+    first, agreeing = None, []
+    for c in edge.candidates:
+        curve = sp.lambdify(symbol("x"), c.numeric(), [POWERS, "numpy"])(x) * np.ones(60)
+        curve = (curve - curve.mean()) / (0.05 / scale)  # the constant is nobody's
+        first = curve if first is None else first
+        distance = float(np.sum((curve - first) ** 2))
+        assert c.agrees == (distance <= 9.0), (c.form.name, distance)
+        agreeing.append(c.agrees)
+    assert agreeing[0] and any(agreeing) and not all(agreeing)
+    assert edge.probability == pytest.approx(
+        sum(c.probability for c in edge.candidates if c.agrees))
+
+
+def test_a_sigma_that_is_stated_is_the_noise() -> None:
+    """Stated ten times too small, a straight line is no answer to a slight bend in it."""
+    x = np.linspace(-1.0, 1.0, 100)
+    y = x + 0.05 * np.random.default_rng(1).normal(size=100)
+    right, wrong = (name_edge(x, y, sigma=s) for s in (0.05, 0.005))
+    assert right.noise == wrong.noise == 1.0
+    line = next(c for c in right.candidates if c.form.name == "linear")
+    assert line.fit.rss == pytest.approx(
+        np.sum((y - np.polyval(np.polyfit(x, y, 1), x)) ** 2) / 0.05**2)
+    assert line.std["a"] == pytest.approx(0.05 / np.sqrt(np.sum((x - x.mean()) ** 2)))
+    other = next(c for c in wrong.candidates if c.form.name == "linear")
+    assert other.fit.rss == pytest.approx(100 * line.fit.rss)
+    assert line.adequacy > 0.01 > other.adequacy
+    by_sample = np.where(x < 0, 0.05, 0.5)
+    weighed = next(c for c in name_edge(x, y, sigma=by_sample).candidates
+                   if c.form.name == "linear")
+    a, b = np.polyfit(x, y, 1, w=1 / by_sample)
+    assert (weighed.values["a"], weighed.values["d"]) == pytest.approx((a, b))

@@ -97,6 +97,8 @@ def _size(A: Array, c: Array, V: Array) -> tuple[float, float, float]:
     slope = moments @ c / size if size > 0.0 else np.zeros(len(c))
     values, vectors = np.linalg.eigh(moments)
     seen = values > 1e-8 * max(values[-1], 1e-300)
+    if not seen.any():  # nothing behind the edge passes it on
+        return 0.0, 0.0, 1.0
     root = (vectors[:, seen] * np.sqrt(values[seen])).T
     spread = root @ V @ root.T
     known, turn = np.linalg.eigh(0.5 * (spread + spread.T))
