@@ -28,8 +28,8 @@ NOTHING = np.empty((N, 0))
 
 def judged(r: np.ndarray, one_sided: tuple[bool, ...] = (True, True), signs: np.ndarray = SIGNS,
            bands: list[np.ndarray] | None = None, spread: float = 0.0) -> Detection:
-    return detect(r, J, signs, np.array(one_sided, bool), [NARROW, WIDE] if bands is None else bands,
-                  INPUTS, spread)
+    lines = [NARROW, WIDE] if bands is None else bands
+    return detect(r, J, signs, np.array(one_sided, bool), lines, INPUTS, spread)
 
 
 def near(p: float, share: float) -> object:
