@@ -15,7 +15,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 PYTEST := $(ONE_THREAD) $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help venv study lint test test-all mutants bench reports notebooks clean
+.PHONY: help venv study lint test test-all test-slow platforms mutants bench reports notebooks clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' Makefile | expand -t 14
@@ -46,6 +46,21 @@ mutants: $(STAMP) ## wrong lines that the tests see: mutmut on a sample, to repo
 	$(BIN)/python benchmarks/mutants.py run $(JOBS)
 	$(BIN)/python benchmarks/mutants.py again $(JOBS)
 	$(BIN)/python benchmarks/mutants.py report reports
+
+# The number of commits decides: the same commit runs the same part, the next one the next.
+SLOW_PARTS ?= 5
+SLOW_PART ?= $(shell echo $$(( $$(git rev-list --count HEAD 2>/dev/null || echo 0) \
+	% $(SLOW_PARTS) + 1 )))
+
+test-slow: $(STAMP) ## one part of the slow tests; parts take turns from commit to commit
+	@echo "slow tests: part $(SLOW_PART) of $(SLOW_PARTS)"
+	$(PYTEST) -m slow --slow-part $(SLOW_PART)/$(SLOW_PARTS)
+
+PLATFORMS ?= --report build/platforms.md
+
+platforms: $(STAMP) ## quick tests and diagnoses under other CPU settings (an hour); PLATFORMS=--short
+	mkdir -p build
+	$(BIN)/python benchmarks/platforms.py --jobs $(JOBS) $(PLATFORMS)
 
 bench: $(STAMP) ## time the code against its references; writes reports/performance.md
 	mkdir -p build reports

@@ -1,4 +1,4 @@
-"""For tests and doctests alike: which are left out, and how models are run."""
+"""For tests and doctests alike: which are left out or have their turn, and how models are run."""
 
 from __future__ import annotations
 
@@ -20,6 +20,19 @@ collect_ignore_glob = (
     ]
 )
 USED = "pikanid.simulation.simulator.compiled"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Turns of slow tests."""
+    parser.addoption("--slow-part", metavar="K/N", help="of N parts of equal length the K-th only")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what has its turn another time; of what is selected only, hence last."""
+    from turns import keep_part
+
+    keep_part(config, items)
 
 
 @pytest.fixture(scope="session", autouse=True)
