@@ -46,24 +46,26 @@ class Shooting:
 
         "fine": the integration error moves no estimate by more than about a hundredth of its
         standard error (0.01 σ/√N an output), or, where no σ is known, is 1e-10 of the signal;
-        "coarse": ten times that (1e-5 of the signal), never more than 1e-3 of the signal.
+        "coarse": ten times that (1e-5 of the signal), never more than 1e-3 of the signal.  Each
+        output has a tolerance of its own, in its own unit.
         """
         old, self.steps = self.steps, []
         for r, simulator in enumerate(self.simulators):
             p = self.problem.parameters(theta, r)
-            samples = self.problem.experiments[r].samples
-            limits = [_tolerance(s) for s in samples if len(s.t)]
-            tolerance = min(limits, default=None)
-            if tolerance is not None and accuracy == "coarse":
-                signal = min(float(np.ptp(s.y)) for s in samples if len(s.t))
-                stated = all(s.sigma is not None for s in samples)
-                tolerance = min(tolerance * (10 if stated else 1e5), 1e-3 * signal)
+            samples = [s for s in self.problem.experiments[r].samples if len(s.t)]
+            fine = [_tolerance(s) for s in samples]
+            scale = np.concatenate([np.full(len(s.t), limit) for s, limit in zip(
+                samples, fine, strict=True)]) if samples else None
+            tolerance = 1.0 if samples else None
+            if samples and accuracy == "coarse":
+                tolerance = min(_coarser(s, limit) for s, limit in zip(samples, fine, strict=True))
             known = old[r] if old and accuracy == "fine" else None
             method, finest = self.method, 0.0
             if self.limits:
                 method, finest = self.limits[r].method, self.limits[r].longest / HURRY
             trial = functools.partial(self._trial, theta, r)
-            self.steps.append(simulator.choose_steps(p, tolerance, method, known, finest, trial))
+            self.steps.append(
+                simulator.choose_steps(p, tolerance, method, known, finest, trial, scale))
         self._at = b""
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
@@ -158,3 +160,9 @@ def _tolerance(samples: Samples) -> float:
     if samples.sigma is not None:
         return 0.01 * float(np.min(samples.sigma)) / np.sqrt(len(samples.t))
     return 1e-10 * max(float(np.ptp(samples.y)), 1e-300)
+
+
+def _coarser(samples: Samples, limit: float) -> float:
+    """How many times more than `limit` an output may err at first."""
+    usual = 10.0 if samples.sigma is not None else 1e5
+    return min(usual, 1e-3 * float(np.ptp(samples.y)) / limit)

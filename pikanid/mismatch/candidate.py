@@ -21,6 +21,9 @@ SYMBOLIC = "symbolic:"  # before the formula, in the id of a law that no catalog
 class View:
     """The nominal motion in one recording, at the stops of its simulation: t (L,), and by name
     states, inputs and recorded channels (L,), the rates of the states, and the rows that are seen.
+
+    `by_parameter` holds p ∂f_v/∂p (L,) by the names (v, p) of a rate and of a parameter that its
+    equation holds: several equations may hold one.
     """
 
     t: Array
@@ -30,7 +33,7 @@ class View:
     extra: Mapping[str, Array]
     y: Mapping[str, Array]
     y_rate: Mapping[str, Array]
-    by_parameter: Mapping[str, Array]
+    by_parameter: Mapping[tuple[str, str], Array]
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,8 @@ def static_bias(site: Site) -> list[Candidate]:
     """A constant force, or a tilt; a system that starts at rest starts where it holds balance."""
     b = Parameter(site.name("bias"), 0.0, f"{site.unit}/s^2")
     k = site.stiffness
-    balanced = site.rest and k != 0
+    # without a restoring force there is no balance to start in
+    balanced = site.rest and site.rate > 0
 
     def extend(model: Model) -> Model:
         model = model.with_term(site.v, b.name)
@@ -127,7 +128,7 @@ def parameter_drift(site: Site) -> list[Candidate]:
             ("parameter_drift",), f"drift of {p}", f"{p} -> {text}", "dynamics", site, (r,),
             lambda m: m.replace(equations={**m.equations, site.v: m.equations[site.v].xreplace(
                 {symbol(p): m.formula(text, "drift")})}),
-            lambda w: [Sign({r.name: 1.0}, force=w.by_parameter[p] * w.t)], variant=p)
+            lambda w: [Sign({r.name: 1.0}, force=w.by_parameter[site.v, p] * w.t)], variant=p)
 
     return [one(p) for p in site.free_in_force]
 

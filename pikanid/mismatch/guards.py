@@ -27,11 +27,16 @@ def _product(u: str, v: str) -> Shape:
 
 
 def _half_sign(v: str, sign: int) -> Shape:
-    return lambda w: -(sense(w, v) + sign) / 2
+    # at rest friction holds whatever pushes, as dry friction does: half of it would push by itself
+    def shape(w: View) -> np.ndarray:
+        rests = (w.x[v] == 0) & (w.rates[v] == 0)
+        return np.where(rests, 0.0, -(sense(w, v) + sign) / 2)
+
+    return shape
 
 
-def _lever(p: str) -> Shape:
-    return lambda w: w.by_parameter[p]
+def _lever(v: str, p: str) -> Shape:
+    return lambda w: w.by_parameter[v, p]
 
 
 def _through(u: str, text: str) -> Callable[[Model], Model]:
@@ -166,7 +171,7 @@ def wobble(site: Site) -> list[Candidate]:
     for p in site.free_in_force[:1]:
         found.append(Candidate(("wobble",), f"a {p} that swings", f"{p}*(1 + e*sin(w*t))",
                                "dynamics", site, (), lambda m: m,
-                               swinging(_lever(p), rates), known=False,
+                               swinging(_lever(site.v, p), rates), known=False,
                                fits=False))
     return found
 

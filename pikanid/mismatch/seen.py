@@ -111,9 +111,8 @@ class Watched:
 
     def _chosen_steps(self, p: Array) -> Steps:
         finest = float(np.median(np.diff(self.samples[0].t))) / COARSE
-        wanted = SHARE * float(np.min(self.spread))
-        steps = self.simulator.choose_steps(p, wanted, "explicit", finest=finest)
-        if steps.error > 20 * wanted:
+        steps = self.simulator.choose_steps(p, SHARE, "explicit", finest=finest, scale=self.spread)
+        if steps.error > 20 * SHARE:
             raise errors.SimulationFailed(errors.too_rough_to_plan(self.model.name, self.name))
         return steps
 

@@ -136,10 +136,9 @@ class Tangent:
         force = {}
         for name in self.model.free_names:
             k = self.model.parameter_names.index(name)
-            touched = [i for i, s in enumerate(names)
-                       if self.model.equations[s].has(symbol(name))]
-            if touched:
-                force[name] = self.fp[:, touched[0], k] * self.p[k]
+            for i, s in enumerate(names):
+                if self.model.equations[s].has(symbol(name)):
+                    force[s, name] = self.fp[:, i, k] * self.p[k]
         return View(self.t, {s: self.x[:, i] for i, s in enumerate(names)},
                     {s: f[:, i] for i, s in enumerate(names)},
                     {h.name: acting[:, j] for j, h in enumerate(held)}, extra,

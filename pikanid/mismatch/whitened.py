@@ -78,9 +78,10 @@ class Whitened:
         self.simulators = [Translated(model, e) for e in self.problem.experiments]
         self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
         self.steps: list[Steps] = []
-        # errors of the last choice of steps, and what is allowed of each where nothing is left
+        # errors of the last choice of steps, and what is allowed of each where nothing is left [σ]
         self.weighed: list[tuple[float, float]] = []
         self.rows = self.problem.n_samples
+        self.sigma = [self._sigmas(r) for r in range(len(self.simulators))]
         self.work = 0.0
 
     def choose_steps(self, theta: np.ndarray, share: float = SHARE, misfit: float = 1.0) -> bool:
@@ -93,11 +94,9 @@ class Whitened:
         self.weighed = []
         finest = 64 if misfit < GROSS else 16
         for r, simulator in enumerate(self.simulators):
-            sigma = min(level.sigma for level in self.records.levels[r].values())
-            usual = share * sigma
-            allowed = usual * allowance(misfit)
+            allowed = share * allowance(misfit)
             steps = self._steps(r, theta, allowed, SHARP if simulator.corners else finest)
-            self._weigh(steps, usual)
+            self._weigh(steps, share)
             if simulator.corners and (steps is None or steps.error > allowed):
                 self.simulators[r] = Translated(
                     simulator.model, simulator.experiment, located=True)
@@ -105,7 +104,7 @@ class Whitened:
                 if steps is None:  # a motion at rest on a corner meets it without end
                     self.simulators[r] = simulator
                     steps = self._steps(r, theta, allowed, finest)
-                self._weigh(steps, usual)
+                self._weigh(steps, share)
             if steps is None or steps.error > 20 * allowed:
                 return False
             found.append(steps)
@@ -121,9 +120,8 @@ class Whitened:
             p = self.problem.parameters(theta, r)
             halved = replace(self.steps[r], longest=self.steps[r].longest / 2)
             rough, fine = (simulator.run(p, steps=s) for s in (self.steps[r], halved))
-            size = float(np.abs(fine.y - rough.y).max(initial=0.0)) * 16 / 15
-            usual = SHARE * min(level.sigma for level in self.records.levels[r].values())
-            found.append(size / usual if rough.finished and fine.finished else np.inf)
+            size = float(np.abs((fine.y - rough.y) / self.sigma[r]).max(initial=0.0)) * 16 / 15
+            found.append(size / SHARE if rough.finished and fine.finished else np.inf)
         return found
 
     def step_as(self, *others: Whitened) -> None:
@@ -135,11 +133,17 @@ class Whitened:
         if steps is not None:
             self.weighed.append((steps.error, usual))
 
+    def _sigmas(self, r: int) -> np.ndarray:
+        """σ (rows,) of every sample of recording r, in the unit of its output."""
+        levels, outputs = self.records.levels[r], self.problem.model.outputs
+        return np.concatenate([np.full(len(s.t), levels[outputs[s.output].name].sigma)
+                               for s in self.problem.experiments[r].samples])
+
     def _steps(self, r: int, theta: np.ndarray, allowed: float, finest: int) -> Steps | None:
         try:
             return self.simulators[r].choose_steps(
                 self.problem.parameters(theta, r), allowed, "explicit",
-                finest=self._spacing(r) / finest)
+                finest=self._spacing(r) / finest, scale=self.sigma[r])
         except errors.SimulationFailed:
             return None
 

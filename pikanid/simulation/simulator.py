@@ -170,7 +170,8 @@ class Simulator:
 
     def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
                      method: MethodChoice = "auto", known: Steps | None = None,
-                     finest: float = 0.0, trial: Trial | None = None) -> Steps:
+                     finest: float = 0.0, trial: Trial | None = None,
+                     scale: np.ndarray | None = None) -> Steps:
         """The longest sub-step whose error, by step doubling, is below `tolerance`.
 
         Runs with steps h and h/2 and takes |y_h - y_{h/2}|·16/15 as the error of h (order 4:
@@ -179,11 +180,14 @@ class Simulator:
 
         Parameters
         ----------
-        tolerance : of the outputs, in their own units; default 1e-8 of the largest output
+        tolerance : of the outputs, in their own units or in those of `scale`; default 1e-8 of the
+            largest output
         known : coarser steps in use: shorter ones follow from the method's order, checked at p
         finest : give up below this step [s]; at least 1/4096 of the median interval is tried
         trial : the response at p for given steps and whether these are likely to be chosen; by
             default simulated without sensitivities
+        scale : (rows,) in which the error of each sample is measured, as its σ: what outputs of
+            several units need; the error of the steps found is in it too
 
         Raises
         ------
@@ -193,8 +197,9 @@ class Simulator:
             def trial(steps: Steps, _: bool) -> Response:
                 return self._outputs(p, steps)
         grid = self.grid(p)
+        unit = 1.0 if scale is None else scale
         if known is not None and tolerance:
-            foretold = _foretold(trial, tolerance, known)
+            foretold = _foretold(trial, tolerance, known, unit)
             if foretold is not None:
                 return foretold
         spacing, usual = grid.spacings
@@ -208,11 +213,11 @@ class Simulator:
             while longest > max(spacing / FINEST, finest):
                 fine = trial(Steps(candidate, longest / 2), False)
                 if rough.finished and fine.finished:
-                    scale = tolerance or 1e-8 * max(float(np.abs(fine.y).max(initial=0.0)), 1e-12)
-                    error = float(np.abs(fine.y - rough.y).max(initial=0.0)) * 16 / 15
+                    allowed = tolerance or 1e-8 * max(_largest(fine.y, unit), 1e-12)
+                    error = _largest(fine.y - rough.y, unit) * 16 / 15
                     if best is None or error < best.error:
                         best = Steps(candidate, longest, error)
-                    if error <= scale:
+                    if error <= allowed:
                         return best
                 else:
                     failure = fine
@@ -240,7 +245,12 @@ class Simulator:
                         response.states, finite, response.stopped_at, response.status)
 
 
-def _foretold(trial: Trial, tolerance: float, known: Steps) -> Steps | None:
+def _largest(y: np.ndarray, unit: np.ndarray | float) -> float:
+    return float(np.abs(y / unit).max(initial=0.0))
+
+
+def _foretold(trial: Trial, tolerance: float, known: Steps, unit: np.ndarray | float = 1.0
+              ) -> Steps | None:
     """Steps for `tolerance` by the known order, checked; None where that does not hold."""
     if not known.error > 0:
         return None
@@ -251,8 +261,8 @@ def _foretold(trial: Trial, tolerance: float, known: Steps) -> Steps | None:
     rough, fine = trial(known, False), trial(finer, True)
     if not rough.finished or not fine.finished:
         return None
-    gap = float(np.abs(fine.y - rough.y).max(initial=0.0))
+    gap = _largest(fine.y - rough.y, unit)
     error = gap * ratio**4 / (1 - ratio**4)
-    asymptotic = gap < 1e-3 * float(np.abs(fine.y).max(initial=0.0))
+    asymptotic = gap < 1e-3 * _largest(fine.y, unit)
     good = asymptotic and error <= tolerance
     return Steps(known.method, finer.longest, error) if good else None

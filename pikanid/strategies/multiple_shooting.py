@@ -125,6 +125,8 @@ class _Residuals:
         sizes = np.maximum(np.ptp(np.array([_span(shooting, k) for k in range(len(outputs))]),
                                   axis=1), 1e-300)
         self.scale = float(np.median(shooting.weights)) * float(np.median(sizes))
+        self.spans = np.concatenate([np.full(len(s.t), sizes[s.output])
+                                     for e in shooting.problem.experiments for s in e.samples])
         self._at: np.ndarray | None = None
         self._kept: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -135,10 +137,13 @@ class _Residuals:
         return np.concatenate([p, start])
 
     def choose_steps(self, z: np.ndarray) -> None:
-        """Choose integration steps of every segment at z, for 1e-5 of the signal."""
+        """Choose integration steps of every segment at z, for 1e-5 of each signal."""
         self._at = None
-        self.steps = [g.simulator.choose_steps(self.parameters(z, g), 1e-5 * float(np.ptp(
-            self.shooting.y)), self.shooting.method) for g in self.segments]
+        nodes = np.abs(z[self.n_theta:].reshape(self.shape)).max(axis=0, initial=0.0)
+        states = np.where(nodes > 0, nodes, np.inf)
+        self.steps = [g.simulator.choose_steps(
+            self.parameters(z, g), 1e-5, self.shooting.method,
+            scale=np.concatenate([self.spans[g.rows], states])) for g in self.segments]
 
     def value(self, z: np.ndarray) -> np.ndarray:
         return self._evaluate(z)[0]
