@@ -149,9 +149,29 @@ class Estimate:
         return sum(len(f.t) for f in self.fits)
 
     @property
+    def rmse_by_output(self) -> dict[str, float]:
+        """Root mean square residual of each output over all recordings, in its unit, by name.
+
+        >>> import pikanid as pk
+        >>> model = pk.systems.sloshing_2d()
+        >>> rec = pk.simulate(model, pk.excitation.two_pulse(), sigma={"theta": 2e-3, "phi": 1e-3})
+        >>> {name: round(v, 3) for name, v in pk.NLS().fit(model, rec).rmse_by_output.items()}
+        {'theta': 0.002, 'phi': 0.001}
+        """
+        found: dict[str, list[np.ndarray]] = {}
+        for f in self.fits:
+            found.setdefault(f.output, []).append(f.residual)
+        return {name: float(np.sqrt(np.mean(np.concatenate(own) ** 2)))
+                for name, own in found.items() if sum(map(len, own))}
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return {f.output: f.unit for f in self.fits}
+
+    @property
     def rmse(self) -> float:
-        """Root mean square residual over everything fitted."""
-        return float(np.sqrt(sum(np.sum(f.residual**2) for f in self.fits) / max(self.n, 1)))
+        """Root mean square residual of the first output, in its unit."""
+        return next(iter(self.rmse_by_output.values()), 0.0)
 
     # --- showing and keeping ---------------------------------------------------------------------
 
@@ -168,6 +188,9 @@ class Estimate:
             "chi2": {k: _plain(v) for k, v in self.adequacy.to_dict().items()},
             "n": self.n,
             "rmse": self.rmse,
+            **({"outputs": {name: {"rmse": value, "unit": self._units[name]}
+                            for name, value in self.rmse_by_output.items()}}
+               if len(self.rmse_by_output) > 1 else {}),
             "converged": self.converged,
             "warnings": list(self.warnings),
             "seconds": self.seconds,
@@ -226,7 +249,10 @@ class Estimate:
         what = ("explains the recording" if a.verdict == "fits"
                 else "does NOT explain the recording")
         noise = "the stated noise" if a.source == "given" else "the recording's own noise"
-        return (f"The fit {stop} and {what}: residual {self.rmse:.3g}, "
+        found = self.rmse_by_output.items()
+        sizes = [f"{value:.3g} {self._units[name]}".rstrip() + (
+            f" of '{name}'" if len(found) > 1 else "") for name, value in found]
+        return (f"The fit {stop} and {what}: residual {', '.join(sizes)}, "
                 f"{ratio:.3g} times {noise}.")
 
     __repr__ = __str__

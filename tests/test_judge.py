@@ -132,4 +132,4 @@ def test_a_wall_that_was_hardly_touched_predicts_a_hard_hit(depth: float, seed: 
     assert predicted is not None
     # noise, and what the move costs the first recording
     assert predicted.chi2 < 501 + 4 * np.sqrt(2 * 501)
-    assert predicted.rmse_moved == pytest.approx(0.0017, rel=0.1)
+    assert predicted.rmse_moved["theta"] == pytest.approx(0.0017, rel=0.1)

@@ -70,10 +70,10 @@ def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothe
 def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
              refused: tuple[str, ...] = (), unseen: tuple[str, ...] = (),
              contradicted: tuple[str, ...] = (), inert: tuple[str, ...] = (),
-             rmse: dict[str, float] | None = None, motion: float = 1e4) -> Answer:
-    """The answer with these held-out evidences (0 unless given) and RMSEs (1), some effects refuted
-    there, some not to be seen or not acting, some contradicted by all recordings together, and with
-    so much motion there.
+             misfit: dict[str, float] | None = None, motion: float = 1e4) -> Answer:
+    """The answer with these held-out evidences (0 unless given) and misfits (1), some effects
+    refuted there, some not to be seen or not acting, some contradicted by all recordings together,
+    and with so much motion there.
     """
     fits = [replace(h, minimum=replace(h.minimum, r=h.minimum.r * np.sqrt(
         rounded(h.minimum.chi2) / h.minimum.chi2))) for h in fits]
@@ -89,7 +89,7 @@ def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
         rest = np.array([10.0 * (one in h.key) * (one not in unseen) for one in keys])
         return cast(HeldOut, SimpleNamespace(
             detection=found(h), together=found(h, contradicted), evidence=value,
-            rmse=rounded((rmse or {}).get(name, 1.0)), rest=rest, motion=motion,
+            misfit=rounded((misfit or {}).get(name, 1.0)), rest=rest, motion=motion,
             inert=frozenset(f"p_{one}" for one in inert)))
 
     def adequate(h: Hypothesis) -> Detection:
@@ -164,8 +164,8 @@ def test_more_is_asked_where_the_noise_is_little_known() -> None:
 def test_what_predicts_far_worse_than_the_nominal_model_is_not_proved() -> None:
     """However much of that the parameters' errors would forgive."""
     fits = [BASE, hypothesis(1000.0, A)]
-    assert answered(fits, rmse={"a": 1.4}).verdict == "named"
-    given = answered(fits, rmse={"a": 1.6})
+    assert answered(fits, misfit={"a": 1.4}).verdict == "named"
+    given = answered(fits, misfit={"a": 1.6})
     assert given.verdict == "unconfirmed" and "far worse" in given.doubt
 
 
@@ -240,7 +240,7 @@ def test_the_most_probable_explanation_comes_first() -> None:
     found = [criterion(h, None, 1.0) + {"a": -12.0}.get("+".join(h.key), 0.0) for h in given.given]
     assert len(found) == 2 and found == sorted(found)
     part = answered([BASE, hypothesis(1000.0, A), hypothesis(1001.0, B)], refused=("a", "b"),
-                    rmse={"a": 0.22, "b": 0.21})
+                    misfit={"a": 0.22, "b": 0.21})
     assert part.verdict == "unconfirmed" and [h.key for h in part.given] == [{"a"}, {"b"}]
 
 

@@ -113,8 +113,8 @@ def test_held_out_is_predicted_with_the_estimates_as_they_are() -> None:
     h, later = hypothesis(), recorded(5, length=0.0472)
     found = predicted(h, False, later)
     r = misfit(h.minimum.theta, later)
-    assert found.rmse == pytest.approx(np.sqrt(np.mean(r**2)), rel=1e-3)
-    assert found.rmse > 5 * SIGMA
+    assert found.rmse["theta"] == pytest.approx(np.sqrt(np.mean(r**2)), rel=1e-3)
+    assert found.rmse["theta"] > 5 * SIGMA
     np.testing.assert_allclose(found.predicted - later["theta"].values, r, atol=1e-5)
     # the fit's uncertainty is forgiven: by what both together leave, and the fit alone did not
     best = least_squares(lambda q: np.concatenate([
@@ -122,7 +122,7 @@ def test_held_out_is_predicted_with_the_estimates_as_they_are() -> None:
         x_scale=[0.045, 0.1])
     assert found.chi2 == pytest.approx(2 * best.cost - h.minimum.chi2, rel=5e-3)
     moved = misfit(best.x, later)
-    assert found.rmse_moved == pytest.approx(np.sqrt(np.mean(moved**2)), rel=1e-2)
+    assert found.rmse_moved["theta"] == pytest.approx(np.sqrt(np.mean(moved**2)), rel=1e-2)
     np.testing.assert_allclose(found.moved - later["theta"].values, moved, atol=0.1 * SIGMA)
     (residual,) = found.residuals
     assert residual[:2] == (0, "theta")
@@ -136,8 +136,8 @@ def test_only_what_a_held_out_recording_has_for_itself_is_estimated_anew() -> No
     values = np.array([h.values["l_theta"], h.values["d_theta"]])
     best = least_squares(lambda q: white(misfit(values, later, float(q[0]))), [-0.06], x_scale=0.1)
     r = misfit(values, later, float(best.x[0]))
-    assert found.rmse == pytest.approx(np.sqrt(np.mean(r**2)), rel=1e-2)
-    assert found.rmse > 2 * SIGMA
+    assert found.rmse["theta"] == pytest.approx(np.sqrt(np.mean(r**2)), rel=1e-2)
+    assert found.rmse["theta"] > 2 * SIGMA
 
 
 @pytest.mark.parametrize("drag", [0.4, -0.4])

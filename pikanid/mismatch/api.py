@@ -31,7 +31,7 @@ from pikanid.mismatch.preparation import (
     with_sigma,
 )
 from pikanid.mismatch.repeats import repeats
-from pikanid.mismatch.result import Diagnosis, Proof
+from pikanid.mismatch.result import Diagnosis, OutputError, Proof
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import sites
 from pikanid.mismatch.symbols import symbolic_candidates
@@ -238,7 +238,9 @@ def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
         return None
     # all that a named model leaves is noise, not its highest frequencies alone
     share = best.noise if answer.verdict in ("named", "set") else 1.0
-    sigma = next(iter(case.later.levels[0].values())).sigma * share
-    return Proof(before.rmse, after.rmse, after.rmse_moved, sigma, case.model.outputs[0].unit,
-                 after.detection.p_value, after.t, after.measured, before.predicted,
+    outputs = {o.name: OutputError(before.rmse[o.name], after.rmse[o.name],
+                                   after.rmse_moved[o.name],
+                                   case.later.levels[0][o.name].sigma * share, o.unit)
+               for o in case.model.outputs}
+    return Proof(outputs, after.detection.p_value, after.t, after.measured, before.predicted,
                  after.predicted, after.moved)

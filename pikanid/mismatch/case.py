@@ -30,7 +30,7 @@ SEARCHED = 6000  # rows that a search is made on before its best hypotheses get 
 EXPLAINED = 0.05  # p-value above which a search need not go on
 AGAIN = 5  # iterations of a fit where nothing but the noise is another
 SAME, SAME_RHO = 0.05, 0.06  # changes of a noise level, and its correlation, that make none
-BETTER = 0.9  # ratio of held-out RMSEs that makes one more effect worth while
+BETTER = 0.9  # ratio of held-out misfits that makes one more effect worth while
 
 
 @dataclass
@@ -152,7 +152,7 @@ class Case:
         old, new, nominal = (self.predicted(h) for h in (fewer, more, self.base))
         return old is None or nominal is None or (
             new is not None and smaller(
-                new.rmse, min(BETTER * old.rmse, old.rmse - WORTH * nominal.rmse)))
+                new.misfit, min(BETTER * old.misfit, old.misfit - WORTH * nominal.misfit)))
 
 
 def _same(one: Records, other: Records) -> bool:

@@ -60,7 +60,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
     fits = {o.key: o for o in ranked}
     nominal = predict(fits[frozenset()])
     proof = predict(h)
-    if nominal and proof and smaller(WORSE * nominal.rmse, proof.rmse):
+    if nominal and proof and smaller(WORSE * nominal.misfit, proof.misfit):
         return "as it stands it predicts the held-out recording far worse than the nominal model"
     louder = float(np.exp(AT_MOST * min(h.whitened.records.spread, UNKNOWN)))
     for e in h.effects:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -21,6 +21,7 @@ from pikanid.mismatch.whitened import Records, Whitened
 from pikanid.model import Model
 
 NEAR, AGAIN = 3.0, 4  # standard deviations that a linearisation holds for; how often it is renewed
+Residual = tuple[int, str, np.ndarray, np.ndarray]  # recording, output, times, values
 MISSED = 15.0  # of χ² that a fit to all recordings may exceed fits to each by, where it is best
 
 
@@ -29,14 +30,15 @@ class HeldOut:
     """What a hypothesis makes of a recording that it was not fitted to.
 
     Attributes:
-        rmse: Of the residual, in the output's unit.
+        rmse: Of the residual of each output, in its unit, by name.
+        misfit: Root mean square of the residual of all outputs, in units of their noise.
         tested, tested_together: Make `detection` and `together`.
         chi2: Of the residual with that forgiveness.
         evidence: -2 ln of the probability density of the recording, given the fit (up to a
             constant that all hypotheses share).
         predicted, measured, t: First output.
-        moved, rmse_moved: The same prediction, and its RMSE, with the parameters moved within their
-            errors to where they suit this recording best.
+        moved, rmse_moved: The same prediction, and the RMSE of each output, with the parameters
+            moved within their errors to where they suit this recording best.
         rest: (N,) whitened residual with that forgiveness.
         inert: Names of parameters that hardly act there: a limit that is not met.
         motion: χ² of the whole predicted motion about its mean: what can be seen there at all.
@@ -44,7 +46,8 @@ class HeldOut:
         known: Tests made so far.
     """
 
-    rmse: float
+    rmse: Mapping[str, float]
+    misfit: float
     tested: Callable[[], Detection]
     tested_together: Callable[[], Detection | None]
     chi2: float
@@ -53,8 +56,8 @@ class HeldOut:
     measured: np.ndarray
     predicted: np.ndarray
     moved: np.ndarray
-    rmse_moved: float
-    residuals: tuple[tuple[int, str, np.ndarray, np.ndarray], ...]
+    rmse_moved: Mapping[str, float]
+    residuals: tuple[Residual, ...]
     rest: np.ndarray
     inert: frozenset[str]
     motion: float
@@ -126,9 +129,11 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     worse = max(float(np.sum(left[whitened.rows:] ** 2)) + prior.constant, 0.0)
     chi2 = float(np.sum(left[: whitened.rows] ** 2)) + worse
     samples = whitened.problem.experiments[0].samples[0]
-    return HeldOut(_rmse(gaps), tests, together, chi2, chi2 + room(found.J, shared, fit),
-                   samples.t, samples.y, predicted, moved, _rmse(closer),
-                   tuple(_residuals(whitened, gaps)), found.r[: whitened.rows],
+    residuals = tuple(_residuals(whitened, gaps))
+    sized = np.concatenate([g / sigma for g, sigma in zip(gaps, whitened.sigma, strict=True)])
+    return HeldOut(_rmse(residuals), float(np.sqrt(np.mean(sized**2))), tests, together, chi2,
+                   chi2 + room(found.J, shared, fit), samples.t, samples.y, predicted, moved,
+                   _rmse(_residuals(whitened, closer)), residuals, found.r[: whitened.rows],
                    _inert(whitened, found), _motion(whitened, gaps))
 
 
@@ -197,12 +202,15 @@ def _shown(whitened: Whitened, theta: np.ndarray) -> tuple[np.ndarray, list[np.n
     return responses[0].y[: len(whitened.problem.experiments[0].samples[0].t)], gaps
 
 
-def _rmse(gaps: Sequence[np.ndarray]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(gaps) ** 2)))
+def _rmse(residuals: Iterable[Residual]) -> dict[str, float]:
+    """By output, over all recordings: residuals in several units have no mean."""
+    found: dict[str, list[np.ndarray]] = {}
+    for _, name, _, gap in residuals:
+        found.setdefault(name, []).append(gap)
+    return {name: float(np.sqrt(np.mean(np.concatenate(own) ** 2))) for name, own in found.items()}
 
 
-def _residuals(whitened: Whitened, gaps: list[np.ndarray]
-               ) -> Iterator[tuple[int, str, np.ndarray, np.ndarray]]:
+def _residuals(whitened: Whitened, gaps: list[np.ndarray]) -> Iterator[Residual]:
     for r, gap in enumerate(gaps):
         first = 0
         for s in whitened.problem.experiments[r].samples:

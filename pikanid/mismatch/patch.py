@@ -24,7 +24,7 @@ from pikanid.model_parts import Parameter, Spline
 
 INTERVALS, DEGREE = 5, 3
 INSIDE = 0.95  # of the held-out motion that must lie in the range
-BETTER = 0.9  # of the nominal held-out RMSE that must not be exceeded
+BETTER = 0.9  # of the nominal held-out misfit that must not be exceeded
 GRID = 201
 
 
@@ -38,7 +38,7 @@ class Patch:
         grid, values, std: (G,) over the range, without mean and slope, which constants and
             parameters share; outside the range the edge means nothing.
         inside: Share of the held-out motion in that range.
-        rmse_before, rmse_after: Held out.
+        rmse_before, rmse_after: Of the first output, held out.
     """
 
     model: Model
@@ -52,7 +52,7 @@ class Patch:
     rmse_after: float
 
     def sentence(self, unit: str) -> str:
-        """What it does, where; `unit` is that of the output."""
+        """What it does, where; `unit` is that of the first output."""
         return (f"a KAN edge of {self.argument} over {self.grid[0]:.3g} ... {self.grid[-1]:.3g} "
                 f"takes the held-out RMSE from {self.rmse_before:.3g} to {self.rmse_after:.3g} "
                 f"{unit}; it holds in that range only and has no name".replace("  ", " "))
@@ -80,7 +80,7 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
     if found is None or before is None or found.minimum.chi2 >= base.minimum.chi2:
         return None
     after = predict(found)
-    if after is None or after.rmse > BETTER * before.rmse:
+    if after is None or after.misfit > BETTER * before.misfit:
         return None
     inside = _inside(found, later, edge)
     if inside < INSIDE:
@@ -94,7 +94,7 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
     spread = np.einsum("gi,ij,gj->g", seen, found.covariance[np.ix_(at, at)], seen)
     return Patch(basis.extended(nominal, site, found), edge.argument, shape.unit, grid,
                  seen @ found.minimum.theta[at], np.sqrt(np.maximum(spread, 0.0)), inside,
-                 before.rmse, after.rmse)
+                 *(next(iter(p.rmse.values())) for p in (before, after)))
 
 
 class _Basis:

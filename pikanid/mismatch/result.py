@@ -75,17 +75,24 @@ class Where:
     static_law: bool | None
 
 
-@dataclass(frozen=True, eq=False)
-class Proof:
-    """Held-out record: RMSE before, after, and after with the parameters `moved` within their
-    errors, noise, p-value; and the first output's curves.
+@dataclass(frozen=True)
+class OutputError:
+    """RMSE of one output's prediction, in its unit: before, after, and after with the parameters
+    `moved` within their errors; and its noise.
     """
 
-    rmse_before: float
-    rmse_after: float
-    rmse_moved: float
+    before: float
+    after: float
+    moved: float
     noise: float
     unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """Held-out record: errors of each output by name, p-value; and the first output's curves."""
+
+    outputs: Mapping[str, OutputError]
     p_value: float
     t: np.ndarray
     measured: np.ndarray
@@ -98,7 +105,48 @@ class Proof:
         """Whether the prediction depends on how exactly the parameters are known: after impacts, a
         small error makes another motion.
         """
-        return self.rmse_after > SENSITIVE * self.rmse_moved
+        return any(e.after > SENSITIVE * e.moved for e in self.outputs.values())
+
+    @property
+    def first(self) -> OutputError:
+        """Of the output that is drawn."""
+        return next(iter(self.outputs.values()))
+
+    @property
+    def rmse_before(self) -> float:
+        """Of the first output."""
+        return self.first.before
+
+    @property
+    def rmse_after(self) -> float:
+        """Of the first output."""
+        return self.first.after
+
+    @property
+    def rmse_moved(self) -> float:
+        """Of the first output."""
+        return self.first.moved
+
+    @property
+    def noise(self) -> float:
+        """Of the first output."""
+        return self.first.noise
+
+    @property
+    def unit(self) -> str:
+        """Of the first output."""
+        return self.first.unit
+
+    def to_dict(self) -> dict[str, Any]:
+        """For diagnosis.json: numbers of the first output, and of each where there are several."""
+        found: dict[str, Any] = {
+            "rmse_before": self.rmse_before, "rmse_after": self.rmse_after, "noise": self.noise,
+            "unit": self.unit, "p_value": self.p_value}
+        if len(self.outputs) > 1:
+            found["outputs"] = {name: {
+                "rmse_before": e.before, "rmse_after": e.after, "noise": e.noise, "unit": e.unit}
+                for name, e in self.outputs.items()}
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +227,6 @@ class Diagnosis:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of diagnosis.json."""
-        proof = self.held_out
         return {
             "schema_version": 1,
             "verdict": self.verdict,
@@ -196,9 +243,7 @@ class Diagnosis:
                             for e in h.effects],
                 "probability": h.probability} for h in self.hypotheses],
             "parameters": {"before": _parameters(self.before), "after": _parameters(self.after)},
-            "held_out": None if proof is None else {
-                "rmse_before": proof.rmse_before, "rmse_after": proof.rmse_after,
-                "noise": proof.noise, "unit": proof.unit, "p_value": proof.p_value},
+            "held_out": None if self.held_out is None else self.held_out.to_dict(),
             "undetectable_below": {
                 n: {"value": v.value, "unit": v.unit} for n, v in self.undetectable_below.items()},
             "next_experiment": self.next_experiment,

@@ -27,10 +27,15 @@ def lines_of(dx: Diagnosis) -> list[str]:
         lines.append(f"Not: {h.title}: {h.why_not}")
     if dx.held_out is not None and dx.hypotheses:
         p = dx.held_out
-        moved = (f", {p.rmse_moved:.3g} with the parameters moved within their errors"
-                 if p.sensitive else "")
-        lines.append(f"Proof: held-out RMSE {p.rmse_before:.3g} -> {p.rmse_after:.3g} {p.unit}"
-                     f"{moved} (noise {p.noise:.3g}), p = {p.p_value:.2g}")
+        several = len(p.outputs) > 1
+        told = []
+        for output, error in p.outputs.items():
+            moved = (f", {error.moved:.3g} with the parameters moved within their errors"
+                     if p.sensitive else "")
+            change = f"{error.before:.3g} -> {error.after:.3g} {error.unit}".rstrip()
+            whose = f"of '{output}' " if several else ""
+            told.append(f"{whose}{change}{moved} (noise {error.noise:.3g})")
+        lines.append(f"Proof: held-out RMSE {'; '.join(told)}, p = {p.p_value:.2g}")
     if dx.patch is not None:
         unit = dx.held_out.unit if dx.held_out is not None else ""
         lines.append(f"Patch: {dx.patch.sentence(unit)}.")

@@ -21,9 +21,9 @@ WITHIN = 6.0  # difference of the criterion below which hypotheses are not told 
 MANY = 12  # of them that are tested: no reader wants more
 BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
 GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
-PART = 0.5  # of the nominal held-out RMSE, a quarter of its square, that a part may leave
-ALIKE = 1.1  # ratio of held-out RMSEs below which two hypotheses predict alike
-WORTH = 0.05  # of the nominal held-out RMSE: what an effect must take away where a part remains
+PART = 0.5  # of the nominal held-out misfit, a quarter of its square, that a part may leave
+ALIKE = 1.1  # ratio of held-out misfits below which two hypotheses predict alike
+WORTH = 0.05  # of the nominal held-out misfit: what an effect must take away where a part remains
 OPEN = 2.0  # of the criterion: two explanations that differ by less are given side by side
 SAME = 1.0  # of the criterion: what differs by less may be the same law, written in another way
 PREDICTED = 8  # hypotheses of which that is found out
@@ -167,11 +167,11 @@ def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
             not closest.known and scale < GROSS
             and below(_handicapped(closest, scale), known[0].score(scale))):
         return ()
-    found = {h.key: p.rmse for h in known if (p := predict(h)) is not None}
+    found = {h.key: p.misfit for h in known if (p := predict(h)) is not None}
     lowest = min(found.values(), default=np.inf)
-    if smaller(PART * nominal.rmse, lowest):
+    if smaller(PART * nominal.misfit, lowest):
         return ()
-    enough = max(ALIKE * lowest, lowest + WORTH * nominal.rmse)
+    enough = max(ALIKE * lowest, lowest + WORTH * nominal.misfit)
     good = [h for h in known if not smaller(enough, found.get(h.key, np.inf))]
     fewest = min(len(h.effects) for h in good)
     return tuple(in_order((h for h in good if len(h.effects) == fewest), lambda h: found[h.key],

@@ -121,10 +121,14 @@ def _proof(dx: Diagnosis) -> str:
     proof = dx.held_out
     if proof is None:
         return "<p>There is no held-out recording: nothing can be proved.</p>"
-    moved = (f"{proof.rmse_moved:.3g} with the parameters moved within their errors, "
-             if proof.sensitive and dx.hypotheses else "")
-    return (f"<p>Held-out RMSE: {proof.rmse_before:.3g} before, {proof.rmse_after:.3g} after, "
-            f"{moved}noise {proof.noise:.3g} {escape(proof.unit)}; p = {proof.p_value:.2g}.</p>")
+    told = []
+    for name, e in proof.outputs.items():
+        moved = (f"{e.moved:.3g} with the parameters moved within their errors, "
+                 if proof.sensitive and dx.hypotheses else "")
+        whose = f" of {escape(name)}" if len(proof.outputs) > 1 else ""
+        told.append(f"Held-out RMSE{whose}: {e.before:.3g} before, {e.after:.3g} after, "
+                    f"{moved}noise {e.noise:.3g} {escape(e.unit)}".rstrip())
+    return f"<p>{'; '.join(told)}; p = {proof.p_value:.2g}.</p>"
 
 
 def _patch(dx: Diagnosis) -> str:
