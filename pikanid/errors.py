@@ -6,7 +6,11 @@ exceptions carry that sentence; the command line prints it and exits with `exit_
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import functools
+import reprlib
+from collections.abc import Callable, Iterable, Sequence
+from types import FunctionType
+from typing import Any
 
 EXIT_MISFIT = 3  # of the command line, where a fit is done but explains nothing
 
@@ -43,8 +47,8 @@ class SimulationFailed(PikanidError):
 
 def _listed(names: Iterable[str]) -> str:
     every = list(names)
-    more = [f"... ({len(every)} in all)"] if len(every) > 40 else []
-    return ", ".join(every[:40] + more) or "(none)"
+    more = [f"... ({len(every)} in all)"] if len(every) > 41 else []  # 41: `brief` has said so
+    return ", ".join([_short(str(name), 60) for name in every[:41 - len(more)]] + more) or "(none)"
 
 
 def _did_you_mean(close: Sequence[str]) -> str:
@@ -68,6 +72,13 @@ def formula_too_long(where: str, limit: int) -> str:
 
 def formula_syntax(text: str, where: str, detail: str) -> str:
     return f"The formula of {where} cannot be read ({detail}): '{_short(text)}'."
+
+
+def formula_work(text: str, where: str) -> str:
+    return (
+        f"The formula of {where} makes the model too complicated: '{_short(text)}'; nest fewer "
+        "functions and write shorter products."
+    )
 
 
 def formula_forbidden(part: str, where: str) -> str:
@@ -483,6 +494,41 @@ def bad_bounds(name: str, value: float, bounds: Sequence[float]) -> str:
 
 def bad_value(what: str, value: object, wanted: str) -> str:
     return f"{what} is {value!r}; it must be {wanted}."
+
+
+def detail_too_large(given: int, most: int) -> str:
+    return f"it holds {given / 2**20:.4g} MiB, more than the {most / 2**20:.4g} that are read"
+
+
+def detail_unpacks(most: int) -> str:
+    return f"what it holds would take more than {most / 2**20:.4g} MiB of memory"
+
+
+def too_many_entries(where: str, given: int, most: int) -> str:
+    return f"{where} has {given} entries; more than {most} are not read."
+
+
+def entry_lacks(where: str, missing: Sequence[str]) -> str:
+    return f"{where} lacks {_listed(missing)}."
+
+
+def entry_extra(where: str, extra: Sequence[str], known: Sequence[str]) -> str:
+    return f"{where} holds {_listed(extra)}, which is unknown (known: {_listed(known)})."
+
+
+def entry_too_deep(where: str) -> str:
+    return f"{where} is nested too deeply: nothing of ours writes that."
+
+
+def not_a_formula(where: str, value: object) -> str:
+    return (
+        f"{where} is {value!r}; it must be a formula as text, a finite number, or a SymPy "
+        "expression."
+    )
+
+
+def model_too_long(limit: int) -> str:
+    return f"The formulas of the model are longer than {limit} characters together."
 
 
 def model_file_unreadable(path: str, detail: str) -> str:
@@ -1127,3 +1173,87 @@ def diagnosis_unreadable(case: str, detail: object) -> str:
         f"The diagnosis of case '{_short(case)}' cannot be scored: {_short(str(detail))} (wanted: "
         "verdict, mismatch, and hypotheses with effects' ids and a probability)."
     )
+
+
+# --- what others wrote, inside a sentence of ours ------------------------------------------------
+
+LONGEST_PART = 300  # characters that one value may take in a sentence
+
+
+def brief(value: Any) -> Any:
+    """A value as it may stand in a sentence: of one line, printable, and not too long.
+
+    A file may hold a formula of a million characters, a list of a million numbers, tables nested
+    a thousand deep, an integer of a thousand digits, or characters that steer a terminal.
+
+    >>> print(brief("a\\nb" + 400 * "x")[:6], len(brief(400 * "x")))
+    a bxxx 300
+    >>> brief(7), brief([1, "k"]), brief(10**400)
+    (7, [1, 'k'], an integer of about 401 digits)
+    """
+    if isinstance(value, str):
+        line = value if value.isprintable() else _printable(value[: 2 * LONGEST_PART])
+        return _short(line, LONGEST_PART)
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**18:
+        return _Huge(value)
+    if isinstance(value, list | tuple) and all(isinstance(v, str | int | float) for v in value):
+        kept = [brief(v) if not isinstance(v, str) else _short(brief(v), 60) for v in value[:40]]
+        while len(kept) > 1 and sum(len(str(v)) for v in kept) > 4 * LONGEST_PART:
+            kept = kept[:-1]
+        more = [f"... ({len(value)} in all)"] if len(value) > len(kept) else []
+        return tuple(kept + more) if isinstance(value, tuple) else kept + more
+    if isinstance(value, list | tuple | dict | set | frozenset):
+        return _AsIs(_short(_printable(_NESTED.repr(value)), LONGEST_PART))
+    return value
+
+
+def _printable(text: str) -> str:
+    plain = " ".join(text.splitlines())
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in plain)
+
+
+class _AsIs(str):
+    """A text that has its own quotes."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+class _Huge(float):
+    """An integer that Python would print with all of its digits, or refuse to."""
+
+    def __new__(cls, value: int) -> _Huge:
+        return super().__new__(cls, "inf" if value > 0 else "-inf")
+
+    def __init__(self, value: int) -> None:
+        self.digits = int(value.bit_length() * 0.30103) + 1
+
+    def __repr__(self) -> str:
+        return f"an integer of about {self.digits} digits"
+
+    __str__ = __repr__
+
+    def __format__(self, form: str) -> str:
+        return repr(self)
+
+
+class _Nested(reprlib.Repr):
+    def repr_int(self, x: int, level: int) -> str:
+        return repr(brief(x))
+
+
+_NESTED = _Nested()
+
+
+def _made_brief(sentence: Callable[..., str]) -> Callable[..., str]:
+    @functools.wraps(sentence)
+    def told(*args: Any, **named: Any) -> str:
+        return sentence(*map(brief, args), **{name: brief(v) for name, v in named.items()})
+
+    return told
+
+
+# One rule for all sentences, those of tomorrow too, instead of a call in each of them.
+for _name, _member in list(globals().items()):
+    if isinstance(_member, FunctionType) and not _name.startswith("_") and _name != "brief":
+        globals()[_name] = _made_brief(_member)

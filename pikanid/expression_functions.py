@@ -5,6 +5,11 @@ from __future__ import annotations
 import sympy as sp
 
 
+def _raised(text: str, exponent: str | None) -> str:
+    """The LaTeX of a function to a power, which SymPy asks the function itself to write."""
+    return text if exponent is None else rf"\left({text}\right)^{{{exponent}}}"
+
+
 class clip(sp.Function):
     """``clip(x, lo, hi)``: x limited to [lo, hi]; exact at both kinks."""
 
@@ -26,9 +31,9 @@ class clip(sp.Function):
             + sp.Heaviside(x - hi) * hi.diff(s)
         )
 
-    def _latex(self, printer: object) -> str:
+    def _latex(self, printer: object, exp: str | None = None) -> str:
         x, lo, hi = (sp.latex(a) for a in self.args)
-        return rf"\operatorname{{clip}}_{{[{lo},\,{hi}]}}\left({x}\right)"
+        return _raised(rf"\operatorname{{clip}}_{{[{lo},\,{hi}]}}\left({x}\right)", exp)
 
 
 class abs_power(sp.Function):
@@ -51,9 +56,9 @@ class abs_power(sp.Function):
             return n * signed_power(x, n - 1)
         return self * log_abs(x)
 
-    def _latex(self, printer: object) -> str:
+    def _latex(self, printer: object, exp: str | None = None) -> str:
         x, n = (sp.latex(a) for a in self.args)
-        return rf"\left|{x}\right|^{{{n}}}"
+        return _raised(rf"\left|{x}\right|^{{{n}}}", exp)
 
 
 class signed_power(sp.Function):
@@ -80,9 +85,10 @@ class signed_power(sp.Function):
             return n * abs_power(x, n - 1)
         return self * log_abs(x)
 
-    def _latex(self, printer: object) -> str:
+    def _latex(self, printer: object, exp: str | None = None) -> str:
         x, n = (sp.latex(a) for a in self.args)
-        return rf"\operatorname{{sgn}}\left({x}\right)\left|{x}\right|^{{{n}}}"
+        return _raised(
+            rf"\operatorname{{sgn}}\left({x}\right)\left|{x}\right|^{{{n}}}", exp)
 
 
 class log_abs(sp.Function):

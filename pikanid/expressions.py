@@ -16,14 +16,13 @@ import math
 from collections.abc import Collection, Mapping
 
 import sympy as sp
-from sympy.printing.str import StrPrinter
 
 from pikanid import errors
+from pikanid.entries import is_integer, is_number
 from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
+from pikanid.expression_limits import MAX_BITS, MAX_DEPTH, MAX_LENGTH, MAX_NAME, MAX_POWER, Work
+from pikanid.expression_printing import Printer
 
-MAX_LENGTH = 20_000
-MAX_DEPTH = 120
-MAX_POWER = 1000  # larger whole exponents would be multiplied out into numbers without end
 TIME = sp.Symbol("t", real=True)
 
 
@@ -62,7 +61,8 @@ def check_name(name: str, what: str) -> str:
     >>> check_name("theta_dot", "state")
     'theta_dot'
     """
-    if not name.isidentifier() or not name.isascii() or name.startswith("_"):
+    if not isinstance(name, str) or not name.isidentifier() or not name.isascii() or (
+            name.startswith("_") or len(name) > MAX_NAME):
         raise errors.BadModel(errors.bad_name(name, what))
     if name in RESERVED:
         raise errors.BadModel(errors.reserved_name(name, what))
@@ -70,7 +70,7 @@ def check_name(name: str, what: str) -> str:
 
 
 def parse(text: str, names: Collection[str], where: str,
-          functions: Collection[str] = ()) -> sp.Expr:
+          functions: Collection[str] = (), work: Work | None = None) -> sp.Expr:
     """Parse one formula.
 
     Parameters
@@ -79,6 +79,7 @@ def parse(text: str, names: Collection[str], where: str,
     names : the symbols that may occur (``t`` and ``pi`` always may)
     where : what the formula belongs to, for the error message
     functions : names of one-argument functions that the model adds (spline edges)
+    work : shared by the formulas of one file, so that all of them together stay cheap
 
     Raises
     ------
@@ -94,7 +95,8 @@ def parse(text: str, names: Collection[str], where: str,
     except (SyntaxError, ValueError, MemoryError, RecursionError) as problem:
         detail = problem.msg if isinstance(problem, SyntaxError) else "it is nested too deeply"
         raise errors.BadModel(errors.formula_syntax(text, where, detail)) from None
-    return _Reader(frozenset(names), frozenset(functions), text, where).read(tree, 0)
+    reader = _Reader(frozenset(names), frozenset(functions), text, where, work or Work())
+    return reader.read(tree, 0)
 
 
 def to_text(expression: sp.Expr) -> str:
@@ -103,24 +105,63 @@ def to_text(expression: sp.Expr) -> str:
     >>> to_text(parse("abs(x)*max(x, 0.1)", {"x"}, "test"))
     'abs(x)*max(0.1, x)'
     """
-    return str(_Printer().doprint(expression))
+    return str(Printer().doprint(expression))
 
 
-def to_real(expression: sp.Expr | float | str) -> sp.Expr:
-    """The expression with every free symbol replaced by the model's real symbol of that name."""
-    expr = sp.sympify(expression) if not isinstance(expression, str) else symbol(expression)
-    return expr.xreplace({s: symbol(s.name) for s in expr.free_symbols if s != symbol(s.name)})
+def to_real(expression: sp.Expr | float | str, where: str = "A formula") -> sp.Expr:
+    """The expression with every free symbol replaced by the model's real symbol of that name.
+
+    Args:
+        expression: SymPy, a finite number, or the name of one symbol; SymPy's own conversion is
+            never asked, because it evaluates the texts in lists and tables as Python.
+        where: What it is, to begin an error message with.
+
+    Raises:
+        BadModel: If it is anything else.
+
+    >>> to_real(2) + to_real(sp.Symbol("k"))
+    k + 2
+    """
+    if isinstance(expression, str):
+        return symbol(expression)
+    if isinstance(expression, sp.Expr):
+        return expression.xreplace(
+            {s: symbol(s.name) for s in expression.free_symbols if s != symbol(s.name)})
+    if is_number(expression) and (number := to_number(expression)) is not None:
+        return number
+    raise errors.BadModel(errors.not_a_formula(where, expression))
+
+
+def to_number(value: float) -> sp.Expr | None:
+    """A real number as SymPy holds it, None where no float can hold it.
+
+    >>> to_number(3), to_number(10**400)
+    (3, None)
+    """
+    if is_integer(value) and abs(value) < 2**53:
+        return sp.Integer(int(value))
+    try:
+        real = float(value)
+    except OverflowError:
+        return None
+    return sp.Float(real) if math.isfinite(real) else None
 
 
 class _Reader:
     """Walks Python's syntax tree and builds SymPy, refusing every node outside the whitelist."""
 
-    def __init__(self, names: frozenset[str], functions: frozenset[str], text: str, where: str):
+    def __init__(self, names: frozenset[str], functions: frozenset[str], text: str, where: str,
+                 work: Work):
         self.names, self.functions, self.text, self.where = names, functions, text, where
+        self.work = work
 
     def fail(self, node: ast.AST) -> errors.BadModel:
         part = ast.get_source_segment(self.text.strip(), node) or self.text
         return errors.BadModel(errors.formula_forbidden(part, self.where))
+
+    def afford(self, fits: bool) -> None:
+        if not fits:
+            raise errors.BadModel(errors.formula_work(self.text, self.where))
 
     def read(self, node: ast.AST, depth: int) -> sp.Expr:
         if depth > MAX_DEPTH:
@@ -134,6 +175,8 @@ class _Reader:
         rest = [node]
         while isinstance(rest[-1].left, ast.BinOp):
             rest.append(rest[-1].left)
+        self.afford(self.work.product(
+            sum(isinstance(step.op, ast.Mult | ast.Div) for step in rest)))
         terms = [self.read(rest[-1].left, depth + 1)]
         for step in reversed(rest):
             right = self.read(step.right, depth + 1)
@@ -152,7 +195,15 @@ class _Reader:
         self.finite(node, result)
         if result.has(sp.zoo, sp.nan, sp.oo, sp.I):
             raise self.fail(node)
+        self.small(node, result)
         return result
+
+    def small(self, node: ast.AST, result: sp.Expr) -> None:
+        """Refuse exact numbers without end, which whole powers of products make."""
+        for part in (result, *result.args):
+            number = part if part.is_Rational else part.as_coeff_Mul()[0]
+            if number.is_Rational and max(abs(number.p), number.q).bit_length() > MAX_BITS:
+                raise self.fail(node)
 
     def finite(self, node: ast.AST, result: sp.Expr) -> None:
         """Refuse a number that no float can hold, before anything grows from it."""
@@ -177,19 +228,14 @@ class _Reader:
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return self.read(operand, depth + 1)
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
-                return self.call(node, name, [self.read(a, depth + 1) for a in args])
+                return self.call(node, name, [self.read(a, depth + 1) for a in args], depth)
         raise self.fail(node)
 
     def number(self, value: int | float, node: ast.AST) -> sp.Expr:
-        if isinstance(value, int) and abs(value) < 2**53:
-            return sp.Integer(value)
-        try:
-            real = float(value)
-        except OverflowError:
-            real = math.inf
-        if not math.isfinite(real):
+        found = to_number(value)
+        if found is None:
             raise self.fail(node)
-        return sp.Float(real)
+        return found
 
     def name(self, name: str) -> sp.Expr:
         if name == "pi":
@@ -218,6 +264,11 @@ class _Reader:
             raise errors.BadModel(errors.division_by_zero(self.text, self.where))
         if exponent.is_number and abs(float(exponent)) > MAX_POWER:
             raise self.fail(node)
+        self.afford(self.work.power(exponent))
+        scale = base.as_coeff_Mul()[0]
+        if exponent.is_number and scale.is_Rational and abs(float(exponent)) * (
+                max(abs(scale.p), scale.q).bit_length() - 1) > MAX_BITS and scale != -1:
+            raise self.fail(node)
         small = exponent.is_Rational and abs(exponent.p) <= 8 and exponent.q <= 8
         if base.is_number and exponent.is_number and not (small and abs(float(base)) < 1e6):
             # exact big-integer powers can fill the memory: these become floating point
@@ -227,7 +278,7 @@ class _Reader:
                 raise self.fail(node) from None
         return base**exponent
 
-    def call(self, node: ast.AST, name: str, args: list[sp.Expr]) -> sp.Expr:
+    def call(self, node: ast.AST, name: str, args: list[sp.Expr], depth: int) -> sp.Expr:
         if name in self.functions:
             count, build = 1, sp.Function(name, real=True)
         elif name in FUNCTIONS:
@@ -238,6 +289,7 @@ class _Reader:
             raise errors.BadModel(errors.unknown_function(name, self.where, known, close))
         if len(args) != count:
             raise errors.BadModel(errors.wrong_argument_count(name, count, len(args), self.where))
+        self.afford(self.work.call(name, depth))
         if name in ("abs_power", "signed_power") and args[1].is_number and (
                 abs(float(args[1])) > MAX_POWER):
             raise self.fail(node)
@@ -245,33 +297,3 @@ class _Reader:
             return build(*args)
         except (ValueError, TypeError, RecursionError):  # SymPy: complex or not comparable
             raise self.fail(node) from None
-
-
-class _Printer(StrPrinter):
-    """Prints what `parse` can read: lower-case names, floats that round-trip exactly."""
-
-    def _print_Float(self, expr: sp.Float) -> str:
-        return repr(float(expr))
-
-    def _print_Abs(self, expr: sp.Expr) -> str:
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_Heaviside(self, expr: sp.Expr) -> str:
-        return f"step({self._print(expr.args[0])})"
-
-    def _nested(self, name: str, args: tuple[sp.Expr, ...]) -> str:
-        # SymPy keeps these in a set: sorted, the text is the same in every process
-        first, *others = sorted(args, key=sp.default_sort_key)
-        text = self._print(first)
-        for arg in others:
-            text = f"{name}({text}, {self._print(arg)})"
-        return str(text)
-
-    def _print_Max(self, expr: sp.Expr) -> str:
-        return self._nested("max", expr.args)
-
-    def _print_Min(self, expr: sp.Expr) -> str:
-        return self._nested("min", expr.args)
-
-    def _print_Exp1(self, expr: sp.Expr) -> str:
-        return "exp(1)"

@@ -21,7 +21,7 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.expressions import parse, symbol, to_real
-from pikanid.model_checks import validate
+from pikanid.model_checks import check_types, validate
 from pikanid.model_lookup import Lookup
 from pikanid.model_parts import Input, Output, Parameter, Spline, State
 
@@ -60,14 +60,18 @@ class Model(Lookup):
 
     def __post_init__(self) -> None:
         put = object.__setattr__
+        check_types(self)
         put(self, "states", tuple(
-            dataclasses.replace(s, initial=_constant(s.initial)) for s in self.states))
+            dataclasses.replace(s, initial=_constant(s.initial, f"The initial value of '{s.name}'"))
+            for s in self.states))
         put(self, "inputs", tuple(
-            dataclasses.replace(i, delay=_constant(i.delay), backlash=_constant(i.backlash),
-                                rate_limit=_constant(i.rate_limit)) for i in self.inputs))
+            dataclasses.replace(i, **{
+                what: _constant(getattr(i, what), f"The {what.replace('_', ' ')} of '{i.name}'")
+                for what in ("delay", "backlash", "rate_limit")}) for i in self.inputs))
         put(self, "parameters", tuple(self.parameters))
         put(self, "outputs", tuple(
-            dataclasses.replace(o, expression=to_real(o.expression), delay=_constant(o.delay))
+            dataclasses.replace(o, expression=to_real(o.expression, f"Output '{o.name}'"),
+                                delay=_constant(o.delay, f"The delay of '{o.name}'"))
             for o in self.outputs))
         put(self, "splines", tuple(self.splines))
         order = [s.name for s in self.states]
@@ -77,7 +81,8 @@ class Model(Lookup):
         for name in order:
             if name not in self.equations:
                 raise errors.BadModel(errors.missing_equation(name))
-        put(self, "equations", MappingProxyType({n: to_real(self.equations[n]) for n in order}))
+        put(self, "equations", MappingProxyType({
+            n: to_real(self.equations[n], f"The equation of '{n}'") for n in order}))
         validate(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -98,7 +103,7 @@ class Model(Lookup):
         if isinstance(text, str):
             names = self.symbols | set(extra)
             return parse(text, names, where, [s.name for s in self.splines])
-        return to_real(text)
+        return to_real(text, where[:1].upper() + where[1:])
 
     # --- new models from this one ----------------------------------------------------------------
 
@@ -171,7 +176,7 @@ class Model(Lookup):
         model = self
         for name, value in initial.items():
             state = model.state(name)
-            if value == "free":
+            if isinstance(value, str) and value == "free":
                 guess = float(state.initial) if state.initial.is_number else 0.0
                 model = model.with_parameters(
                     Parameter(f"{name}_0", guess, state.unit, scope="recording",
@@ -267,9 +272,9 @@ class Model(Lookup):
         return f"$${self.latex()}$$"
 
 
-def _constant(formula: Formula) -> sp.Expr:
+def _constant(formula: Formula, where: str) -> sp.Expr:
     """The formula, a plain number in one form: SymPy holds 1 and 1.0 for different."""
-    expr = to_real(formula)
+    expr = to_real(formula, where)
     if not (expr.is_Integer or expr.is_Float):
         return expr
     return sp.Float(float(expr)) if expr != 0 else sp.Integer(0)

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import difflib
 import functools
-import math
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from pikanid import errors
+from pikanid.entries import Entry, is_integer
 from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
+from pikanid.expression_limits import MAX_NAME
 from pikanid.expressions import TIME, check_name
 
 if TYPE_CHECKING:
     from pikanid.model import Model
 
+# Far more than any model has, and few enough that checking them takes no time.
+MOST = {"states": 1000, "inputs": 200, "parameters": 20_000, "outputs": 500, "splines": 200,
+        "knots": 10_000}
+MAX_DEGREE = 20  # of a spline
 
 def find(items: Iterable[Any], name: str, what: str) -> Any:
     """The item of that name; a `BadModel` that lists the names if there is none."""
@@ -28,6 +34,54 @@ def find(items: Iterable[Any], name: str, what: str) -> Any:
         names.append(item.name)
     close = difflib.get_close_matches(name, names, 1)
     raise errors.BadModel(errors.not_in_model(what, name, names, close))
+
+
+def check_types(model: Model) -> None:
+    """Raise `BadModel` unless every part of the model is of its type, and of a sensible size.
+
+    Formulas are left to `pikanid.expressions.to_real`.
+    """
+    entry(model.name, "The model's name").text(longest=MAX_NAME)
+    entry(model.equations, "The equations").table(optional=None, most=MOST["states"])
+    parts: list[tuple[str, tuple[Any, ...]]] = [
+        ("states", model.states), ("inputs", model.inputs), ("parameters", model.parameters),
+        ("outputs", model.outputs), ("splines", model.splines)]
+    for section, items in parts:
+        if len(items) > MOST[section]:
+            raise errors.BadModel(errors.too_many_entries(
+                f"The model's list of {section}", len(items), MOST[section]))
+        what = section.rstrip("s")
+        for item in items:
+            check_name(item.name, what)
+            if section != "splines":
+                entry(item.unit, f"The unit of {what} '{item.name}'").text()
+    for item in model.inputs:
+        if item.default is not None:
+            entry(item.default, f"The default of input '{item.name}'").number()
+    for p in model.parameters:
+        entry(p.value, f"The value of parameter '{p.name}'").number()
+        entry(p.description, f"The description of parameter '{p.name}'").text()
+        bounds = entry(p.bounds, f"The bounds of parameter '{p.name}'")
+        if not isinstance(p.bounds, list | tuple) or len(p.bounds) != 2:
+            raise bounds.fail("[lower, upper]")
+        for bound in bounds.items():
+            bound.number(finite=False)
+    for o in model.outputs:
+        if o.sigma is not None:
+            sigma = entry(o.sigma, f"The sigma of output '{o.name}'")
+            if sigma.number() <= 0:
+                raise sigma.fail("positive (or left out)")
+    for s in model.splines:
+        degree = entry(s.degree, f"The degree of spline '{s.name}'")
+        if not is_integer(s.degree) or not 1 <= s.degree <= MAX_DEGREE:
+            raise degree.fail(f"an integer, degree >= 1 and <= {MAX_DEGREE}")
+        for knot in entry(s.knots, f"The knots of spline '{s.name}'").items(most=MOST["knots"]):
+            knot.number()
+
+
+def entry(value: Any, where: str) -> Entry:
+    """A part of a model to be checked."""
+    return Entry(value, where, errors.BadModel)
 
 
 def validate(model: Model) -> None:
@@ -57,9 +111,6 @@ def validate(model: Model) -> None:
             raise errors.BadModel(errors.bad_value(
                 f"The hold of input '{item.name}'", item.hold, "'zero' or 'first'"))
     for p in model.parameters:
-        if not math.isfinite(p.value):
-            raise errors.BadModel(errors.bad_value(
-                f"The value of parameter '{p.name}'", p.value, "a finite number"))
         if not p.bounds[0] < p.bounds[1] or (p.free and not p.bounds[0] <= p.value <= p.bounds[1]):
             raise errors.BadModel(errors.bad_bounds(p.name, p.value, p.bounds))
         if p.scope not in ("shared", "recording"):
@@ -74,20 +125,19 @@ def _check_names(model: Model) -> None:
         ("parameter", model.parameters), ("spline", model.splines)]
     for what, items in groups:
         for item in items:
-            check_name(item.name, what)
             if item.name in seen:
                 raise errors.BadModel(errors.duplicate_name(item.name, seen[item.name], what))
             seen[item.name] = what
-    outputs = [o.name for o in model.outputs]
-    for name in outputs:
-        check_name(name, "output")  # an output may share the name of the state that it measures
-        if outputs.count(name) > 1:
+    outputs: set[str] = set()
+    for name in model.output_names:
+        # an output may share the name of the state that it measures
+        if name in outputs:
             raise errors.BadModel(errors.duplicate_name(name, "output", "output"))
         if seen.get(name) in ("input", "spline"):
             raise errors.BadModel(errors.duplicate_name(name, seen[name], "output"))
+        outputs.add(name)
     for spline in model.splines:
-        if spline.degree < 1 or spline.size < 1 or not all(map(math.isfinite, spline.knots)) or any(
-                b < a for a, b in zip(spline.knots, spline.knots[1:], strict=False)):
+        if spline.size < 1 or any(b < a for a, b in pairwise(spline.knots)):
             raise errors.BadModel(errors.bad_value(
                 f"Spline '{spline.name}'", f"degree {spline.degree}, {len(spline.knots)} knots",
                 "of degree >= 1 with at least degree + 2 finite, non-decreasing knots"))

@@ -11,7 +11,7 @@ import difflib
 import math
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,12 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.channel_maps import INPUT_MAPS, OUTPUT_MAPS, map_input, map_output
-from pikanid.expressions import RESERVED, check_name, parse, symbol, to_text
+from pikanid.entries import Entry
+from pikanid.expression_limits import Work
+from pikanid.expressions import check_name, parse, symbol, to_text
 from pikanid.model import Input, Model, Output, Parameter, Spline, State
+from pikanid.model_checks import MOST
+from pikanid.stored import MOST_MODEL, file_bytes
 from pikanid.writing import atomically
 
 SECTIONS = ("name", "states", "inputs", "parameters", "equations", "outputs", "splines")
@@ -40,18 +44,15 @@ def load(path: str | os.PathLike[str]) -> Model:
     ------
     pikanid.errors.BadModel : not a file, not TOML, or not a consistent model
     """
+    def wrong(detail: str) -> errors.BadModel:
+        return errors.BadModel(errors.model_file_unreadable(str(path), detail))
+
     try:
-        text = Path(path).read_bytes().decode("utf-8")
-        content = tomllib.loads(text)
+        content = tomllib.loads(file_bytes(path, wrong, MOST_MODEL).decode("utf-8"))
     except UnicodeDecodeError:
-        raise errors.BadModel(errors.model_file_unreadable(str(path), "it is not text")) from None
-    except OSError as problem:
-        detail = problem.strerror or "no access"
-        raise errors.BadModel(errors.model_file_unreadable(str(path), detail)) from None
-    except tomllib.TOMLDecodeError as problem:
-        raise errors.BadModel(errors.model_file_unreadable(str(path), str(problem))) from None
-    except RecursionError:
-        raise errors.BadModel(errors.model_file_unreadable(str(path), "nested too deep")) from None
+        raise wrong("it is not text") from None
+    except (ValueError, RecursionError) as problem:  # also an integer of thousands of digits
+        raise wrong(str(problem) or "it is nested too deep") from None
     return from_dict(content, str(path))
 
 
@@ -63,15 +64,18 @@ def save(model: Model, path: str | os.PathLike[str]) -> None:
 
 
 def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
-    """Build a `Model` from the file's content; `source` names it in error messages."""
+    """Build a `Model` from the file's content; `source` names it in error messages.
+
+    Raises
+    ------
+    pikanid.errors.BadModel : anything in it is of another type, unknown or inconsistent
+    """
     if not isinstance(content, Mapping):
         raise errors.BadModel(errors.bad_value(f"The model '{source}'", content, "a table"))
     _known_keys(content, SECTIONS, source, "the file")
     tables = {section: _table(content, section, source) for section in KEYS}
-    title = content.get("name", Path(source).stem)
-    if not isinstance(title, str):
-        raise errors.BadModel(errors.bad_value(f"'{source}': the name", title, "text in quotes"))
-    if not isinstance(content.get("equations", {}), Mapping):
+    equations = content.get("equations", {})
+    if not isinstance(equations, Mapping):
         raise errors.BadModel(errors.bad_value(f"'{source}': [equations]", "no table", "a table"))
     splines = tuple(_spline(n, e, source) for n, e in tables["splines"].items())
     parameters = {n: _parameter(n, e, source) for n, e in tables["parameters"].items()}
@@ -81,33 +85,34 @@ def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
     for name, entry in tables["states"].items():
         if entry.get("initial") == "free":
             free = Parameter(
-                f"{name}_0", _number(entry.get("guess", 0.0), f"guess of state '{name}'"),
-                _text(entry, "unit", name), _bounds(entry, f"state '{name}'"),
+                f"{name}_0", entry.get("guess", 0.0), entry.get("unit", ""), _bounds(entry),
                 scope=entry.get("scope", "recording"), description=f"initial {name}")
             parameters.setdefault(free.name, free)
     names = {*tables["states"], *tables["inputs"], *parameters}
-    for name in names:
-        check_name(name, "symbol")
     functions = [s.name for s in splines]
+    work = Work()
 
-    def formula(value: Any, where: str) -> sp.Expr:
+    def formula(value: Any, where: str, extra: Iterable[str] = ()) -> sp.Expr:
         if isinstance(value, str):
-            return parse(value, names, where, functions)
-        return sp.Float(_number(value, where)) if value else sp.Integer(0)
+            return parse(value, names.union(extra), where, functions, work)
+        number = Entry(value, f"The {where}", errors.BadModel).number()
+        return sp.Float(number) if number else sp.Integer(0)
 
     model = Model(
-        name=title,
+        name=content.get("name", Path(source).stem),
         states=tuple(_state(n, e, formula) for n, e in tables["states"].items()),
-        inputs=tuple(_input(n, e) for n, e in tables["inputs"].items()),
+        inputs=tuple(Input(n, e.get("unit", ""), e.get("hold", "zero"), e.get("default"))
+                     for n, e in tables["inputs"].items()),
         parameters=tuple(parameters.values()),
-        equations={n: formula(e, f"equation '{n}'")
-                   for n, e in content.get("equations", {}).items()},
+        equations={n: formula(e, f"equation '{n}'") for n, e in equations.items()},
         outputs=tuple(_output(n, e, formula, source) for n, e in tables["outputs"].items()),
         splines=splines)
     for name, entry in tables["inputs"].items():
-        model = map_input(model, name, **{k: v for k, v in entry.items() if k in INPUT_MAPS})
+        if maps := _maps(entry, INPUT_MAPS, f"of input '{name}'", formula, ()):
+            model = map_input(model, name, **maps)
     for name, entry in tables["outputs"].items():
-        model = map_output(model, name, **{k: v for k, v in entry.items() if k in OUTPUT_MAPS})
+        if maps := _maps(entry, OUTPUT_MAPS, f"of output '{name}'", formula, (name,)):
+            model = map_output(model, name, **maps)
     return model
 
 
@@ -167,34 +172,41 @@ def _table(content: Mapping[str, Any], name: str, source: str) -> dict[str, Mapp
     if not isinstance(table, Mapping) or not all(isinstance(e, Mapping) for e in table.values()):
         raise errors.BadModel(errors.bad_value(
             f"'{source}': [{name}]", "not a table of tables", "lines like  x = { unit = \"m\" }"))
+    if len(table) > MOST[name]:
+        raise errors.BadModel(errors.too_many_entries(
+            f"'{source}': [{name}]", len(table), MOST[name]))
     for key, entry in table.items():
+        check_name(key, name.rstrip("s"))
         _known_keys(entry, KEYS[name], source, f"{name}.{key}")
-        if key in RESERVED:
-            check_name(key, name.rstrip("s"))
     return dict(table)
 
 
-def _number(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise errors.BadModel(errors.bad_value(f"The {where}", value, "a number"))
-    try:
-        return float(value)
-    except OverflowError:
-        raise errors.BadModel(errors.bad_value(f"The {where}", "too large", "a number")) from None
+def _maps(entry: Mapping[str, Any], known: Sequence[str], where: str, formula: Any,
+          extra: Iterable[str]) -> dict[str, Any]:
+    """The maps of a channel, each an expression or a number."""
+    def read(value: Any, what: str) -> Any:
+        if not isinstance(value, str):
+            Entry(value, f"The {what}", errors.BadModel).number()
+            return value
+        return formula(value, what, extra)
+
+    maps: dict[str, Any] = {}
+    for key in known:
+        if key not in entry:
+            continue
+        what = f"{key.replace('_', ' ')} {where}"
+        if key == "clip":
+            if not isinstance(entry[key], list | tuple) or len(entry[key]) != 2:
+                raise errors.BadModel(errors.bad_value(f"The {what}", entry[key], "[lo, hi]"))
+            maps[key] = [read(limit, what) for limit in entry[key]]
+        else:
+            maps[key] = read(entry[key], what)
+    return maps
 
 
-def _text(entry: Mapping[str, Any], key: str, name: str) -> str:
-    value = entry.get(key, "")
-    if not isinstance(value, str):
-        raise errors.BadModel(errors.bad_value(f"The {key} of '{name}'", value, "text in quotes"))
-    return value
-
-
-def _bounds(entry: Mapping[str, Any], where: str) -> tuple[float, float]:
-    bounds = entry.get("bounds", [-math.inf, math.inf])
-    if not isinstance(bounds, list | tuple) or len(bounds) != 2:
-        raise errors.BadModel(errors.bad_value(f"The bounds of {where}", bounds, "[lower, upper]"))
-    return (_number(bounds[0], f"bounds of {where}"), _number(bounds[1], f"bounds of {where}"))
+def _bounds(entry: Mapping[str, Any]) -> Any:
+    bounds = entry.get("bounds", (-math.inf, math.inf))
+    return tuple(bounds) if isinstance(bounds, list) and len(bounds) < 9 else bounds
 
 
 def _parameter(name: str, entry: Mapping[str, Any], source: str) -> Parameter:
@@ -203,38 +215,28 @@ def _parameter(name: str, entry: Mapping[str, Any], source: str) -> Parameter:
             source, f"parameter '{name}'", "either 'guess' (estimated) or 'value' (fixed)"))
     free = "guess" in entry
     return Parameter(
-        name, _number(entry["guess" if free else "value"], f"value of parameter '{name}'"),
-        _text(entry, "unit", name), _bounds(entry, f"parameter '{name}'"), free,
-        entry.get("scope", "shared"), _text(entry, "description", name))
+        name, entry["guess" if free else "value"], entry.get("unit", ""), _bounds(entry), free,
+        entry.get("scope", "shared"), entry.get("description", ""))
 
 
 def _state(name: str, entry: Mapping[str, Any], formula: Any) -> State:
     initial = entry.get("initial", 0.0)
     expr = symbol(f"{name}_0") if initial == "free" else formula(initial, f"initial of '{name}'")
-    return State(name, _text(entry, "unit", name), expr)
-
-
-def _input(name: str, entry: Mapping[str, Any]) -> Input:
-    default = entry.get("default")
-    return Input(name, _text(entry, "unit", name), entry.get("hold", "zero"),
-                 None if default is None else _number(default, f"default of input '{name}'"))
+    return State(name, entry.get("unit", ""), expr)
 
 
 def _output(name: str, entry: Mapping[str, Any], formula: Any, source: str) -> Output:
     if "expression" not in entry:
         raise errors.BadModel(errors.model_file_missing(source, f"output '{name}'", "'expression'"))
-    sigma = entry.get("sigma")
-    if sigma is not None and _number(sigma, f"sigma of output '{name}'") <= 0:
-        raise errors.BadModel(errors.bad_value(
-            f"The sigma of output '{name}'", sigma, "positive (or left out)"))
     expression = formula(entry["expression"], f"output '{name}'")
-    return Output(name, expression, _text(entry, "unit", name),
-                  None if sigma is None else float(sigma))
+    return Output(name, expression, entry.get("unit", ""), entry.get("sigma"))
 
 
 def _spline(name: str, entry: Mapping[str, Any], source: str) -> Spline:
     degree, knots = entry.get("degree", 3), entry.get("knots")
-    if not isinstance(knots, list) or isinstance(degree, bool) or not isinstance(degree, int):
+    wrong = isinstance(degree, bool) or not isinstance(degree, int) or abs(degree) > MOST["knots"]
+    if wrong or not isinstance(knots, list) or len(knots) > MOST["knots"]:
         raise errors.BadModel(errors.model_file_missing(
-            source, f"spline '{name}'", "an integer 'degree' and a list of 'knots'"))
-    return Spline(name, degree, tuple(_number(k, f"knots of spline '{name}'") for k in knots))
+            source, f"spline '{name}'",
+            f"an integer 'degree' and a list of at most {MOST['knots']} 'knots'"))
+    return Spline(name, degree, tuple(knots))

@@ -20,7 +20,8 @@ PACKAGE = ROOT / "pikanid"
 # A name also covers what continues it with an underscore: "model" covers model_parts.
 ROWS = (
     ("errors", "version", "cache"),
-    ("units", "expressions", "expression_functions"),
+    ("units", "entries", "stored", "expressions", "expression_functions", "expression_limits",
+     "expression_printing"),
     ("approximators",),
     ("model", "channel", "resampling", "kinematics", "alignment", "reading", "writing", "recording",
      "half_derivative", "excitation"),

@@ -199,7 +199,9 @@ def test_any_content_is_a_model_or_one_kind_of_error(content: dict[str, object])
 
 @settings(max_examples=60)
 @given(st.floats(-1e12, 1e12), st.floats(0, 1e9), st.booleans(),
-       st.sampled_from(["shared", "recording"]), st.text(max_size=20),
+       st.sampled_from(["shared", "recording"]),
+       # control characters could steer a terminal: they are refused, see test_hostile_models
+       st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=20),
        st.sampled_from(["", "m", "m/s^2", "rad"]))
 def test_parameters_round_trip_to_the_last_bit(value: float, room: float, free: bool, scope: str,
                                                description: str, unit: str) -> None:

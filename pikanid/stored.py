@@ -1,0 +1,106 @@
+"""Bytes of files, and what is packed in them: never more than a stated amount of memory.
+
+A file of a few kilobytes can unpack to gigabytes, a name can lead to a pipe that never ends, and a
+list of empty tables takes twenty times the memory of its text.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+from pikanid import errors
+
+MEBI = 2**20
+MOST_MODEL = 2 * MEBI  # bytes of a model file
+MOST_JSON = 512 * MEBI  # bytes of an estimate, a network, a truth or a diagnosis, unpacked
+MOST_UNPACKED = 512 * MEBI  # bytes that a compressed recording may unpack to
+MOST_PARSED = 768 * MEBI  # bytes that the objects in a JSON file may take
+
+Wrong = Callable[[str], errors.PikanidError]
+
+
+def file_bytes(path: str | os.PathLike[str], wrong: Wrong, most: int | None = None) -> bytes:
+    """The content of a regular file.
+
+    Args:
+        path: Of the file.
+        wrong: Makes the exception from what is wrong, such as ``"it is a folder"``.
+        most: Bytes that are read at most; None for any number.
+
+    Raises:
+        PikanidError: If it is missing, no regular file (a pipe may never end), or too large.
+    """
+    try:
+        with open(path, "rb", opener=_without_waiting) as file:
+            about = os.fstat(file.fileno())
+            if not stat.S_ISREG(about.st_mode):
+                raise wrong("it is no regular file")
+            if most is not None and about.st_size > most:
+                raise wrong(errors.detail_too_large(about.st_size, most))
+            return file.read()
+    except OSError as failure:
+        raise wrong(failure.strerror or "it cannot be opened") from None
+    except ValueError:  # a NUL in the name
+        raise wrong("there is no file of that name") from None
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a pipe without waiting for its writer."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def gunzipped(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> bytes:
+    """What a gzip file holds, all of its members.
+
+    Raises:
+        PikanidError: If it is damaged, or unpacks to more than `most` bytes.
+    """
+    parts, rest, room = [], content, most
+    try:
+        while rest:
+            unpacker = zlib.decompressobj(wbits=31)
+            parts.append(unpacker.decompress(rest, room + 1))
+            room -= len(parts[-1])
+            if room < 0:
+                raise wrong(errors.detail_unpacks(most))
+            if not unpacker.eof:
+                raise wrong("it is no complete gzip file")
+            rest = unpacker.unused_data.lstrip(b"\0")  # padding, as of tapes
+    except zlib.error:
+        raise wrong("it is no complete gzip file") from None
+    return b"".join(parts)
+
+
+def json_content(path: str | os.PathLike[str], wrong: Wrong) -> Any:
+    """The content of a JSON file, gzipped or not.
+
+    Raises:
+        PikanidError: If it is missing, too large, damaged, or no JSON.
+    """
+    content = file_bytes(path, wrong, MOST_JSON)
+    if content[:2] == b"\x1f\x8b":
+        content = gunzipped(content, wrong, MOST_JSON)
+    return parsed(content, wrong)
+
+
+def parsed(content: bytes, wrong: Wrong) -> Any:
+    """JSON text as Python's objects, once it is known that these fit into `MOST_PARSED`.
+
+    Raises:
+        PikanidError: If it is no JSON, nested without end, or would take more memory.
+    """
+    # What CPython takes for a number, an entry of a table, a list and a table.
+    needed = len(content) + 40 * content.count(b",") + 110 * content.count(b":") + (
+        64 * content.count(b"[") + 250 * content.count(b"{"))
+    if needed > MOST_PARSED + len(content):
+        raise wrong(errors.detail_unpacks(MOST_PARSED))
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError):
+        raise wrong("it is no JSON") from None
+
