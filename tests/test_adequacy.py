@@ -90,3 +90,42 @@ def test_differences_are_not_fooled_by_a_few_jumps() -> None:
 
 def test_short_signals_have_their_spread_for_noise() -> None:
     assert difference_noise(np.array([1.0, 3.0])) == 1.0
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
+def test_differences_of_any_order_see_the_same_noise(order: int) -> None:
+    """And none of a polynomial below that degree."""
+    t = np.linspace(-1, 1, 20_000)
+    noise = np.random.default_rng(6).normal(0, 0.3, t.size)
+    found = difference_noise(noise + 0.05 * t ** (order - 1), order)
+    assert found == pytest.approx(0.3, rel=0.03)
+    assert difference_noise(np.arange(50.0) ** (order - 1), order) == pytest.approx(0, abs=1e-6)
+
+
+def test_value_against_the_visible_noise_and_where_it_becomes_a_misfit() -> None:
+    """Twice the noise is forgiven, which is only estimated: a factor of four of χ²."""
+    t = np.arange(600) * 0.01
+    y = np.cos(t) + np.random.default_rng(7).normal(0, 0.02, 600)
+    noise = difference_noise(y)
+    r = np.random.default_rng(8).normal(size=600)
+    r /= np.sqrt(np.mean(r**2))
+    for factor, verdict in ((1.9, "fits"), (1.99, "fits"), (2.01, "misfit")):
+        found = judge([factor * noise * r], [None], [y], 5)
+        assert found.value == pytest.approx(600 * factor**2)
+        assert (found.dof, found.verdict) == (595, verdict)
+        assert found.p_value == pytest.approx(chi2.sf(found.value, 595))
+    # half of the samples have a stated noise: theirs counts
+    stated = judge([2 * noise * r, r], [None, np.ones(600)], [y, y], 0)
+    assert stated.value == pytest.approx(600 * 4 + 600)
+    assert (stated.verdict, stated.source, stated.dof) == ("fits", "differences", 1200)
+
+
+def test_a_misfit_with_stated_noise_is_less_probable_than_alpha() -> None:
+    r = np.ones(100)
+    for alpha in (1e-3, 0.05):
+        edge = np.sqrt(chi2.isf(alpha, 97) / 100)
+        assert judge([1.001 * edge * r], [r], [r], 3, alpha).verdict == "misfit"
+        assert judge([0.999 * edge * r], [r], [r], 3, alpha).verdict == "fits"
+    assert judge([1.1 * r], [r], [r], 3).to_dict() == {
+        "value": pytest.approx(121), "dof": 97, "p_value": pytest.approx(chi2.sf(121, 97)),
+        "verdict": "fits", "sigma_source": "given"}

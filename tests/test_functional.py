@@ -12,7 +12,7 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.approximators import Approximator
 from pikanid.chains import find_chains
-from pikanid.functional import Functional, bind
+from pikanid.functional import Functional, Part, bind
 from pikanid.optimise.gauss_newton import Point
 from pikanid.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
@@ -153,3 +153,144 @@ def test_fixed_output_delay_shifts_the_sites() -> None:
     model = guessed().map_output("theta", parameters=late, delay="tau")
     sites = collocated(model, slosh(0.1)).parts[0].data[0]
     assert sites.t[0] == 0.0 and sites.t[10] == pytest.approx(0.1 - 0.033)
+
+
+def coupled() -> pk.Model:
+    """A driven oscillator that heats a body: three states, two outputs, one of them late, a start
+    that is a formula of parameters and inputs, one parameter a recording.
+    """
+    model = pk.Model.from_dict({
+        "states": {"heat": {"initial": 0.3}, "x": {"initial": "a + 0.5*u"},
+                   "v": {"initial": "k/9"}},
+        "inputs": {"u": {"hold": "first", "delay": "0.03"}},
+        "parameters": {"a": {"guess": 0.2}, "k": {"guess": 5.0}, "c": {"guess": 0.7}},
+        "equations": {"heat": "c*v**2 - heat", "x": "v", "v": "-k*sin(x) - 0.4*v + u"},
+        "outputs": {"y": {"expression": "k*x*v", "delay": "0.05"},
+                    "z": {"expression": "heat**2 + c*u"}}})
+    return model.per_recording("c")
+
+
+def seen(seed: int, known: bool) -> pk.Recording:
+    t, own = np.linspace(0.0, 2.0, 41), np.linspace(0.1, 1.9, 23)
+    rng = np.random.default_rng(seed)
+    sigma = np.linspace(0.1, 0.3, 41)
+    return pk.Recording({
+        "u": pk.Channel("u", t, np.sin(3 * t) + seed),
+        "y": pk.Channel("y", t, np.cos(2 * t) + 0.1 * rng.normal(size=41), "",
+                        sigma if known else None),
+        "z": pk.Channel("z", own, 40 * np.exp(-own) + 0.3 * rng.normal(size=23))})
+
+
+def visible(y: np.ndarray) -> float:
+    return float(np.median(np.abs(np.diff(y, 4)))) / 0.6744897501960817 / np.sqrt(70.0)
+
+
+@pytest.mark.parametrize("form", ["second_order", "state"])
+def test_every_family_by_hand(form: str) -> None:
+    data = [seen(0, True), seen(1, False)]
+    functional = collocated(coupled(), data, form, intervals=12)
+    chains = functional.chains
+    theta = np.array([0.25, 6.0, 0.5, 0.9])  # a, k, c of each recording
+    rng = np.random.default_rng(3)
+    scale = 1.0 + np.arange(len(chains.top))
+    functional = functional.with_scale(scale)
+    count = 0
+    for r, part in enumerate(functional.parts):
+        c = functional.complete(r, rng.normal(size=part.n_coefficients), theta)
+        recording, (a, k, own) = data[r], (theta[0], theta[1], theta[2 + r])
+        pieces = np.split(c, np.cumsum([s.n_coefficients for s in part.approximators])[:-1])
+
+        def state(i: int, t: np.ndarray, more: int = 0, pieces: list[np.ndarray] = pieces,
+                  part: Part = part) -> np.ndarray:
+            chain = chains.root[i]
+            basis = part.approximators[chain].basis(t, chains.order[i] + more)
+            return np.asarray(basis @ pieces[chain])
+
+        def u(t: np.ndarray, recording: pk.Recording = recording) -> np.ndarray:
+            return np.interp(t - 0.03, recording["u"].time, recording["u"].values)
+
+        start = np.array([state(i, np.zeros(1))[0] for i in range(3)])
+        assert start == pytest.approx([0.3, a + 0.5 * u(np.zeros(1))[0], k / 9])
+        at = [np.maximum(recording["y"].time - 0.05, 0.0), recording["z"].time]
+        models = [k * state(1, at[0]) * state(2, at[0]), state(0, at[1]) ** 2 + own * u(at[1])]
+        spreads = [np.linspace(0.1, 0.3, 41) if r == 0 else visible(recording["y"].values),
+                   visible(recording["z"].values)]
+        wanted = [(model - recording[name].values) / spread for model, name, spread in zip(
+            models, "yz", spreads, strict=True)]
+        count += sum(map(len, models))
+        t = part.physics.t
+        rhs = {0: own * state(2, t) ** 2 - state(0, t), 1: state(2, t),
+               2: -k * np.sin(state(1, t)) - 0.4 * state(2, t) + u(t)}
+        physics = np.stack([np.sqrt(LAM) * part.physics.weight[:, e] / scale[e]
+                            * (state(top, t, 1) - rhs[top]) for e, top in enumerate(chains.top)])
+        rows = functional.rows(r, c, theta, LAM)
+        np.testing.assert_allclose(rows[0].residual[:, 0], wanted[0], atol=1e-9)
+        np.testing.assert_allclose(rows[1].residual[:, 0], wanted[1], atol=1e-9)
+        np.testing.assert_allclose(rows[2].residual.T, physics, atol=1e-9)
+        again = functional.reweighed(r, rows, 4 * LAM)
+        np.testing.assert_allclose(again[2].residual.T, 2 * physics, atol=1e-9)
+        assert [row is old for row, old in zip(again, rows, strict=True)] == [True, True, False]
+        np.testing.assert_allclose(functional.physics_rows(r, c, theta, LAM).residual.T, physics,
+                                   atol=1e-9)
+        for found, row in zip(functional.data_rows(r, c, theta), rows, strict=False):
+            np.testing.assert_array_equal(found.residual, row.residual)
+        # weights of Gauss' rule: the integral of 1
+        assert np.sum(part.physics.weight[:, 0] ** 2) == pytest.approx(2.0)
+        deviations = [sites.deviation for sites in part.data]
+        assert deviations[1] is None and (deviations[0] is None) == (r == 1)
+    assert functional.n_data == count == 2 * (41 + 23)
+    square = sum(float(np.sum((recording[name].values / spread) ** 2))
+                 for recording, spread in zip(data, (np.linspace(0.1, 0.3, 41),
+                                                     visible(data[1]["y"].values)), strict=True)
+                 for name, spread in (("y", spread), ("z", visible(recording["z"].values))))
+    assert functional.data_square == pytest.approx(square)
+
+
+@pytest.mark.parametrize("form", ["second_order", "state"])
+def test_held_coefficients_follow_the_start(form: str) -> None:
+    functional = collocated(coupled(), [seen(0, True), seen(1, False)], form, intervals=12)
+    assert functional.start_moves
+    theta = np.array([0.25, 6.0, 0.5, 0.9])
+    for r, part in enumerate(functional.parts):
+        free = functional.problem.columns(r)[1]
+        slopes = functional.hold_jacobian(r, theta)
+        assert slopes is not None
+        for column, k in enumerate(free):
+            ends = [functional.complete(r, np.zeros(part.n_coefficients), theta + h)[part.held]
+                    for h in (1e-5 * np.eye(4)[k], -1e-5 * np.eye(4)[k])]
+            np.testing.assert_allclose(slopes[:, column], (ends[0] - ends[1]) / 2e-5, atol=1e-8)
+        c = functional.resting(r, theta)
+        values = functional.states(part.physics, c)
+        roots = [i for i, q in enumerate(functional.chains.order) if q == 0]
+        start = functional.problem.experiments[r].initial(functional.problem.parameters(theta, r))
+        inner = part.physics.t > 0.8  # behind the first splines, which hold rates too
+        for i in roots:
+            np.testing.assert_allclose(values[inner, i], start[i], atol=1e-12)
+    fixed = coupled().with_initial(x=0.1, v=0.0)
+    functional = collocated(fixed, seen(0, True), form, intervals=12)
+    assert not functional.start_moves and functional.hold_jacobian(0, theta[:3]) is None
+
+
+def test_rougher_penalty_is_the_higher_derivative() -> None:
+    functional = collocated(guessed(), slosh(0.1, stride=10)).smoothing(1)
+    point = random_point(functional)
+    part, c = functional.parts[0], point.coefficients[0]
+    rows = functional.physics_rows(0, c, point.theta, 4.0)
+    third = part.approximators[0].basis(part.physics.t, 3) @ c
+    np.testing.assert_allclose(rows.residual[:, 0], 2 * part.physics.weight[:, 0] * third)
+
+
+def test_unweighted_data_are_as_they_are() -> None:
+    problem = Problem(guessed(), slosh(0.1, stride=10))
+    made = collocated(guessed(), slosh(0.1, stride=10))
+    nodes = [(made.parts[0].physics.t, made.parts[0].physics.weight[:, 0] ** 2)]
+    plain = bind(problem, made.vector_field, made.chains, [made.parts[0].approximators], nodes,
+                 weighted=False)
+    c = random_point(made).coefficients
+    known = made.rows(0, c[0], problem.guess, LAM)[0].residual
+    found = plain.rows(0, c[0], problem.guess, LAM)[0].residual
+    np.testing.assert_allclose(found, known * 0.1 * DEGREE)
+    loose = bind(problem, made.vector_field, made.chains, [made.parts[0].approximators], nodes,
+                 given_start=False, like=made)
+    assert loose.parts[0].held.size == 0 and loose.parts[0].start is None
+    np.testing.assert_array_equal(loose.rows(0, c[0], problem.guess, LAM)[0].residual, known)
