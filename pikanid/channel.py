@@ -35,6 +35,11 @@ class Channel:
 
     Arrays are copied and cannot be written to.
 
+    Raises:
+        BadRecording: If lengths differ, or times, values or sigma are not numbers.
+        BadUnit: If the unit is unknown.
+        BadSetting: If there is no such hold.
+
     >>> Channel("theta", [0.0, 0.1], [1.0, 2.0], "deg").interval
     0.1
     """
@@ -51,7 +56,9 @@ class Channel:
             raise errors.BadRecording(errors.channel_name(self.name))
         object.__setattr__(self, "time", _frozen(self.time, self.name, "times"))
         object.__setattr__(self, "values", _frozen(self.values, self.name, "values"))
-        object.__setattr__(self, "unit", str(self.unit or "").strip())
+        if not isinstance(self.unit, units.Unread):
+            object.__setattr__(self, "unit", str(self.unit or "").strip())
+            units.check(self.unit, f"channel '{self.name}'")
         if len(self.time) != len(self.values):
             raise errors.BadRecording(
                 errors.lengths_differ(self.name, len(self.time), len(self.values))
@@ -120,9 +127,8 @@ class Channel:
         array([3.1416])
         """
         where = f"channel '{self.name}'"
-        for text in (self.unit, unit):
-            if not units.is_unit(text):
-                raise errors.BadUnit(errors.unknown_unit(text, where))
+        units.check(self.unit, where)
+        units.check(unit, where)
         if units.parse(self.unit) == units.parse(unit):
             return replace(self, unit=unit)
         if not units.convertible(self.unit, unit):

@@ -121,10 +121,11 @@ def _short(text: str, limit: int = 80) -> str:
 # --- units ---------------------------------------------------------------------------------------
 
 
-def unknown_unit(text: str, where: str = "") -> str:
+def unknown_unit(text: str, where: str = "", close: Sequence[str] = ()) -> str:
     return (
         f"The unit '{_short(text)}'{f' of {where}' if where else ''} is unknown: write products "
         "and powers of SI units such as 'm/s^2', 'rad', 'deg/s', 'mV', or '' for none."
+        f"{_did_you_mean(close)}"
     )
 
 
@@ -133,6 +134,49 @@ def units_differ(source: str, target: str, where: str = "") -> str:
     return (
         f"{f'{where}: ' if where else ''}'{source or 'dimensionless'}' cannot be converted to "
         f"'{target or 'dimensionless'}': they measure different things{hint}."
+    )
+
+
+def unit_without_size(text: str) -> str:
+    return (
+        f"The unit '{_short(text)}' is logarithmic, so that no formula can be written in it: "
+        "convert the signal first."
+    )
+
+
+def units_meet(
+    where: str, formula: str, found: str, wanted: str, unknown: Sequence[str]
+) -> str:
+    advice = (
+        f"declare the unit of {_listed(unknown)}"
+        if unknown
+        else "declare units that fit, and a parameter for every number that has a unit"
+    )
+    return (
+        f"{where}: '{_short(formula)}' comes out in '{found or 'dimensionless'}' where "
+        f"'{wanted or 'dimensionless'}' is needed, and no factor turns one into the other: "
+        f"{advice}."
+    )
+
+
+def number_between_units(where: str, number: str) -> str:
+    return (
+        f"{where} adds '{_short(number)}', which has no unit, to terms in different units: declare "
+        "its unit, for a number as a parameter with a value."
+    )
+
+
+def temperatures_meet(where: str, first: str, second: str) -> str:
+    return (
+        f"{where} adds temperatures in '{first}' and '{second}', which begin at different zeros: "
+        "declare all of them in one unit, and differences in 'delta_degC'."
+    )
+
+
+def converted_twice(where: str, number: float, factor: str, value: float) -> str:
+    return (
+        f"{where} needs the factor {value:.6g} {factor}, which is put there by itself, and holds "
+        f"the number {number:.6g}, which looks like it: leave the number out."
     )
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
-from pikanid import errors
+from pikanid import errors, model_units
 from pikanid.expressions import symbol
 from pikanid.model import Formula, Model, State
 
@@ -77,9 +77,10 @@ def with_half_derivative(model: Model, of: Formula, name: str, band: tuple[float
     found = design(band, order)
     z = model.formula(of, f"the half-derivative '{name}'")
     start = z.xreplace({symbol(s.name): s.initial for s in model.states})
+    unit = model_units.of_formula(model, z)
     expression: sp.Expr = found.constant * z
     for k, (rate, weight) in enumerate(zip(found.rates, found.weights, strict=True)):
         state = symbol(f"{name}_{k}")
-        model = model.with_state(State(state.name, "", start), float(rate) * (z - state))
+        model = model.with_state(State(state.name, unit, start), float(rate) * (z - state))
         expression += float(weight) * (z - state)
     return model, expression

@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 
 import sympy as sp
 
-from pikanid import errors
+from pikanid import errors, model_units
 from pikanid.expressions import parse, symbol, to_real
 from pikanid.model_checks import check_types, validate
 from pikanid.model_lookup import Lookup
@@ -84,6 +84,9 @@ class Model(Lookup):
         put(self, "equations", MappingProxyType({
             n: to_real(self.equations[n], f"The equation of '{n}'") for n in order}))
         validate(self)
+        model_units.check((*self.states, *self.inputs, *self.parameters, *self.outputs))
+        for name, value in model_units.coherent(self).items():
+            put(self, name, MappingProxyType(value) if name == "equations" else value)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model.from_dict, (self.to_dict(),)

@@ -200,11 +200,11 @@ def test_where_one_side_states_no_unit_numbers_are_taken_as_they_are() -> None:
     np.testing.assert_array_equal(bind(unitless, stated).held[0].values, PUSH)
 
 
-def test_parameters_of_another_unit_system_are_the_users_business() -> None:
-    """A parameter's unit is documentation: 45 mm must be written as 0.045 m."""
-    assert systems.sloshing().parameter("l_theta").unit == "m"
+def test_bounds_are_in_the_unit_of_their_parameter() -> None:
     with pytest.raises(errors.BadModel):
         systems.sloshing().with_parameters(Parameter("l_theta", 45.0, "mm", (0.002, 2.0)))
+    model = systems.sloshing().with_parameters(Parameter("l_theta", 45.0, "mm", (2.0, 2000.0)))
+    assert model.parameter("l_theta").bounds == (2.0, 2000.0)
 
 
 def test_excitation_alone_binds_without_outputs() -> None:

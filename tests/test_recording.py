@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -145,9 +146,16 @@ def test_units_on_use() -> None:
     assert y.unit == "rad"
     with pytest.raises(BadUnit, match=r"channel 'y'.*different things"):
         rec.as_output("y", "m")
-    odd = Recording.from_arrays([0, 1], {"y": [0, 1]}, {"y": "widgets"})
-    with pytest.raises(BadUnit, match="'widgets' of channel 'y' is unknown"):
-        odd.as_output("y")
+
+
+@pytest.mark.parametrize("unit", ["Vlt", "widgets", "m//s", "2*m"])
+def test_an_unknown_unit_is_an_error_at_once(unit: str) -> None:
+    with pytest.raises(BadUnit, match=f"'{re.escape(unit)}' of channel 'y' is unknown"):
+        Channel("y", [0, 1], [0, 1], unit)
+    with pytest.raises(BadUnit, match="is unknown"):
+        Recording.from_arrays([0, 1], {"y": [0, 1]}, {"y": unit})
+    with pytest.raises(BadUnit, match="is unknown"):
+        Recording.from_arrays([0, 1], {"y": [0, 1]}).with_unit("y", unit)
 
 
 def test_no_unit_means_the_models() -> None:

@@ -113,15 +113,14 @@ def prepared(path: str, model: Model, columns: dict[str, str], units: dict[str, 
               decimate: int, sigma: Sequence[str]) -> Recording:
     """The recording in a file as the options want it: channels, units, window, noise."""
     from pikanid.recording import Recording
-    from pikanid.units import is_unit
+    from pikanid.units import check
 
     known = [*model.input_names, *model.output_names, "t", "time"]
     for name in [*columns, *units]:
         if name not in known:
             raise errors.BadModel(errors.not_in_model("input or output", name, known))
     for name, text in units.items():
-        if not is_unit(text):
-            raise errors.BadUnit(errors.unknown_unit(text, f"--unit {name}"))
+        check(text, f"--unit {name}")
     rec = Recording.read(path, columns, rate, sheet, units)
     # Declared as held, an input keeps its meaning when the recording is cut.
     rec = rec.with_hold(**{i.name: i.hold for i in model.inputs

@@ -89,8 +89,8 @@ def quantity(text: str, unit: str, where: str, difference: bool = False) -> floa
         return value
     from pikanid import units
 
-    if not units.is_unit(given):
-        raise errors.BadUnit(errors.unknown_unit(given, where))
+    given = f"1{given}" if given.startswith("/") else given  # 0.3/h
+    units.check(given, where)
     if not units.convertible(given, unit):
         raise errors.BadUnit(errors.units_differ(given, unit, where))
     if difference:

@@ -19,7 +19,7 @@ def cross_axis(site: Site) -> list[Candidate]:
     goal = site.inputs[0] if site.inputs else site.v
     unit = site.model.input(goal).unit if site.inputs else f"{site.unit}/s^2"
     for c in site.extra:
-        k = Parameter(site.name(f"kappa_{c}"), 0.0, f"({unit or '1'})/[{c}]")
+        k = Parameter(site.name(f"kappa_{c}"), 0.0, unit)  # for each unit of the channel
 
         def added(model: Model, c: str = c) -> Model:
             known = c in model.input_names

@@ -132,7 +132,8 @@ def soft_saturation(site: Site) -> list[Candidate]:
     """An input limited softly: u/(1 + (u/L)²)^½ to first order u - u³/2L²."""
     found = []
     for u in site.inputs:
-        k = Parameter(site.name("k_soft"), 0.0, "", (0.0, INF))
+        unit = f"1/({site.model.input(u).unit or '1'})"
+        k = Parameter(site.name("k_soft"), 0.0, unit, (0.0, INF))
         text = f"tanh({k.name}*{u} + 1e-9*{u})/({k.name} + 1e-9)"
 
         def signs(view: View, u: str = u, k: Parameter = k) -> list[Sign]:

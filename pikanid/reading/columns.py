@@ -193,8 +193,7 @@ class _TimeBases:
     def _seconds(self, source: Named) -> Array:
         unit = self.request.units.get("t", self.request.units.get("time", source.unit)) or "s"
         where = f"the time column '{source.name}'"
-        if not units.is_unit(unit):
-            raise errors.BadUnit(errors.unknown_unit(unit, where))
+        units.check(unit, where)
         if source.column.is_clock or units.parse(unit) == "s":
             return source.column.values
         if not units.convertible(unit, "s"):

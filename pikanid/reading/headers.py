@@ -43,7 +43,7 @@ def named(columns: Iterable[Column], where: str) -> list[Named]:
     return [
         Named(
             name if bare[name] == 1 else column.header,
-            unit if column.unit is None else column.unit,
+            unit if column.unit is None else _normal(column.unit),
             column,
         )
         for name, unit, column in split
@@ -74,4 +74,4 @@ def _split(header: str, number: int) -> tuple[str, str]:
 
 def _normal(unit: str) -> str:
     # An unknown unit matters only once the channel is used: the model may not need it.
-    return units.parse(unit) if units.is_unit(unit) else unit
+    return units.parse(unit) if units.is_unit(unit) else units.Unread(unit)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
+from pikanid import model_units, units
 from pikanid.estimate import Estimate
 from pikanid.expressions import symbol
 from pikanid.model import Model, Parameter
@@ -46,7 +47,7 @@ class Laws:
 
 
 def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, FormFit],
-                ranges: Sequence[tuple[float, float]]) -> Laws:
+                ranges: Sequence[tuple[float, float]], unit: str = "") -> Laws:
     """The sum without the laws' offsets, which the equation's own constant part holds.
 
     Parameters
@@ -55,6 +56,7 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
     arguments : of every edge, by its number
     fits : the laws, by place (0, number, 0)
     ranges : of every edge's argument, which bound the parameters inside a law
+    unit : of the sum, from which the units of the parameters follow; left open if empty
     """
     terms, parameters = [], []
     taken = set(model.symbols)
@@ -64,19 +66,30 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
         names = [*fit.form.amplitudes, *(q.name for q in fit.form.knobs)]
         bounds = [(-np.inf, np.inf)] * len(fit.amplitudes)
         bounds += [q.limits(*ranges[k], POINTS) for q in fit.form.knobs]
-        for name, value, reach in zip(names, [*fit.amplitudes, *fit.inside], bounds, strict=True):
+        argument = model.formula(arguments[k], f"argument '{arguments[k]}'")
+        measured = _units(fit, unit, model_units.of_formula(model, argument)) if unit else (
+            [""] * len(names))
+        for name, value, reach, own in zip(names, [*fit.amplitudes, *fit.inside], bounds, measured,
+                                           strict=True):
             full = f"{name}_{tail}"
             while full in taken:
                 full += "_"
             taken.add(full)
             swap[symbol(name)] = symbol(full)
             inside = float(np.clip(value, *reach))
-            parameters.append(Parameter(full, inside, bounds=reach,
+            parameters.append(Parameter(full, inside, own, bounds=reach,
                                         description=f"of {arguments[k]}"))
-        argument = model.formula(arguments[k], f"argument '{arguments[k]}'")
         bare = fit.form.expression - symbol("d")
         terms.append(bare.xreplace({**swap, X: argument}))
     return Laws(fits, sp.Add(*terms), tuple(parameters))
+
+
+def _units(fit: FormFit, unit: str, argument: str) -> list[str]:
+    """Units of a law's amplitudes and of the constants inside it."""
+    outside = [units.product((unit, 1), (argument, -(power or 0))) for power in fit.form.powers]
+    inside = ["" if knob.power is None else units.product((argument, knob.power))
+              for knob in fit.form.knobs]
+    return [*outside, *inside]
 
 
 def chosen(named: Mapping[Place, NamedEdge]) -> dict[Place, FormFit]:

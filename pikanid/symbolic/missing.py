@@ -53,7 +53,7 @@ def read_discrepancy(found: Discrepancy, library: Sequence[Form],
                             float(np.sqrt(np.mean(e.std**2))), e.p_value)
                for k, e in enumerate(found.edges)]
     if not named or recordings is None:
-        laws = sum_of_laws(found.nominal.model, arguments, chosen(named), ranges)
+        laws = sum_of_laws(found.nominal.model, arguments, chosen(named), ranges, found.unit)
         share = np.array([float(np.prod([e.probability for e in named.values()]))])
         stuck = [found.edges[k].argument for _, k, _ in named if sticks(found.edges[k])]
         return replace(
@@ -112,7 +112,7 @@ def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
         if key in results:
             return
         results[key] = None
-        law = sum_of_laws(found.nominal.model, arguments, choice, ranges)
+        law = sum_of_laws(found.nominal.model, arguments, choice, ranges, found.unit)
         try:
             with np.errstate(all="ignore"):  # on its way a law may leave its domain
                 estimate = NLS(starts=1).fit(_extended(found, law), recordings)
