@@ -29,8 +29,8 @@ from pikanid import noise
 from pikanid.concealed.score import judge
 from pikanid.errors import PikanidError
 from pikanid.mismatch import api, case, search, symbols
+from pikanid.outputs import atomically
 from pikanid.strategies.nls import NLS
-from pikanid.writing import atomically
 
 FACTORS = (0.75, 1.25)
 FEW = 3  # cases of each set that thresholds inside fits are tried on: nothing can be remembered

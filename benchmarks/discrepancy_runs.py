@@ -20,9 +20,9 @@ import numpy as np
 import pikanid as pk
 from pikanid import discrepancy, excitation, systems
 from pikanid.discrepancy import Discrepancy, Edge
+from pikanid.outputs import atomically
 from pikanid.recording import Recording
 from pikanid.uncertainty import cramer_rao
-from pikanid.writing import atomically
 
 SIGMA = 0.1 * np.pi / 180
 DURATION = 20.0

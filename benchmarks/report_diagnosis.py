@@ -31,8 +31,8 @@ from pikanid.concealed.generate import generate
 from pikanid.concealed.score import Score, Share, judge, reliability, tally
 from pikanid.concealed.seal import Settings
 from pikanid.errors import DatasetUnavailable
+from pikanid.outputs import atomically
 from pikanid.plots import new_figure, save_figure
-from pikanid.writing import atomically
 
 DEGREE = math.pi / 180
 LONGEST = 5  # diagnoses of a set that are timed again by themselves

@@ -14,7 +14,7 @@ import time
 from provenance import provenance
 
 from pikanid.equivalence import run_checks
-from pikanid.writing import atomically
+from pikanid.outputs import atomically
 
 SEED = 0
 

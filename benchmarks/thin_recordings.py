@@ -20,7 +20,7 @@ import numpy as np
 from scipy import signal
 
 from pikanid import datasets
-from pikanid.writing import atomically
+from pikanid.outputs import atomically
 
 STRIDE = 10  # of the pendulum: 1 kHz recorded, 100 Hz kept
 DIGITS = 6  # of the angle [rad] after the point: 1/160 of the encoder's step

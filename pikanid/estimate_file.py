@@ -8,7 +8,6 @@ from __future__ import annotations
 import gzip
 import json
 import os
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,14 +18,25 @@ from pikanid import errors
 from pikanid.adequacy import Adequacy
 from pikanid.estimate import Estimate, Fit, Trajectory
 from pikanid.model import Model
+from pikanid.outputs import atomically
 from pikanid.problem import FreeParameter
 
 SCHEMA = 1
 
 
 def save(estimate: Estimate, path: str | os.PathLike[str]) -> None:
-    """Write `estimate`; an existing file is replaced only once the new one is complete."""
-    content: dict[str, Any] = {
+    """Write `estimate`; an existing file is replaced only once the new one is complete.
+
+    Raises
+    ------
+    pikanid.errors.BadRecording : the place cannot be written to
+    """
+    atomically(path, content(estimate, path))
+
+
+def content(estimate: Estimate, path: str | os.PathLike[str]) -> bytes:
+    """What `save` writes to `path`."""
+    entries: dict[str, Any] = {
         "pikanid_estimate": SCHEMA,
         "model": estimate.model.to_dict(),
         "strategy": estimate.strategy,
@@ -43,18 +53,8 @@ def save(estimate: Estimate, path: str | os.PathLike[str]) -> None:
         "warnings": list(estimate.warnings),
         "seconds": estimate.seconds, "seed": estimate.seed, "version": estimate.version,
     }
-    target = Path(path)
-    data = json.dumps(content).encode()
-    if target.suffix == ".gz":
-        data = gzip.compress(data, mtime=0)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    data = json.dumps(entries).encode()
+    return gzip.compress(data, mtime=0) if Path(path).suffix == ".gz" else data
 
 
 def load(path: str | os.PathLike[str]) -> Estimate:

@@ -24,8 +24,8 @@ from pikanid.expression_limits import Work
 from pikanid.expressions import check_name, parse, symbol, to_text
 from pikanid.model import Input, Model, Output, Parameter, Spline, State
 from pikanid.model_checks import MOST
+from pikanid.outputs import atomically
 from pikanid.stored import MOST_MODEL, file_bytes
-from pikanid.writing import atomically
 
 SECTIONS = ("name", "states", "inputs", "parameters", "equations", "outputs", "splines")
 KEYS = {

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 
 from pikanid import errors
-from pikanid.writing import atomically
+from pikanid.outputs import atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -195,11 +195,20 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     pikanid.errors.BadSetting : the name ends otherwise
     pikanid.errors.BadRecording : the place cannot be written to
     """
-    file = Path(path)
-    ending = file.suffix.lower()
+    atomically(path, image_for(figure, path))
+
+
+def image_for(figure: Figure, path: str | os.PathLike[str]) -> bytes:
+    """What `save_figure` writes to `path`.
+
+    Raises
+    ------
+    pikanid.errors.BadSetting : the name ends neither in .png nor in .svg nor in .pdf
+    """
+    ending = Path(path).suffix.lower()
     if ending not in ENDINGS:
         raise errors.BadSetting(errors.output_ending("The figure", str(path), ENDINGS))
-    atomically(file, image(figure, ending))
+    return image(figure, ending)
 
 
 @cache

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import gzip
 import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.channel import Array, Channel
+from pikanid.outputs import atomically
 
 
 def write(channels: Mapping[str, Channel], path: str | os.PathLike[str]) -> None:
@@ -26,6 +26,7 @@ def write(channels: Mapping[str, Channel], path: str | os.PathLike[str]) -> None
     Raises:
         BadRecording: If the file name ends otherwise or the place cannot be written to.
 
+    >>> import tempfile
     >>> from pikanid.recording import Recording
     >>> rec = Recording.from_arrays([0.0, 0.1], {"theta": [0.5, 1.0]}, {"theta": "deg"})
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -35,43 +36,24 @@ def write(channels: Mapping[str, Channel], path: str | os.PathLike[str]) -> None
     0.0,0.5
     0.1,1.0
     """
-    file = Path(path)
-    name = file.name.lower()
-    if name.endswith((".csv", ".csv.gz", ".tsv", ".tsv.gz")):
-        content = _csv(channels, "\t" if ".tsv" in name else ",").encode()
-        # No time stamp inside: the same recording gives the same bytes.
-        atomically(file, gzip.compress(content, mtime=0) if name.endswith(".gz") else content)
-    elif name.endswith((".parquet", ".pq")):
-        atomically(file, _parquet(channels))
-    else:
-        known = [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet"]
-        raise errors.BadRecording(errors.unknown_ending(file.name, known))
+    atomically(path, content(channels, Path(path).name))
 
 
-def atomically(path: Path, content: bytes) -> None:
-    """Replace a file as a whole, so that nobody ever reads half of it.
+def content(channels: Mapping[str, Channel], name: str) -> bytes:
+    """What a file of that name holds.
 
     Raises:
-        BadRecording: If the folder is missing or cannot be written to.
+        BadRecording: If the file name has no known ending.
     """
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            os.chmod(temporary, 0o666 & ~_umask())
-            os.replace(temporary, path)
-        except BaseException:
-            os.unlink(temporary)
-            raise
-    except OSError as failure:
-        raise errors.BadRecording(errors.cannot_write(str(path), failure.strerror or "")) from None
-
-
-def _umask() -> int:
-    current = os.umask(0o077)
-    os.umask(current)
-    return current
+    lower = name.lower()
+    if lower.endswith((".csv", ".csv.gz", ".tsv", ".tsv.gz")):
+        text = _csv(channels, "\t" if ".tsv" in lower else ",").encode()
+        # No time stamp inside: the same recording gives the same bytes.
+        return gzip.compress(text, mtime=0) if lower.endswith(".gz") else text
+    if lower.endswith((".parquet", ".pq")):
+        return _parquet(channels)
+    known = [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet"]
+    raise errors.BadRecording(errors.unknown_ending(name, known))
 
 
 def _columns(channels: Mapping[str, Channel]) -> Iterator[tuple[str, str, Array, Channel | None]]:

@@ -19,7 +19,7 @@ PACKAGE = ROOT / "pikanid"
 # Rows from the ground up: a module may import from its own row and from the rows before it.
 # A name also covers what continues it with an underscore: "model" covers model_parts.
 ROWS = (
-    ("errors", "version", "cache"),
+    ("errors", "version", "cache", "outputs", "workers"),
     ("units", "entries", "stored", "expressions", "expression_functions", "expression_limits",
      "expression_printing"),
     ("approximators",),

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -31,6 +32,14 @@ from pikanid.recording import Recording
 SMALL = Settings(4, "two_pulse", 0.1 * np.pi / 180, dict(DEFAULT_MIX))
 CLEAN = Settings(3, "two_pulse", 1e-3, {"nothing": 1.0})
 LONGER = Settings(6, "two_pulse", 1e-3, {"nothing": 1.0})
+
+
+UMASK = os.umask(0o022)
+os.umask(UMASK)
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -131,11 +140,46 @@ def test_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     # What a killed run may leave behind: a recording without its entry, a half-written file.
     progress = tmp_path / "t.json.unfinished"
     (progress / "006_train.csv").write_text("half")
-    (tmp_path / "d" / ".001_train.csv.abc").write_text("half")
+    leftovers = [tmp_path / "d" / ".001_train.csv.0a.part", tmp_path / "d" / ".seal.json.0a.part",
+                 tmp_path / ".t.json.0a.part"]
+    for path in leftovers:
+        path.write_text("half")
     again = generate(tmp_path / "d", tmp_path / "t.json", LONGER, seed=11, workers=1)
     assert (again.kept, again.made) == (3, 3)
     assert content(tmp_path / "d") == content(tmp_path / "whole")
     assert (tmp_path / "t.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
+    assert not any(path.exists() for path in [progress, *leftovers])
+
+
+def test_the_secret_of_an_unfinished_set_is_the_users_alone(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    places = tmp_path / "d", tmp_path / "t.json"
+    for last in ("_hand_over", "_remove"):
+        with monkeypatch.context() as patch:
+            patch.setattr(room, last, killed)
+            with pytest.raises(KeyboardInterrupt):
+                generate(*places, CLEAN, workers=1)
+        progress = tmp_path / "t.json.unfinished"
+        assert mode(progress) == 0o700
+        assert {mode(path) for path in progress.iterdir()} == {0o600}
+    seed = json.loads((progress / "set.json").read_bytes())["seed"]
+    assert not any(seed.encode() in path.read_bytes() for path in places[0].iterdir())
+    again = generate(*places, CLEAN, workers=1)
+    assert (again.kept, again.made) == (3, 0)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["d", "t.json"]
+    assert mode(places[1]) == 0o600  # sealed
+    assert {mode(path) for path in places[0].iterdir()} == {0o666 & ~UMASK}
+
+
+def test_a_planted_place_for_the_secret_is_not_used(tmp_path: Path) -> None:
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "t.json.unfinished").symlink_to(tmp_path / "theirs")
+    with pytest.raises(errors.BadSetting, match="something else"):
+        generate(tmp_path / "d", tmp_path / "t.json", CLEAN, workers=1)
+    assert list((tmp_path / "theirs").iterdir()) == []
 
 
 def test_damaged_case_of_an_unfinished_set_is_made_again(tmp_path: Path,

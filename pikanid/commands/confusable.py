@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -48,9 +47,9 @@ def confusable(
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [model, excitation])
     from pikanid import systems
     from pikanid.mismatch.confusable import confusable as run
+    from pikanid.outputs import atomically
     from pikanid.reporting.console import console, working
     from pikanid.reporting.strict_json import text
-    from pikanid.writing import atomically
 
     chosen = adjusted(systems.find(model), set_)
     drive = excited(chosen, excitation, duration, rate, [])
@@ -60,7 +59,7 @@ def confusable(
     if json_ == "-":
         print(text(found.to_dict()), end="")
     elif json_ is not None:
-        atomically(Path(json_), text(found.to_dict()).encode())
+        atomically(json_, text(found.to_dict()).encode())
     if not quiet and json_ != "-":
         console().print(str(found), markup=False, soft_wrap=True)
     return 0

@@ -54,9 +54,11 @@ def design(
     from pikanid import errors, systems
     from pikanid.mismatch.experiments import d_optimal, next_experiment
     from pikanid.mismatch.profiles import Bounds
-    from pikanid.plots import save_figure
+    from pikanid.outputs import together
+    from pikanid.plots import image_for
     from pikanid.recording import Recording
     from pikanid.reporting.console import console
+    from pikanid.writing import content
 
     if not rate > 0:
         raise errors.BadSetting(errors.bad_rate(rate))
@@ -72,9 +74,10 @@ def design(
     else:
         chosen = next_experiment(found, past, noise, offered, drive, duration, 1 / rate, limits,
                                  seed)
-    chosen.save(out)
+    files = {out: content(chosen.profile.channels, out)}
     if plot is not None:
-        save_figure(chosen.plot(), plot)
+        files[plot] = image_for(chosen.plot(), plot)
+    together(files)
     if not quiet:
         console().print(f"{chosen}\n{out}: {chosen.profile.stop:g} s, "
                         f"columns {', '.join(chosen.profile.names)}", markup=False, soft_wrap=True)

@@ -93,14 +93,17 @@ def diagnose(
 def _write(dx: Diagnosis, title: str, json_: str | None, report: str | None) -> None:
     from pathlib import Path
 
+    from pikanid.outputs import together
     from pikanid.reporting import strict_json
-    from pikanid.writing import atomically
 
-    if json_ == "-":
-        print(strict_json.text(dx.to_dict()), end="")
-    elif json_ is not None:
-        atomically(Path(json_), strict_json.text(dx.to_dict()).encode())
+    files: dict[str, bytes] = {}
+    text = "" if json_ is None else strict_json.text(dx.to_dict())
+    if json_ is not None and json_ != "-":
+        files[json_] = text.encode()
     if report is not None:
         from pikanid.reporting.diagnosis_page import page
 
-        atomically(Path(report), page(dx, Path(title).stem).encode())
+        files[report] = page(dx, Path(title).stem).encode()
+    together(files)
+    if json_ == "-":
+        print(text, end="")

@@ -47,9 +47,7 @@ def equivalence(
     build_kan([1, 1])  # says what is missing where torch or pykan is not installed
     with working("equivalence", count_parts(quick), quiet) as step:
         found = run_checks(quick=quick, seed=seed, progress=step)
-    if json_ is not None:
-        _write_json(found, json_)
-    page = None if folder is None else found.write(folder)
+    page = _write(found, folder, json_)
     if not quiet and json_ != "-":
         screen = console()
         show(screen, found)
@@ -98,17 +96,21 @@ def show(screen: Console, report: EquivalenceReport) -> None:
                  f"{lost} of {total} comparisons did not pass.", markup=False)
 
 
-def _write_json(report: EquivalenceReport, path: str) -> None:
+def _write(report: EquivalenceReport, folder: Path | None, json_: str | None) -> Path | None:
+    """The page with its figure, and JSON; the path of the page."""
     from importlib.metadata import version
 
+    from pikanid.outputs import together
     from pikanid.reporting.strict_json import text
-    from pikanid.writing import atomically
 
     content = text({**report.to_dict(), "version": version("pikanid")})
-    if path == "-":
+    files = {} if folder is None else report.files(folder)
+    if json_ is not None and json_ != "-":
+        files[Path(json_)] = content.encode()
+    together(files)
+    if json_ == "-":
         print(content, end="")
-    else:
-        atomically(Path(path), content.encode())
+    return None if folder is None else folder / "equivalence.md"
 
 
 def _folder(text: str) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -49,9 +48,9 @@ def extract(
         metavar="FILE", show_default=False, help="the network drawn: .png, .svg, .pdf")] = None,
 ) -> int:
     """Read a KAN: a formula with standard errors, and how far to trust it."""
+    from pikanid.outputs import together
     from pikanid.reporting.console import console
     from pikanid.symbolic import extract as read
-    from pikanid.writing import atomically
 
     check_outputs({"--plot": (plot, (".png", ".svg", ".pdf")),
                    "--json": (None if json_ == "-" else json_, (".json",))},
@@ -61,16 +60,18 @@ def extract(
     x, y = _points(data, names, output) if data else (None, None)
     reading = read(network, x, y, inputs=names or None, alpha=alpha)
     text = json.dumps(_content(reading), indent=2, allow_nan=False) + "\n"
+    files: dict[str, bytes] = {}
+    if json_ is not None and json_ != "-":
+        files[json_] = text.encode()
+    if plot is not None:
+        from pikanid.plots import image_for
+
+        files[plot] = image_for(reading.plot(), plot)
+    together(files)
     if json_ == "-":
         print(text, end="")
     else:
-        if json_ is not None:
-            atomically(Path(json_), text.encode())
         console().print(str(reading), markup=False, soft_wrap=True)
-    if plot is not None:
-        from pikanid.plots import save_figure
-
-        save_figure(reading.plot(), plot)
     return 0 if reading.ok else errors.EXIT_MISFIT
 
 

@@ -199,26 +199,28 @@ def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str]
 def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimate],
            failed: dict[str, str], several: bool, seconds: float, json_: str | None,
            plot: str | None, save: str | None) -> None:
-    from pathlib import Path
-
     import pikanid
+    from pikanid.outputs import together
     from pikanid.reporting import strict_json
-    from pikanid.writing import atomically
 
+    files: dict[str, bytes] = {}
     labels = [r.name for r in given]
     if json_ is not None:
         content = (strict_json.of_several(estimates, failed, model.name, labels,
                                           pikanid.__version__, seconds)
                    if several else strict_json.of_one(estimates[0], labels))
-        if json_ == "-":
-            print(strict_json.text(content), end="")
-        else:
-            atomically(Path(json_), strict_json.text(content).encode())
+        if json_ != "-":
+            files[json_] = strict_json.text(content).encode()
     if plot is not None:
-        from pikanid.plots import plot_strategies, save_figure
+        from pikanid.plots import image_for, plot_strategies
 
         figure = (plot_strategies({e.strategy: e.fits for e in estimates}, model.name)
                   if len(estimates) > 1 else estimates[0].plot())
-        save_figure(figure, plot)
+        files[plot] = image_for(figure, plot)
     if save is not None:
-        estimates[0].save(save)
+        from pikanid import estimate_file
+
+        files[save] = estimate_file.content(estimates[0], save)
+    together(files)
+    if json_ == "-":
+        print(strict_json.text(content), end="")

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pikanid import errors
 from pikanid.concealed.arrays import Array
 from pikanid.concealed.experiment import Experiment
 
@@ -38,26 +36,6 @@ def csv(experiment: Experiment, theta: Array) -> bytes:
 def canonical(content: Mapping[str, object]) -> bytes:
     """JSON with one form for one content."""
     return (json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
-
-
-def write(path: Path, content: bytes) -> None:
-    """Replace a file as a whole: it is there completely or not at all.
-
-    Raises:
-        BadSetting: If the place cannot be written to.
-    """
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, path)
-        except BaseException:
-            os.unlink(temporary)
-            raise
-    except OSError as failure:
-        raise errors.BadSetting(errors.cannot_write(str(path), failure.strerror or "")) from None
 
 
 def same_times(paths: Sequence[Path]) -> None:

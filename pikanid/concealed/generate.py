@@ -1,9 +1,15 @@
 """A whole set of concealed recordings: resumable, in parallel, the same for any number of workers.
 
 While a set is being made, a folder beside the truth file (its name and ``.unfinished``) keeps the
-secret, the finished recordings and the truth about each.  The recordings move to their place all at
-once, in the order of their numbers: when a file was born would tell how long its case took, and
-with that what it hides.
+secret, the finished recordings and the truth about each; from that a run that was interrupted or
+killed goes on.  To go on is to know the secret, so it has to lie somewhere: where the user has
+chosen to keep the truth, in a folder that nobody else can enter (mode 0700, not a link, files
+0600), never among the recordings.  It is removed as soon as the truth file is there, by the next
+run if this one is killed in between; whoever gives a set up removes it.
+
+The recordings move to their place all at once, in the order of their numbers: when a file was born
+would tell how long its case took, and with that what it hides.  The truth file of a sealed set is
+the user's alone as well; who hands it out opens it.
 """
 
 from __future__ import annotations
@@ -19,14 +25,16 @@ from typing import cast
 import numpy as np
 
 from pikanid import errors
+from pikanid.cache import own_folder
 from pikanid.concealed import files, seal
 from pikanid.concealed.case import Order, make
 from pikanid.concealed.deck import deal
 from pikanid.concealed.excitations import CHOICES
 from pikanid.concealed.seal import Secret, Settings
+from pikanid.outputs import STAGED, atomically
+from pikanid.workers import unordered
 
 MOST_CASES = 100_000
-SUFFIX = ".csv"
 
 
 @dataclass(frozen=True)
@@ -65,9 +73,11 @@ def generate(out: str | Path, truth: str | Path, settings: Settings, seed: int |
     folder, file = Path(out), Path(truth)
     check(settings)
     _check_places(folder, file)
-    if file.exists():
-        return _already_made(folder, file, settings, seed)
     progress = file.with_name(file.name + ".unfinished")
+    if file.exists():
+        made = _already_made(folder, file, settings, seed)
+        _remove(progress, folder, file)  # of a run that was killed after its last step but one
+        return made
     key = _begin(progress, folder, settings, seed)
     orders = orders_of(settings, key)
     waiting = [order for order in orders if not _finished(progress, order)]
@@ -77,8 +87,8 @@ def generate(out: str | Path, truth: str | Path, settings: Settings, seed: int |
     cases = [json.loads(_entry(progress, order).read_bytes()) for order in orders]
     content = seal.truth_content(settings, key, cases)
     _hand_over(cases, progress, folder, seal.seal_content(content, key.sealed))
-    files.write(file, content)
-    shutil.rmtree(progress)
+    atomically(file, content, private=key.sealed)
+    _remove(progress, folder, file)
     return Made(folder, file, len(waiting), len(orders) - len(waiting))
 
 
@@ -151,12 +161,11 @@ def _begin(progress: Path, folder: Path, settings: Settings, seed: int | None) -
     if any(folder.iterdir()):
         raise errors.BadSetting(errors.conceal_taken(str(folder)))
     key = seal.secret(seed)
-    progress.mkdir(exist_ok=True)
-    # Nobody else on the machine is to read the secret of a sealed set.
-    os.chmod(progress, 0o700)
-    files.write(note, files.canonical({
+    if not own_folder(progress):
+        raise errors.BadSetting(errors.conceal_taken(str(progress)))
+    atomically(note, files.canonical({
         "seed": str(key.seed), "nonce": key.nonce, "sealed": key.sealed,
-        "settings": asdict(settings)}))
+        "settings": asdict(settings)}), private=True)
     return key
 
 
@@ -171,28 +180,31 @@ def _finished(progress: Path, order: Order) -> bool:
 
 def _made_in_parallel(orders: Sequence[Order], progress: Path,
                       workers: int | None) -> Iterable[str]:
-    from joblib import Parallel, delayed
-
     number = min(workers or os.cpu_count() or 1, max(len(orders), 1))
-    return Parallel(n_jobs=number, return_as="generator_unordered", batch_size=1)(
-        delayed(_make_one)(order, progress) for order in orders)
+    return unordered(_make_one, [(order, progress) for order in orders], number)
 
 
 def _make_one(order: Order, progress: Path) -> str:
     case = make(order)
     for name, content in case.recordings.items():
-        files.write(progress / name, content)
-    files.write(_entry(progress, order), files.canonical(case.truth))
+        atomically(progress / name, content, private=True)
+    atomically(_entry(progress, order), files.canonical(case.truth), private=True)
     return order.name
 
 
 def _hand_over(cases: Sequence[Mapping[str, object]], progress: Path, folder: Path,
                seal_text: bytes) -> None:
     """Recordings and seal into the folder that is given away."""
-    for leftover in folder.glob(f".*{SUFFIX}.*"):  # of a run that was killed just here
-        leftover.unlink()
     names = sorted(name for case in cases for name in cast(dict[str, str], case["sha256"]))
     for name in names:
-        files.write(folder / name, (progress / name).read_bytes())
-    files.write(folder / seal.SEAL, seal_text)
+        atomically(folder / name, (progress / name).read_bytes())
+    atomically(folder / seal.SEAL, seal_text)
     files.same_times([folder / name for name in (*names, seal.SEAL)])
+
+
+def _remove(progress: Path, folder: Path, file: Path) -> None:
+    """The unfinished set, and what a kill left of files on their way to their places."""
+    if progress.exists():
+        shutil.rmtree(progress)
+    for leftover in (*folder.glob(STAGED), *file.parent.glob(f".{file.name}{STAGED}")):
+        leftover.unlink()

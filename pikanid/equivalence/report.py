@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pikanid.outputs import together
 from pikanid.plots import new_figure
 
 if TYPE_CHECKING:
@@ -108,21 +109,21 @@ class EquivalenceReport:
 
     def write(self, folder: str | os.PathLike[str]) -> Path:
         """Write equivalence.md and its figure equivalence.png into ``folder``; the page's path."""
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        together(self.files(folder))
+        return Path(folder) / "equivalence.md"
+
+    def files(self, folder: str | os.PathLike[str]) -> dict[Path, bytes]:
+        """What `write` writes: path -> content."""
         picture = io.BytesIO()
         self.plot().savefig(picture, format="png", dpi=110)
         text = self.to_markdown().replace(
             "## What must differ", "![differences](equivalence.png)\n\n## What must differ", 1
         )
-        for name, content in (
-            ("equivalence.png", picture.getvalue()),
-            ("equivalence.md", text.encode()),
-        ):
-            part = folder / f".{name}.{os.getpid()}.part"
-            part.write_bytes(content)
-            os.replace(part, folder / name)
-        return folder / "equivalence.md"
+        return {
+            Path(folder) / "equivalence.png": picture.getvalue(),
+            Path(folder) / "equivalence.md": text.encode(),
+        }
 
     def plot(self) -> Figure:
         """Every difference on a logarithmic axis: agreements, their bounds, and controls."""

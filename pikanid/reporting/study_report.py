@@ -8,12 +8,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pikanid.plots import save_figure
+from pikanid.outputs import together
+from pikanid.plots import image
 from pikanid.reporting import study_sheets as sheets
 from pikanid.reporting.study_figures import figures
 from pikanid.study import pendulum, slosh
 from pikanid.study.run import SEED, Study
-from pikanid.writing import atomically
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -67,14 +67,12 @@ def write(study: Study, folder: Path) -> list[Path]:
         BadRecording: If the folder cannot be written to.
     """
     drawn = figures(study)
-    (folder / "figures").mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in drawn.items():
-        written.append(folder / "figures" / f"study-{name}.png")
-        save_figure(figure, written[-1])
     pictures = {name: f"figures/study-{name}.png" for name in drawn}
-    atomically(folder / "study.md", text(study, pictures).encode())
-    return [folder / "study.md", *written]
+    files = {folder / "study.md": text(study, pictures).encode(),
+             **{folder / pictures[name]: image(figure) for name, figure in drawn.items()}}
+    (folder / "figures").mkdir(parents=True, exist_ok=True)
+    together(files)
+    return list(files)
 
 
 def text(study: Study, pictures: Mapping[str, str]) -> str:

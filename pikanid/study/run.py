@@ -15,6 +15,7 @@ from pikanid import errors
 from pikanid.mismatch import Diagnosis
 from pikanid.strategies import STRATEGIES
 from pikanid.study import pendulum, slosh
+from pikanid.workers import begin
 
 SEED = 0
 # Only what is quick is repeated: the study is to stay a matter of minutes.
@@ -101,5 +102,5 @@ def _meanwhile(jobs: Sequence[tuple[slosh.Scenario, str]]
         return
     # More threads of its BLAS, which reads that on import, would slow down the fits timed here.
     with multiprocessing.get_context("spawn").Pool(
-            1, os.putenv, ("OMP_NUM_THREADS", "1")) as pool:
+            1, begin, (os.getpid(), {"OMP_NUM_THREADS": "1"})) as pool:
         yield {job: pool.apply_async(slosh.fit, (*job, SEED)) for job in jobs}

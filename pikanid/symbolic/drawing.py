@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from pikanid.plots import new_figure
+from pikanid.outputs import together
+from pikanid.plots import image_for, new_figure
 from pikanid.symbolic.composed import Groups, Place
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.significance import Contribution
@@ -83,8 +84,7 @@ def draw(reading: Drawable, *paths: str | Path) -> Figure:
                       bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8}, zorder=6)
     back.set_title("")
     back.text(0.5 * width, height - 0.28, _title(reading), ha="center", va="center", fontsize=10)
-    for path in paths:
-        figure.savefig(path, dpi=150)
+    together({path: image_for(figure, path) for path in paths})
     return figure
 
 

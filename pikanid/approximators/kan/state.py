@@ -18,6 +18,7 @@ from pikanid.approximators.kan.build import blank_kan, plan_of, read, write
 from pikanid.approximators.kan.kinks import Kink
 from pikanid.approximators.kan.plan import Arity, Array, Base, KanPlan
 from pikanid.approximators.kan.shallow import ShallowKAN
+from pikanid.outputs import atomically
 
 _FORMAT = "pikanid-kan"
 _VERSION = 1
@@ -148,9 +149,7 @@ def save(kan: Any, path: str | os.PathLike[str]) -> None:
     else:
         stored: dict[str, Any] = {"header": np.array(json.dumps(header)), **arrays}
         np.savez(content, **stored)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    part.write_bytes(content.getvalue())
-    os.replace(part, path)
+    atomically(path, content.getvalue())
 
 
 def load(path: str | os.PathLike[str], device: str = "cpu") -> Any:
