@@ -11,18 +11,23 @@ import json
 import os
 import resource
 import shutil
+import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 WORK = Path(os.environ["MUTANTS_WORK"])
 BUDGET = float(os.environ.get("MUTANTS_BUDGET", "15"))
 MEMORY = 6 << 30
+SLOW = 3.0  # processor seconds: a test that takes longer is left out
 # Tests about the source text, the installation or other programs; mutants are none of theirs.
 LEFT_OUT = ("architecture", "readme", "concealed", "plots", "datasets", "interrupts", "public_api",
-            "no_traces", "study", "cli.py", "compiled_cache", "diagnosis_memory", "kan_",
-            "pinn", "pikan", "reading", "mlp", "excitation", "slosh_recording", "units")
+            "no_traces", "study", "cli.py", "compiled_cache", "diagnosis_memory", "kan_build",
+            "kan_paper", "pinn", "pikan.py", "reading", "mlp", "excitation", "slosh_recording",
+            "units", "hostile", "unforeseen", "excerpt")
 _durations: dict[str, float] = {}
 
 
@@ -63,7 +68,10 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Order, and cut at the budget."""
+    """Order, and cut at the budget; no test that was found to be slow."""
+    slow = set(_lines("slow"))
+    config.hook.pytest_deselected(items=[i for i in items if i.nodeid in slow])
+    items[:] = [i for i in items if i.nodeid not in slow]
     if os.environ.get("MUTANT_UNDER_TEST", "") in ("stats", "list_all_tests", "fail"):
         return
     parts = mutant().partition(".x")[0].split(".")
@@ -78,12 +86,37 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Processor seconds, not those of the clock: other programs run beside."""
+    """A limit in processor seconds, not those of the clock: other programs run beside."""
     if mutant():
         _, hard = resource.getrlimit(resource.RLIMIT_CPU)
         wanted = int(time.process_time() + 10 * _time(item) + 20)
         limit = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
         resource.setrlimit(resource.RLIMIT_CPU, (limit, hard))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """In the first run, of the code as it is: note what runs, and end and note what is slow."""
+    if mutant():
+        return (yield)
+
+    def too_long(*_: Any) -> None:
+        with (WORK / "slow").open("a") as file:
+            file.write(f"{item.nodeid}\n")
+        pytest.skip(f"takes more than {SLOW:g} s")
+
+    (WORK / "now").write_text(f"{item.nodeid}\n")
+    before = signal.signal(signal.SIGPROF, too_long)
+    signal.setitimer(signal.ITIMER_PROF, SLOW)
+    try:
+        return (yield)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def _lines(name: str) -> list[str]:
+    return (WORK / name).read_text().splitlines() if (WORK / name).exists() else []
 
 
 def _time(item: pytest.Item) -> float:

@@ -75,6 +75,17 @@ def test_gradnorm_makes_both_parts_pull_equally() -> None:
     assert balance(1, bowl, z) == lam
 
 
+def test_gradnorm_looks_again_every_so_often() -> None:
+    """Between looks λ stays; a look moves it by a tenth of the way, and never beyond the most."""
+    balance = gradient.GradNorm(every=2, momentum=0.9, largest=2.0)
+    near, far = (torch.tensor(z, dtype=torch.float64) for z in ([0.0, 3.0], [1.9, 3.0]))
+    first = balance(0, bowl, near)
+    assert balance(1, bowl, far) == first
+    wanted = abs(2 * (1.9 - 2.0)) / (2 * 1.1 * 2**0.5)
+    assert np.isclose(balance(2, bowl, far), 0.9 * first + 0.1 * wanted)
+    assert gradient.GradNorm(largest=0.1)(0, bowl, near) == 0.1
+
+
 def test_progress_is_told() -> None:
     told: list[dict[str, float]] = []
     gradient.adam(bowl, np.zeros(2), steps=250, weight=gradient.Ramp(0.0, 0.1, 250), goal=0.1,

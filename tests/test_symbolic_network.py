@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -231,6 +233,14 @@ def test_text_and_html(additive: tuple[object, np.ndarray, np.ndarray, Reading])
     *_, reading = additive
     assert "a_theta" in str(reading) and "±" in str(reading)
     assert "<table>" in reading._repr_html_() and "\\sin" in reading.latex()
+    digits = re.findall(r"\d+\.\d+", str(reading).splitlines()[0])
+    assert digits and all(len(n.replace(".", "").lstrip("0")) <= 4 for n in digits)
+    assert "off the data" in reading.sentence() and "of the spread" in reading.sentence()
+    still = replace(reading, spread=0.0, error_network=0.0)  # a network that says one number
+    assert "0.00% of the spread" in still.sentence()
+    lost = replace(reading, p_value=1e-9, error_network=0.25 * reading.spread)
+    assert not lost.ok and "off by 25.00% of its spread" in lost.sentence()
+    assert replace(reading, caution="Not this one.").sentence() == "Not this one."
 
 
 def test_bad_data_are_refused() -> None:
