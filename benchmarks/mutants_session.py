@@ -22,7 +22,7 @@ import pytest
 WORK = Path(os.environ["MUTANTS_WORK"])
 BUDGET = float(os.environ.get("MUTANTS_BUDGET", "15"))
 MEMORY = 6 << 30
-SLOW = 3.0  # processor seconds: a test that takes longer is left out
+SLOW = 5.0  # processor seconds: a test that takes longer is left out
 # Tests about the source text, the installation or other programs; mutants are none of theirs.
 LEFT_OUT = ("architecture", "readme", "concealed", "plots", "datasets", "interrupts", "public_api",
             "no_traces", "study", "cli.py", "compiled_cache", "diagnosis_memory", "kan_build",
@@ -68,10 +68,10 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Order, and cut at the budget; no test that was found to be slow."""
-    slow = set(_lines("slow"))
-    config.hook.pytest_deselected(items=[i for i in items if i.nodeid in slow])
-    items[:] = [i for i in items if i.nodeid not in slow]
+    """Order, and cut at the budget; no test that the first run has left out."""
+    without = set(_lines("left_out"))
+    config.hook.pytest_deselected(items=[i for i in items if i.nodeid in without])
+    items[:] = [i for i in items if i.nodeid not in without]
     if os.environ.get("MUTANT_UNDER_TEST", "") in ("stats", "list_all_tests", "fail"):
         return
     parts = mutant().partition(".x")[0].split(".")
@@ -101,8 +101,7 @@ def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
         return (yield)
 
     def too_long(*_: Any) -> None:
-        with (WORK / "slow").open("a") as file:
-            file.write(f"{item.nodeid}\n")
+        _leave_out(item)
         pytest.skip(f"takes more than {SLOW:g} s")
 
     (WORK / "now").write_text(f"{item.nodeid}\n")
@@ -113,6 +112,21 @@ def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Iterator[None]:
+    """A test that fails without any mutant, among copies of the files, says nothing of mutants."""
+    report: Any = yield
+    if report.failed and os.environ.get("MUTANT_UNDER_TEST") == "stats":
+        _leave_out(item)
+        report.outcome, report.longrepr = "skipped", (str(item.path), 0, "left out")
+    return report
+
+
+def _leave_out(item: pytest.Item) -> None:
+    with (WORK / "left_out").open("a") as file:
+        file.write(f"{item.nodeid}\n")
 
 
 def _lines(name: str) -> list[str]:

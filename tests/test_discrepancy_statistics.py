@@ -13,6 +13,7 @@ from scipy.stats import binom, chi2, multivariate_normal
 from pikanid.discrepancy.bands import (
     _smoothest,
     holm,
+    likelihood,
     posterior,
     simultaneous_factor,
     wald,
@@ -84,6 +85,63 @@ def test_gradient_of_the_evidence() -> None:
     cost = functools.partial(smooth.cost, J.T @ J, J.T @ y)
     slopes = [(cost(rho + h)[0] - cost(rho - h)[0]) / 2e-3 for h in 1e-3 * np.eye(6)]
     np.testing.assert_allclose(cost(rho)[1], slopes, rtol=1e-4)
+
+
+def test_curvature_of_the_evidence() -> None:
+    J, smooth = design(True), smoothness(True, 3)
+    A, b = J.T @ J, J.T @ np.sin(3 * visited().arguments[:, 0]) / SIGMA
+    rho = smooth.choose(A, b, smooth.stiff)[0]
+    h = 0.05 * np.eye(len(rho))
+
+    def cost(*moves: np.ndarray) -> float:
+        return smooth.cost(A, b, rho + sum(moves))[0]
+
+    wanted = [[(cost(x, y) - cost(x, -y) - cost(-x, y) + cost(-x, -y)) / 0.01 for x in h]
+              for y in h]
+    found = smooth.curvature(A, b, rho)
+    np.testing.assert_allclose(found, wanted, atol=0.03 * np.abs(wanted).max())
+    weights = [w for _, w in smooth.plausible(A, b, rho)]
+    assert sum(weights) == pytest.approx(1.0, abs=0.01) and min(weights) > 0.0
+
+
+def test_a_straight_edge_costs_its_size_alone() -> None:
+    """A tenth of the equation's size is usual, for all of its coefficients together."""
+    prior = EdgePrior(plan(), np.arange(plan().size), 2.0)
+    for c in (np.ones(plan().size), np.linspace(-1.0, 1.0, plan().size)):
+        cost = c @ prior.precision(np.array([3.0])) @ c
+        assert cost == pytest.approx(np.mean(c**2) / 0.2**2, rel=1e-9)
+    assert np.linalg.eigvalsh(prior.precision(np.array([-12.0]))).min() > 0.0
+
+
+def test_what_the_data_alone_say_of_an_edge() -> None:
+    """χ² of the edge's coefficients, the parameters at their best: priors of these do not count."""
+    y = 0.1 * visited().arguments[:, 0] ** 3 / SIGMA + np.random.default_rng(4).normal(size=400)
+    fit = linear_fit(y)
+    fit = replace(fit, smoothness=replace(fit.smoothness, weak=1e4 * (fit.smoothness.weak > 0)))
+    S, g = likelihood(fit, 0)
+    own, edge = design()[:, :2], design()[:, 2:]
+
+    def chi2(c: np.ndarray) -> float:
+        left = y - edge @ c
+        return float(np.sum((left - own @ np.linalg.lstsq(own, left, rcond=None)[0]) ** 2))
+
+    nothing = np.zeros(plan().size)
+    for c in np.random.default_rng(5).normal(size=(3, plan().size)):
+        assert c @ S @ c - 2 * g @ c == pytest.approx(chi2(c) - chi2(nothing), rel=1e-6)
+
+
+def test_the_posterior_does_not_depend_on_where_it_is_expanded() -> None:
+    fit = linear_fit(np.random.default_rng(6).normal(size=400))
+    away = 0.01 * np.random.default_rng(7).normal(size=len(fit.theta))
+    moved = replace(fit, theta=fit.theta + away)
+    here, there = posterior(fit), posterior(moved)
+    # smoothnesses that hardly count are left out, so that weights add up to one but for 1e-4
+    np.testing.assert_allclose(there.mean, here.mean, atol=1e-6)
+    np.testing.assert_allclose(there.covariance, here.covariance, atol=1e-8)
+    # no wider than the prior, no narrower than at a smoothness that is known
+    known = np.linalg.inv(fit.information + fit.smoothness.precision(fit.rho))
+    assert np.all(np.diag(here.covariance) > 0.5 * np.diag(known))
+    assert np.all((here.freedom >= 0.0) & (here.freedom <= 1.0 + 1e-9))
 
 
 def test_gauge_is_the_constant_and_the_nominal_term() -> None:

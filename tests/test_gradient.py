@@ -52,6 +52,7 @@ def test_bounds_hold() -> None:
     b = gradient.lbfgs(bowl, np.zeros(2), steps=50, lam=1.0, **options)
     for found in (a, b):
         np.testing.assert_allclose(found.z, [1.5, 1.0], atol=1e-6)
+    assert b.gradient < 1e-5  # what is left of it pushes against a bound
 
 
 def test_nan_costs_the_rest_but_not_the_best() -> None:
