@@ -76,7 +76,7 @@ def from_rows(
     Raises:
         BadRecording: If there is no data row.
     """
-    headed = not all(_number(cell, decimal) is not None for cell in rows[0])
+    headed = heads(rows[0], decimal)
     headers = [str(cell or "").strip() for cell in rows[0]] if headed else []
     body, shown = (rows[1:], numbers[1:]) if headed else (rows, numbers)
     if not body:
@@ -88,6 +88,15 @@ def from_rows(
         for header, cells in zip(headers, zip(*body, strict=True), strict=True)
     )
     return Table(columns, shown)
+
+
+def heads(row: Sequence[object], decimal: str) -> bool:
+    """Whether the first row of a file holds headers: not all of it are numbers or empty.
+
+    >>> heads(["t", "1"], "."), heads(["0", "1,5"], ",")
+    (True, False)
+    """
+    return not all(_number(cell, decimal) is not None for cell in row)
 
 
 def from_cells(
