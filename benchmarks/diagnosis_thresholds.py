@@ -54,7 +54,7 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
                  "patch": "*", "penalised": "*"},
     BEFOREHAND: {"confusable": "*", "experiments": "*", "profiles": "*", "seen": "*",
                  "sizing": "*"},
-    LONGER: {"case": "SEARCHED", "preparation": "LONG FINE", "remainder": "MOST_ROWS"},
+    LONGER: {"case": "SEARCHED", "preparation": "LONG FINE MOST", "remainder": "MOST_ROWS"},
     REPEATED: {"repeats": "*"},
     STEPS: {"api": "RELEVELLED ASKED", "case": "AGAIN", "descent": "HILLS COARSE RENEWED",
             "growing": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED", "judge": "AGAIN",

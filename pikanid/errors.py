@@ -870,6 +870,20 @@ def too_few_samples(samples: int, parameters: int) -> str:
     )
 
 
+def too_few_to_diagnose(samples: int, parameters: int, needed: int) -> str:
+    return (
+        f"There are {samples} usable samples for {parameters} free parameters, and a diagnosis "
+        f"needs at least {needed}: record more, or fix parameters."
+    )
+
+
+def too_rough_to_diagnose(model: str) -> str:
+    return (
+        f"Model '{model}' cannot be simulated as exactly as the recording's noise asks: check its "
+        "units, its initial values and the given sigma."
+    )
+
+
 # --- discrepancy ---------------------------------------------------------------------------------
 
 

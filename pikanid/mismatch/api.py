@@ -22,7 +22,10 @@ from pikanid.mismatch.latent_force import force_over_time
 from pikanid.mismatch.locate import locate, smallest
 from pikanid.mismatch.patch import patch
 from pikanid.mismatch.preparation import (
+    beginnings,
+    check_freedom,
     check_pair,
+    freedom,
     held_as_recorded,
     oversampling,
     prepared,
@@ -166,7 +169,9 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     proves = later is not None
     if later is not None:
         check_pair(train, later)
-    else:
+        later = beginnings(model, later, "the held-out recording", notes)
+    train = beginnings(model, train, "the recording", notes)
+    if later is None:
         train, later = set_aside(train, model, notes)
     model = held_as_recorded(model, train)
     sites(model, train)  # a model in which nothing can be looked for is refused before any fit
@@ -176,6 +181,7 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
         notes.append(f"{together} neighbouring samples of the outputs count as one: nothing in "
                      "them moves fast enough to need more.")
     records = prepared(model, train, quiet, notes, together)
+    check_freedom(model, records)
     short = records.beginning(SEARCHED)
     before = NLS().fit(model, with_sigma(short, model))
     if short is not records:
@@ -184,9 +190,14 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     rate = sites(nominal, records.recordings)[0].rate
     records, count = with_refined_noise(records, before, rate, quiet)
     note_outliers(count, "the recording", notes)
-    held = None
+    held, excuse = None, ""
     if later is not None:
         held = prepared(model, later, None, notes, together, records.levels[0])
+        count, _, needed = freedom(model, held)
+        if count < needed:
+            held, proves = None, False
+            excuse = (f"the held-out recording has {count} usable samples, and at least {needed} "
+                      "are needed to confirm anything")
     again = repeats(nominal, records, held if proves else None)
     if again is not None:
         notes += again.notes
@@ -199,13 +210,15 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     base = search.base()
     alone = tuple(c for c in listed if c.suits())
     case = Case(nominal, records, held, proves, found, alone, search, base, before, notes, {}, {},
-                again)
+                again, excuse)
     search.predicts = case.predicts
     return case
 
 
 def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceShape | None,
                alpha: float) -> Diagnosis:
+    if case.excuse:
+        case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
     best = answer.given[0] if answer.given else case.base
     after = as_estimate(best, case.before) if answer.given else case.before
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
@@ -229,7 +242,8 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
         tuple(case.notes), smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
                case.search.workers, bool(answer.doubt)), shape=shape,
-        force_over_time=force, doubt=answer.doubt)
+        force_over_time=force,
+        doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""))
 
 
 def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:

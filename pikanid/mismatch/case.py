@@ -50,6 +50,7 @@ class Case:
     tests: dict[tuple[frozenset[str], float], Detection]
     predictions: dict[tuple[frozenset[str], float], HeldOut | None]
     repeats: Repeats | None = None
+    excuse: str = ""  # why held-out recordings that were given prove nothing
 
     @property
     def rate(self) -> float:

@@ -29,12 +29,13 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
     force = dx.force_over_time
     first = 1 if force is None else 2
     rows = first if dx.held_out is None else first + 2
-    figure = new_figure(9.0, 2.6 * (rows + (dx.shape is not None)))
+    shape = dx.shape if dx.shape is not None and (dx.shape.edges or dx.patch) else None
+    figure = new_figure(9.0, 2.6 * (rows + (shape is not None)))
     upper: matplotlib.figure.FigureBase = figure
-    if dx.shape is not None:
+    if shape is not None:
         upper, lower = figure.subfigures(
             2, 1, squeeze=False, height_ratios=[rows, 1.2])[:, 0]
-        _shape(lower, dx.shape, dx.patch)
+        _shape(lower, shape, dx.patch)
     axes = np.atleast_1d(upper.subplots(rows, 1))
     _train(axes[0], dx)
     if force is not None:

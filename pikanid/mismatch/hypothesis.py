@@ -98,7 +98,7 @@ class Hypothesis:
         J = self.minimum.J
         norms = np.maximum(np.linalg.norm(J, axis=0), 1e-100)
         _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
-        inverse = vt.T / np.maximum(s, 1e-9 * s[0] if len(s) else 1.0) ** 2 @ vt
+        inverse = vt.T / np.maximum(s, 1e-9 * (s[0] or 1.0) if len(s) else 1.0) ** 2 @ vt
         return np.asarray(inverse / np.outer(norms, norms))
 
     @property

@@ -22,6 +22,13 @@ def without_one(h: Hypothesis) -> Iterator[Job]:
         yield _rest(h, effect), [h.point]
 
 
+def beside(h: Hypothesis, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """What may be added to a hypothesis."""
+    groups = {e.twin for e in h.effects if e.twin}
+    return [c for c in candidates if c.fits and c.suits(h.effects) and c.key not in h.key
+            and (not c.twin or c.twin not in groups) and not (c.absent and h.far)]
+
+
 def afresh(h: Hypothesis) -> Iterator[Job]:
     """The same, effects begun where what it leaves shows them as well: a mode, or a moment, may
     have been a wrong one.

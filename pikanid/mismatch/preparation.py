@@ -19,6 +19,9 @@ from pikanid.recording import Recording
 LONG = 4000  # samples below which none are put together
 FINE = 30  # samples a period that are kept
 ASIDE = 0.3  # of a recording that is set aside where there is no held-out one
+MOST = 25_000  # samples, put together where they may be, that a minute's diagnosis has time for
+EXACT = 1e-6  # of an output's swing: no simulation is compared with less noise
+FREEDOM = 20  # samples beyond the free parameters: a noise level read off them is 16 % uncertain
 LEAST = 300  # samples of an output that must be there for that
 
 
@@ -41,11 +44,69 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
                              f"'{output.name}' are left out.")
             if together > 1:
                 recording = recording.with_channels(averaged(recording[output.name], together))
-            found[output.name] = (levels[output.name] if levels is not None else
-                                  first_level(recording, output.name, quiet, model.input_names))
+            if levels is not None:
+                found[output.name] = levels[output.name]
+                continue
+            level = first_level(recording, output.name, quiet, model.input_names)
+            found[output.name] = loud_enough(level, recording[output.name])
+            if found[output.name] is not level:
+                notes.append(f"Recording '{recording.name}': noise of '{output.name}' below "
+                             f"{EXACT:.0e} of its swing counts as that.")
         done.append(recording)
         every.append(found)
     return Records(tuple(done), tuple(every))
+
+
+def beginnings(model: Model, recordings: tuple[Recording, ...], what: str, notes: list[str]
+               ) -> tuple[Recording, ...]:
+    """The recordings, or as much of them from their start on as can be diagnosed in a minute.
+
+    Args:
+        model: That names the outputs.
+        recordings: Each is cut alike.
+        what: They are, for a note.
+        notes: Get a sentence where something is cut.
+    """
+    total = sum(len(r[o].time) for r in recordings for o in model.output_names)
+    if total <= MOST:
+        return recordings
+    share = MOST * oversampling(model, recordings) / total
+    if share >= 1:
+        return recordings
+    notes.append(f"{what[0].upper()}{what[1:]} is long: its first {100 * share:.2g} % are "
+                 f"diagnosed, {share * total:.0f} of {total} samples.")
+    return tuple(r.window(r.start, r.start + share * (r.stop - r.start)) for r in recordings)
+
+
+def loud_enough(level: Level, channel: Channel) -> Level:
+    """The level, or that of the least noise that a simulation can be compared with.
+
+    Recordings without noise, or with a given σ that nothing measured has, would ask for more digits
+    than a simulation has.
+    """
+    seen = channel.values[np.isfinite(channel.values)]
+    floor = EXACT * float(np.ptp(seen)) / 2 if len(seen) else 0.0
+    return level if level.sigma >= floor else replace(level, sigma=floor)
+
+
+def check_freedom(model: Model, records: Records) -> None:
+    """Refuse recordings that leave too little beside what is estimated.
+
+    Raises:
+        BadRecording: With the number of samples that is needed.
+    """
+    count, free, needed = freedom(model, records)
+    if count < needed:
+        raise errors.BadRecording(errors.too_few_to_diagnose(count, free, needed))
+
+
+def freedom(model: Model, records: Records) -> tuple[int, int, int]:
+    """Usable samples of the outputs, free parameters, and samples that these ask for."""
+    count = sum(int(np.isfinite(r[o].values).sum()) for r in records.recordings
+                for o in model.output_names)
+    free = sum(1 if p.scope == "shared" else len(records.recordings)
+               for p in model.parameters if p.free)
+    return count, free, free + FREEDOM
 
 
 def oversampling(model: Model, recordings: tuple[Recording, ...]) -> int:
@@ -105,8 +166,8 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
         for name, level in found.items():
             f = fits[r, name]
             kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
-            new[name] = refined(level, recording[name], f.t[kept], f.residual[kept], rate, quiet,
-                                explained)
+            new[name] = loud_enough(refined(level, recording[name], f.t[kept], f.residual[kept],
+                                            rate, quiet, explained), recording[name])
         levels.append(new)
     return Records(records.recordings, tuple(levels)), count
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
+from pikanid import errors
 from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.closest import Closest
 from pikanid.mismatch.decisions import below, in_order
@@ -19,6 +19,7 @@ from pikanid.mismatch.in_turn import in_turn
 from pikanid.mismatch.neighbours import (
     Job,
     afresh,
+    beside,
     closest_of_each,
     leading,
     signature,
@@ -91,8 +92,11 @@ class Search:
         return sum(c.known and c.suits() for c in self.candidates)
 
     def base(self) -> Hypothesis:
-        """The nominal model without effects, refitted."""
-        return self._fit((), [{}])
+        """The nominal model without effects, refitted; SimulationFailed where that cannot be."""
+        self._fit_all([((), [{}])], always=True)
+        if frozenset() not in self.fits:
+            raise errors.SimulationFailed(errors.too_rough_to_diagnose(self.nominal.name))
+        return self.fits[frozenset()]
 
     def run(self, adequate: Adequate) -> list[Hypothesis]:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
@@ -108,7 +112,7 @@ class Search:
                            Closest(self._closest_chi2()))
             self._fit_all([] if about is None else [
                 ((c,), starts) for c, starts in Screen(about, every).singles(SINGLES)],
-                again=True, always=True, beside=self.base().minimum.chi2)
+                again=True, always=True, reach=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
         if not adequate(self.ranked()[0]):
@@ -217,8 +221,7 @@ class Search:
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
-        new = dataclasses.replace(self, records=records, fits={}, begun=set(),
-                                  astray=set(self.astray))
+        new = replace(self, records=records, fits={}, begun=set(), astray=set(self.astray))
         new.base()
         ranked = self.ranked()
         near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
@@ -238,11 +241,7 @@ class Search:
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
-        groups = {e.twin for e in hypothesis.effects if e.twin}
-        others = [c for c in self.candidates if c.fits and c.suits(hypothesis.effects)
-                  and c.key not in hypothesis.key and (not c.twin or c.twin not in groups)
-                  and not (c.absent and hypothesis.far)]
-        screen = Screen(hypothesis, others)
+        screen = Screen(hypothesis, beside(hypothesis, self.candidates))
         least = TELLING * hypothesis.minimum.chi2 if hypothesis.far else least
         bent = any(e.channel == "input" for e in hypothesis.effects)
         jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
@@ -256,16 +255,15 @@ class Search:
         self._fit_all(jobs, always=anyway, settled=settled)
         self._fit_all(lost, again=True, settled=settled)
 
-    def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False
-             ) -> Hypothesis:
+    def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False) -> Hypothesis:
         self._fit_all([(effects, starts)], again, always=True)
         return self.fits.get(frozenset(e.key for e in effects), self.fits[frozenset()])
 
     def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False,
-                 beside: float = 0.0, settled: frozenset[str] = frozenset()) -> None:
+                 reach: float = 0.0, settled: frozenset[str] = frozenset()) -> None:
         """Fit these effects from these starts, one after the other, and keep what is better; what
         is known is fitted `again` only, and nothing once the search is tired, except `always`.
-        Fits far above the closest one, and above `beside` [χ²], are given up; effects that are
+        Fits far above the closest one, and above `reach` [χ²], are given up; effects that are
         `settled` are not looked for beyond hills.
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
@@ -292,7 +290,7 @@ class Search:
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])
                 and (again or frozenset(e.key for e in job[0]) not in self.fits)
                 and signature(job) not in self.begun]  # from there it would end there again
-        in_turn(jobs, lambda: max(self._closest_chi2(), beside), work, take,
+        in_turn(jobs, lambda: max(self._closest_chi2(), reach), work, take,
                 lambda: always or not self.tired, self.workers,
                 lambda result, chi2: result[1].stands(chi2))
 

@@ -23,6 +23,7 @@ from pikanid.simulation.input_paths import combined
 from pikanid.simulation.vectorfield import VectorField
 
 TOGETHER = 100  # signs integrated at once
+CELLS = 400_000  # of signs times steps: fewer at once on long recordings, to keep memory small
 STABLE = 1.5  # rate times step that the Runge-Kutta method follows well enough
 MOST_PARTS = 64  # of a step
 
@@ -147,7 +148,8 @@ class Tangent:
 
     def columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
         """δy (rows, m) of every sign; a few at a time, to keep long recordings in memory."""
-        parts = [self._columns(listed[k:k + TOGETHER]) for k in range(0, len(listed), TOGETHER)]
+        together = min(TOGETHER, max(CELLS // len(self.t), 1))
+        parts = [self._columns(listed[k:k + together]) for k in range(0, len(listed), together)]
         return np.concatenate(parts, axis=1) if parts else np.empty((len(self.stop), 0))
 
     def _columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:

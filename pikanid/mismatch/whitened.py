@@ -166,7 +166,11 @@ class Whitened:
         return float(len(self.problem.model.states) * sum(steps))
 
     def residual(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run."""
+        """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run, or no
+        steps were found that could.
+        """
+        if not self.steps:
+            return None
         responses = self.responses(theta)
         if not all(r.finished for r in responses):
             return None
@@ -179,7 +183,11 @@ class Whitened:
         return np.concatenate(parts), np.concatenate(jacobians)
 
     def chi2(self, theta: np.ndarray) -> float:
-        """Sum of squares of the whitened residual, without derivatives; infinite if it fails."""
+        """Sum of squares of the whitened residual, without derivatives; infinite if it fails, or
+        where no steps were found that could do.
+        """
+        if not self.steps:
+            return np.inf
         total = 0.0
         for r, simulator in enumerate(self.simulators):
             response = simulator.run(self.problem.parameters(theta, r), steps=self.steps[r])

@@ -120,7 +120,8 @@ def _figure(dx: Diagnosis) -> str:
 def _proof(dx: Diagnosis) -> str:
     proof = dx.held_out
     if proof is None:
-        return "<p>There is no held-out recording: nothing can be proved.</p>"
+        why = dx.doubt or "there is no held-out recording"
+        return f"<p>Nothing is proved: {escape(why)}.</p>"
     told = []
     for name, e in proof.outputs.items():
         moved = (f"{e.moved:.3g} with the parameters moved within their errors, "
