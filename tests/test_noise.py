@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import binom
 
 from pikanid import noise, noise_ar
 from pikanid.channel import Channel
 from pikanid.errors import BadRecording
-from pikanid.noise_quiet import find_quiet
+from pikanid.noise_quiet import _is_quiet, even_parts, find_quiet
 from pikanid.recording import Recording
 
 DT = 0.01
@@ -186,3 +189,102 @@ def test_sigma_is_attached_with_a_note() -> None:
     assert told["u"].sigma is None
     assert "quiet stretch" in told.notes[0]
     assert noise.with_estimated_sigma(told) == told
+
+
+def test_highest_frequencies_by_hand() -> None:
+    """Median of fourth differences, and an error bar that counts what neighbours share."""
+    t = np.delete(np.arange(400) * DT, [100, 101, 250])
+    y = np.sin(3 * t) + 0.1 * coloured(397, 0.0, 5)
+    parts = [y[:100], y[100:248], y[248:]]
+    d = np.concatenate([np.diff(part, 4) for part in parts])
+    expected = np.median(np.abs(d)) / 0.6745 / np.sqrt(70)
+    # Σ ρ_k² of fourth differences: 70² + 2·(56² + 28² + 8² + 1²) over 70²
+    shared = (70**2 + 2 * (56**2 + 28**2 + 8**2 + 1)) / 70**2
+    error = expected * np.sqrt(shared / 0.37 / (2 * len(d)))
+    assert noise.high_band_sigma(Channel("y", t, y)) == pytest.approx((expected, error), rel=1e-3)
+    with pytest.raises(BadRecording, match="only"):
+        noise.high_band_sigma(Channel("y", t[:11], y[:11]))
+    assert noise.high_band_sigma(Channel("y", t[:12], y[:12]))[0] > 0
+
+
+def test_a_quiet_stretch_by_hand() -> None:
+    channel = swing(0.5, 3)
+    inside = channel.values[100:301]
+    fitted = noise_ar.fit(inside - inside.mean())
+    model = noise.estimate(channel, (channel.time[100], channel.time[300]))
+    assert (model.n, model.source) == (201, "quiet stretch")
+    assert (model.start, model.stop) == (channel.time[100], channel.time[300])
+    assert model.interval == pytest.approx(DT)
+    assert (model.sigma, model.sigma_std, model.innovation) == pytest.approx(
+        (fitted.sigma, fitted.sigma_std, fitted.innovation))
+    np.testing.assert_array_equal(model.ar, fitted.coefficients)
+    np.testing.assert_array_equal(model.ar_covariance, fitted.covariance)
+    again = noise.estimate(Channel("y", channel.time, 5.0 + channel.values), (1.0, 3.0))
+    assert again.sigma == pytest.approx(noise.estimate(channel, (1.0, 3.0)).sigma)
+
+
+def test_a_coarse_sensor_at_rest_has_the_noise_of_its_steps() -> None:
+    """One sample in fifteen is a step off: far less spread than step/√12, which it must hide."""
+    step, rng = 0.01, np.random.default_rng(0)
+    t = np.arange(400) * DT
+    y = step * np.where(rng.uniform(size=400) < 1 / 15, 1.0, 0.0)
+    channel = Channel("y", t, np.where(t > 3, y + step * np.round(20 * np.sin(t)), y))
+    model = noise.estimate(channel, (0.0, 2.5))
+    inside = channel.values[:251]
+    fitted = noise_ar.fit(inside - inside.mean())
+    scale = step / np.sqrt(12) / fitted.sigma
+    assert scale > 1.1
+    assert (model.sigma, model.sigma_std, model.innovation) == pytest.approx(
+        (step / np.sqrt(12), scale * fitted.sigma_std, scale * fitted.innovation))
+    steps = Channel("y", t, step * np.round(np.arange(400) / 50))
+    assert noise.high_band_sigma(steps)[0] == pytest.approx(step / np.sqrt(12))
+
+
+def test_sigma_is_attached_to_what_lacks_one_or_is_named() -> None:
+    theta = swing(0.0, 0)
+    told = Channel("told", theta.time, theta.values, "rad", 0.5)
+    driven = Channel("driven", theta.time, theta.values, "rad", None, "first")
+    rec = Recording({"theta": theta, "told": told, "driven": driven})
+    found = noise.with_estimated_sigma(rec)
+    assert found["told"].sigma == 0.5 and found["driven"].sigma is None
+    assert found["theta"].sigma == pytest.approx(noise.estimate(theta).sigma)
+    named = noise.with_estimated_sigma(rec, ["told"])
+    assert named["told"].sigma == pytest.approx(noise.estimate(told).sigma)
+    assert named["theta"].sigma is None and len(named.notes) == 1
+
+
+def test_stretches_end_at_gaps() -> None:
+    t = np.arange(60) * DT
+    t[20:] += 0.5
+    y = np.arange(60.0) ** 2
+    y[[40, 41]] = np.nan
+    parts = list(even_parts(Channel("y", t, y)))
+    assert [len(a) for a, _ in parts] == [20, 20, 18]
+    for (times, values), part in zip(parts, (slice(20), slice(20, 40), slice(42, 60)), strict=True):
+        np.testing.assert_array_equal(times, t[part])
+        np.testing.assert_array_equal(values, y[part])
+    assert not list(even_parts(Channel("y", t[:3], [np.nan, 1.0, np.nan])))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+def test_noise_alone_is_quiet_as_often_as_stated(rho: float) -> None:
+    """Of 100 stretches of 300 samples few are refused: two tests at 1 %, one at 1 %."""
+    shape = np.concatenate([np.zeros(300), 100 * np.sin(np.arange(40))])
+    quiet = 0
+    for seed in range(100):
+        y = Channel("y", np.arange(340) * DT, coloured(340, rho, seed) + shape)
+        quiet += _is_quiet(y.values[:300], float(np.var(y.values)))
+    assert quiet >= binom.ppf(0.001, 100, 0.95)
+
+
+@pytest.mark.parametrize("extra", [
+    lambda t: 0.8 * np.sin(20.944 * t),  # ten periods: a line that no eye would see
+    lambda t: np.where(t > 1.5, 1.0, 0.0) * np.random.default_rng(1).normal(size=300),
+    lambda t: np.where(t < 1.5, 1.0, 0.0) * np.random.default_rng(1).normal(size=300),
+    lambda t: 1.0 * t,  # a drift
+    lambda t: np.convolve(np.random.default_rng(2).normal(size=349), np.ones(50) / 5, "valid"),
+], ids=["line", "louder", "quieter", "drift", "slow"])
+def test_noise_with_something_in_it_is_not_quiet(extra: Callable[[np.ndarray], np.ndarray]) -> None:
+    t = np.arange(300) * DT
+    for seed in range(5):
+        assert not _is_quiet(coloured(300, 0.0, seed) + extra(t), 1e4)
