@@ -23,6 +23,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -111,8 +112,8 @@ class Run:
     diagnoses: dict[str, Any]
 
 
-def tried(setting: Setting, folder: Path, cases: Sequence[str], tests: Sequence[str] | None,
-          jobs: int) -> Run:
+def tried(setting: Setting, folder: Path, cases: Sequence[str], tests: Sequence[str] | None
+          ) -> Run:
     """Diagnoses and tests (None for no tests) in processes of their own."""
     own = folder / setting.name.replace(" ", "_")
     own.mkdir(parents=True, exist_ok=True)
@@ -125,8 +126,7 @@ def tried(setting: Setting, folder: Path, cases: Sequence[str], tests: Sequence[
     passed, failed = 0, ()
     if tests is not None:
         call = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider",
-                f"--junitxml={report}", *(("-n", str(jobs), "--dist", "worksteal") if jobs > 1
-                                          else ()), *tests]
+                f"--junitxml={report}", *tests]
         done = subprocess.run(call, cwd=ROOT, env=setting.environment(), text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         if done.returncode not in (0, 1):  # 1: tests have failed
@@ -194,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run every setting, print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--short", action="store_true", help="few settings, tests and diagnoses")
-    parser.add_argument("--jobs", type=int, default=2, help="processes of a test session")
+    parser.add_argument("--jobs", type=int, default=2, help="settings tried at a time")
     parser.add_argument("--only", nargs="*", help="settings beside the reference")
     parser.add_argument("--no-tests", action="store_true", help="diagnoses only")
     parser.add_argument("--work", type=Path, default=ROOT / "build/platforms")
@@ -211,17 +211,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
              "| --- | --- | --- | --- | --- |"]
     print("\n".join(lines), flush=True)
     told, reference, sound = [], None, True
-    for setting in chosen:
-        run = tried(setting, given.work.resolve(), cases, tests, given.jobs)
-        reference = reference or run
-        other = {c: differences(reference.diagnoses[c], run.diagnoses[c]) for c in cases}
-        same = sum(not d for d in other.values())
-        sound = sound and not run.failed and same == len(cases)
-        lines.append(f"| {setting.name} | {setting.described()} | {run.passed} | "
-                     f"{len(run.failed)} | {same} of {len(cases)} |")
-        print(lines[-1], flush=True)
-        told += [f"- {setting.name}: {name} fails" for name in run.failed]
-        told += [f"- {setting.name}: {case}: {', '.join(d)}" for case, d in other.items() if d]
+    with ThreadPoolExecutor(given.jobs) as pool:
+        runs = pool.map(lambda s: tried(s, given.work.resolve(), cases, tests), chosen)
+        for setting, run in zip(chosen, runs, strict=True):
+            reference = reference or run
+            other = {c: differences(reference.diagnoses[c], run.diagnoses[c]) for c in cases}
+            same = sum(not d for d in other.values())
+            sound = sound and not run.failed and same == len(cases)
+            lines.append(f"| {setting.name} | {setting.described()} | {run.passed} | "
+                         f"{len(run.failed)} | {same} of {len(cases)} |")
+            print(lines[-1], flush=True)
+            told += [f"- {setting.name}: {name} fails" for name in run.failed]
+            told += [f"- {setting.name}: {c}: {', '.join(d)}" for c, d in other.items() if d]
     left_out = sorted({"Sandybridge", "Haswell", "SkylakeX", "no AVX512", "no AVX2"}
                       - {s.name for s in here()})
     lines += ["", f"Left out, as this CPU has no such thing: {', '.join(left_out) or 'nothing'}.",
