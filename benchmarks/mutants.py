@@ -139,7 +139,9 @@ def verdicts() -> Iterator[tuple[Any, str, str]]:
 
 
 def again(jobs: int, pattern: str = "*", tests: Sequence[str] = ()) -> None:
-    """Survivors once more, each in a process of its own."""
+    """Survivors once more, each in a process of its own; and what a busy machine may have stopped,
+    since the limit is of processor seconds here.
+    """
     prepare()
     from mutmut.__main__ import tests_for_mutant_names
     from mutmut.stats import load_stats
@@ -148,7 +150,7 @@ def again(jobs: int, pattern: str = "*", tests: Sequence[str] = ()) -> None:
     load_stats()
     copy_also_copy_files()
     alive = [(data, name) for data, name, verdict in verdicts()
-             if verdict in ("survived", "no tests") and fnmatch(name, pattern)]
+             if verdict in ("survived", "no tests", "timeout") and fnmatch(name, pattern)]
 
     def once(found: tuple[Any, str]) -> tuple[Any, str, int]:
         data, name = found

@@ -25,7 +25,7 @@ MEMORY = 6 << 30
 SLOW = 5.0  # processor seconds: a test that takes longer is left out
 # Tests about the source text, the installation or other programs; mutants are none of theirs.
 LEFT_OUT = ("architecture", "readme", "concealed", "plots", "datasets", "interrupts", "public_api",
-            "no_traces", "study", "cli.py", "compiled_cache", "diagnosis_memory", "kan_build",
+            "no_traces", "study", "test_cli.py", "compiled_cache", "diagnosis_memory", "kan_build",
             "kan_paper", "pinn", "pikan.py", "reading", "mlp", "excitation", "slosh_recording",
             "units", "hostile", "unforeseen", "excerpt")
 _durations: dict[str, float] = {}
@@ -49,6 +49,8 @@ def pytest_configure(config: pytest.Config) -> None:
     known = Path("mutmut-stats.json")
     if known.exists():
         _durations.update(json.loads(known.read_text())["duration_by_test"])
+    if mutant():  # before files are read: most are not needed
+        config.args = _affordable(config.args)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -74,22 +76,30 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = [i for i in items if i.nodeid not in without]
     if os.environ.get("MUTANT_UNDER_TEST", "") in ("stats", "list_all_tests", "fail"):
         return
+    chosen = _affordable([i.nodeid for i in items])
+    place = {nodeid: n for n, nodeid in enumerate(chosen)}
+    config.hook.pytest_deselected(items=[i for i in items if i.nodeid not in place])
+    items[:] = sorted((i for i in items if i.nodeid in place), key=lambda i: place[i.nodeid])
+
+
+def _affordable(tests: list[str]) -> list[str]:
+    """Tests of the file named after the module, then the fastest, up to the budget."""
     parts = mutant().partition(".x")[0].split(".")
-    items.sort(key=lambda i: (i.path.stem.removeprefix("test_") not in parts, _time(i)))
+    ranked = sorted(tests, key=lambda t: (
+        Path(t.partition("::")[0]).stem.removeprefix("test_") not in parts, _time(t)))
     spent = 0.0
-    for n, item in enumerate(items):
-        spent += _time(item)
+    for n, test in enumerate(ranked):
+        spent += _time(test)
         if n > 0 and spent > BUDGET:
-            config.hook.pytest_deselected(items=items[n:])
-            del items[n:]
-            break
+            return ranked[:n]
+    return ranked
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """A limit in processor seconds, not those of the clock: other programs run beside."""
     if mutant():
         _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-        wanted = int(time.process_time() + 10 * _time(item) + 20)
+        wanted = int(time.process_time() + 10 * _time(item.nodeid) + 20)
         limit = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
         resource.setrlimit(resource.RLIMIT_CPU, (limit, hard))
 
@@ -133,5 +143,5 @@ def _lines(name: str) -> list[str]:
     return (WORK / name).read_text().splitlines() if (WORK / name).exists() else []
 
 
-def _time(item: pytest.Item) -> float:
-    return _durations.get(item.nodeid, 0.1)
+def _time(test: str) -> float:
+    return _durations.get(test, 0.1)

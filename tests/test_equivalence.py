@@ -21,9 +21,11 @@ from pikanid.equivalence import (  # noqa: E402
     run_checks,
 )
 from pikanid.equivalence.checks import apart, compare_paths, settings  # noqa: E402
+from pikanid.equivalence.controls import uniqueness  # noqa: E402
 from pikanid.equivalence.ipda import IpdaObjective  # noqa: E402
 from pikanid.equivalence.network import NetworkLoss  # noqa: E402
 from pikanid.equivalence.optimisers import Path as Iterates  # noqa: E402
+from pikanid.equivalence.optimisers import Path as Path_  # noqa: E402
 from pikanid.equivalence.setting import motion  # noqa: E402
 from pikanid.equivalence.systems import SYSTEMS  # noqa: E402
 
@@ -210,6 +212,38 @@ def test_report_speaks_markdown_json_and_pictures(
     page = report.write(tmp_path / "reports")
     assert "equivalence.png" in page.read_text(encoding="utf-8")
     assert sorted(p.name for p in page.parent.iterdir()) == ["equivalence.md", "equivalence.png"]
+
+
+def test_the_same_seed_gives_the_same_numbers() -> None:
+    """Grids, noise and unknowns of a setting, and what is checked with draws of its own."""
+    def made(seed: int) -> list[np.ndarray]:
+        s = Setting("duffing", "state", even=False, seed=seed)
+        return [s.data_times, s.collocation_times, s.data, s.unknowns()]
+
+    for once, again, other in zip(made(3), made(3), made(4), strict=True):
+        np.testing.assert_array_equal(once, again)
+        assert np.any(once != other)
+    assert uniqueness(3) == uniqueness(3)
+
+
+def test_every_check_says_what_it_compared(report: EquivalenceReport) -> None:
+    for row in report.rows:
+        assert all(isinstance(text, str) and text for text in
+                   (row.check, row.setting, row.quantity)), row
+    text = report.to_markdown()
+    assert all(row.quantity in text for row in report.rows) and "\n## Every comparison\n" in text
+    assert "| yes |" in text
+
+
+def test_a_report_is_written_anew(report: EquivalenceReport, tmp_path: Path) -> None:
+    first = report.write(tmp_path).read_text(encoding="utf-8")
+    assert report.write(tmp_path).read_text(encoding="utf-8") == first
+
+
+def test_ends_of_a_path() -> None:
+    path = Path_(np.array([[0.0], [1.0], [2.0]]), True)
+    assert path.last().iterates.tolist() == [[2.0]] and path.last().converged
+    assert path.first(1).iterates.tolist() == [[0.0], [1.0]]
 
 
 def test_a_failure_is_reported_as_one() -> None:

@@ -287,3 +287,17 @@ def test_noise_with_something_in_it_is_not_quiet(extra: Callable[[np.ndarray], n
     t = np.arange(300) * DT
     for seed in range(5):
         assert not _is_quiet(coloured(300, 0.0, seed) + extra(t), 1e4)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_the_step_of_a_rounded_signal_in_any_unit(scale: float) -> None:
+    """Nothing but rounding: a uniform error of one step."""
+    t = np.linspace(0.0, 3.0, 300)
+    rounded = scale * np.round(10.0 * t) / 10.0
+    sigma, _ = noise.high_band_sigma(Channel("y", t, rounded))
+    assert sigma == pytest.approx(0.1 * scale / np.sqrt(12.0))
+
+
+def test_a_channel_that_never_changes_is_named() -> None:
+    with pytest.raises(BadRecording, match="gauge"):
+        noise.high_band_sigma(Channel("gauge", np.linspace(0.0, 3.0, 300), np.full(300, 2.0)))

@@ -52,6 +52,14 @@ def test_noisy_cubic_is_not_zero() -> None:
     assert abs(edge.best.values["a"] - 1.0) < 4.0 * edge.best.std["a"]
 
 
+def test_stated_noise_is_believed() -> None:
+    """Standard errors grow with it, whatever the points leave."""
+    y = noisy(X**3, 0.05)
+    narrow, wide = (name_edge(X, y, sigma=s, library=FEW) for s in (0.02, 0.06))
+    assert narrow.name == wide.name == "cubic"
+    assert wide.best.std["a"] == pytest.approx(3.0 * narrow.best.std["a"])
+
+
 @pytest.mark.parametrize("share", [0.0, 1e-7])
 def test_exact_points_are_named_too(share: float) -> None:
     edge = name_edge(X, noisy(np.sin(3 * X), share), library=FEW)

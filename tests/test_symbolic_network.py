@@ -132,7 +132,13 @@ def test_contribution_and_its_error(
     assert edges[1].size == pytest.approx(np.std(x[:, 1] ** 3), abs=4 * edges[1].std)
     assert edges[0].p_value < 1e-10 and edges[2].p_value > 0.001
     assert all(c.attribution is not None for c in found)
-    assert len(table(found)) == 6  # three edges, three nodes
+    shown = table(found)
+    assert shown["what"].tolist() == 3 * ["edge"] + 3 * ["node"]
+    for column in ("layer", "source", "target"):
+        wanted = [getattr(c, column) for c in found]
+        assert [None if v != v else v for v in shown[column]] == wanted
+    assert shown[["contribution", "std", "p", "attribution"]].to_numpy(float).tolist() == [
+        [c.size, c.std, c.p_value, c.attribution] for c in found]
 
 
 def test_null_edges_keep_the_stated_level() -> None:
