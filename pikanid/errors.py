@@ -560,6 +560,10 @@ def entry_extra(where: str, extra: Sequence[str], known: Sequence[str]) -> str:
     return f"{where} holds {_listed(extra)}, which is unknown (known: {_listed(known)})."
 
 
+def entry_negative(where: str) -> str:
+    return f"{where[:1].upper()}{where[1:]} holds negative numbers."
+
+
 def entry_too_deep(where: str) -> str:
     return f"{where} is nested too deeply: nothing of ours writes that."
 
@@ -1224,6 +1228,10 @@ def conceal_other_settings(place: str) -> str:
 
 def truth_unreadable(path: str, detail: str) -> str:
     return f"The truth file '{_short(path, 200)}' cannot be read: {detail}."
+
+
+def truth_case(detail: str) -> str:
+    return f"A case of the truth file cannot be compared with: {detail}."
 
 
 def diagnosis_unreadable(case: str, detail: object) -> str:

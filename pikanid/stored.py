@@ -6,14 +6,20 @@ list of empty tables takes twenty times the memory of its text.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import stat
+import struct
+import zipfile
 import zlib
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pikanid import errors
+
+if TYPE_CHECKING:
+    import numpy as np
 
 MEBI = 2**20
 MOST_MODEL = 2 * MEBI  # bytes of a model file
@@ -21,16 +27,25 @@ MOST_JSON = 512 * MEBI  # bytes of an estimate, a network, a truth or a diagnosi
 MOST_UNPACKED = 512 * MEBI  # bytes that a compressed recording may unpack to
 MOST_PARSED = 768 * MEBI  # bytes that the objects in a JSON file may take
 
+# What the parsers of other people raise on damaged bytes: they promise no closed list.
+DAMAGE: tuple[type[Exception], ...] = (
+    ValueError, TypeError, LookupError, AttributeError, ArithmeticError, AssertionError, OSError,
+    EOFError, RuntimeError, NameError, MemoryError, SyntaxError, BufferError, struct.error,
+    zlib.error, zipfile.BadZipFile,
+)  # fmt: skip
+
 Wrong = Callable[[str], errors.PikanidError]
 
 
-def file_bytes(path: str | os.PathLike[str], wrong: Wrong, most: int | None = None) -> bytes:
+def file_bytes(path: str | os.PathLike[str], wrong: Wrong, most: int | None = None,
+               first: int = -1) -> bytes:
     """The content of a regular file.
 
     Args:
         path: Of the file.
         wrong: Makes the exception from what is wrong, such as ``"it is a folder"``.
-        most: Bytes that are read at most; None for any number.
+        most: Size of the largest file that is read; None for any.
+        first: Bytes that are wanted of it; all if negative.
 
     Raises:
         PikanidError: If it is missing, no regular file (a pipe may never end), or too large.
@@ -42,7 +57,7 @@ def file_bytes(path: str | os.PathLike[str], wrong: Wrong, most: int | None = No
                 raise wrong("it is no regular file")
             if most is not None and about.st_size > most:
                 raise wrong(errors.detail_too_large(about.st_size, most))
-            return file.read()
+            return file.read(first)
     except OSError as failure:
         raise wrong(failure.strerror or "it cannot be opened") from None
     except ValueError:  # a NUL in the name
@@ -95,7 +110,7 @@ def parsed(content: bytes, wrong: Wrong) -> Any:
         PikanidError: If it is no JSON, nested without end, or would take more memory.
     """
     # What CPython takes for a number, an entry of a table, a list and a table.
-    needed = len(content) + 40 * content.count(b",") + 110 * content.count(b":") + (
+    needed = len(content) + 64 * content.count(b",") + 110 * content.count(b":") + (
         64 * content.count(b"[") + 250 * content.count(b"{"))
     if needed > MOST_PARSED + len(content):
         raise wrong(errors.detail_unpacks(MOST_PARSED))
@@ -104,3 +119,58 @@ def parsed(content: bytes, wrong: Wrong) -> Any:
     except (ValueError, RecursionError):
         raise wrong("it is no JSON") from None
 
+
+def unpacked_size(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> int:
+    """Bytes of all members of a ZIP archive (.npz, .xlsx), which it states and cannot exceed.
+
+    Raises:
+        PikanidError: If it is no archive, or these are more than `most`.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+    except (zipfile.BadZipFile, ValueError, NotImplementedError, LookupError, OSError, EOFError):
+        raise wrong("it is damaged or cut off") from None
+    if size > most:
+        raise wrong(errors.detail_unpacks(most))
+    return size
+
+
+def archived(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> dict[str, np.ndarray]:
+    """The arrays of an NPZ archive; pickled objects are refused.
+
+    Raises:
+        PikanidError: If it is damaged, holds objects, or unpacks to more than `most` bytes.
+    """
+    import numpy as np
+
+    unpacked_size(content, wrong, most)
+    found = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            for name in archive.namelist():
+                member = archive.read(name)
+                if not member.startswith(np.lib.format.MAGIC_PREFIX):
+                    continue
+                # Its header states a shape, for which NumPy asks memory before it looks further.
+                if _stated_size(member) > len(member):
+                    raise wrong("it is damaged or cut off")
+                found[name.removesuffix(".npy")] = np.lib.format.read_array(
+                    io.BytesIO(member), allow_pickle=False)
+    except DAMAGE:
+        raise wrong("it is damaged, or holds what are no plain arrays") from None
+    return found
+
+
+def _stated_size(member: bytes) -> int:
+    """Bytes that the values of an array take by its header."""
+    import math
+
+    import numpy as np
+
+    file = io.BytesIO(member)
+    version = np.lib.format.read_magic(file)
+    read = (np.lib.format.read_array_header_1_0 if version == (1, 0)
+            else np.lib.format.read_array_header_2_0)
+    shape, _, dtype = read(file)
+    return math.prod(shape) * dtype.itemsize

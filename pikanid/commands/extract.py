@@ -78,13 +78,10 @@ def extract(
 def _load(path: str) -> Any:
     """A KAN or an estimate, by what the file holds."""
     from pikanid.estimate import Estimate
+    from pikanid.stored import file_bytes
 
-    try:
-        with open(path, "rb") as file:
-            start = file.read(4096)
-    except OSError as problem:
-        raise errors.BadSetting(
-            errors.cannot_open(path, problem.strerror or "it cannot be read")) from None
+    start = file_bytes(path, lambda why: errors.BadSetting(errors.cannot_open(path, why)),
+                       first=4096)
     if path.endswith(".npz") or b"pikanid-kan" in start:
         from pikanid.approximators.kan import load
 

@@ -13,15 +13,17 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise, permutations
+from itertools import pairwise
 from typing import Any, Literal
 
-from pikanid import errors
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from pikanid.concealed.answers import check_case, read_answer
 from pikanid.concealed.visibility import FROM_NOMINAL, FROM_RIVAL
 
 Entry = Mapping[str, Any]
 Outcome = Literal["right", "long", "visible", "wrong", "formula", "alarm", "silent"]
-VERDICTS = ("none", "named", "set", "unconfirmed", "unnamed")
 ANSWERS = ("named", "set")
 MOST_HYPOTHESES = 2
 SYMBOLIC = "symbolic:"
@@ -128,7 +130,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
         diagnosis: Content of diagnosis.json.
 
     Raises:
-        BadSetting: If the diagnosis has no known verdict or its hypotheses no ids.
+        BadSetting: If what is compared is missing in either, or of another type.
 
     >>> truth = {"id": "001", "class": "single", "nameable": True, "base": {},
     ...          "effects": [{"id": "input_delay", "twins": ["sensor_delay"], "near": ""}],
@@ -139,28 +141,20 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
     >>> judge(truth, answer).outcome
     'right'
     """
-    try:
-        verdict, mismatch = diagnosis["verdict"], bool(diagnosis["mismatch"])
-        given = [([set(effect["ids"]) for effect in hypothesis["effects"]],
-                  float(hypothesis["probability"]))
-                 for hypothesis in diagnosis["hypotheses"]]
-    except (KeyError, TypeError, ValueError) as failure:
-        raise errors.BadSetting(errors.diagnosis_unreadable(str(case["id"]), failure)) from None
-    if verdict not in VERDICTS:
-        raise errors.BadSetting(errors.diagnosis_unreadable(str(case["id"]), verdict))
-    given.sort(key=lambda hypothesis: -hypothesis[1])
-    explanations = [effects for effects, _ in given]
+    check_case(case)
+    answer = read_answer(diagnosis, case["id"])
     truth = [{effect["id"], *effect["twins"], INCLUDED.get(effect["id"], effect["id"])}
              for effect in case["effects"]]
-    outcome, reason = _outcome(case, truth, verdict, mismatch, explanations)
-    answered = verdict in ANSWERS and bool(given)
+    given = answer.hypotheses
+    outcome, reason = _outcome(case, truth, answer.verdict, answer.mismatch, given)
+    answered = answer.verdict in ANSWERS and bool(given)
     return Score(
-        str(case["id"]), case["class"], bool(case["nameable"]),
-        float(case["visibility"]["nominal"]), verdict, mismatch, outcome, reason, len(given),
-        given[0][1] if answered else None,
-        answered and any(_same([_read(effect) for effect in explanations[0]], t)
+        case["id"], case["class"], case["nameable"], float(case["visibility"]["nominal"]),
+        answer.verdict, answer.mismatch, outcome, reason, len(given),
+        answer.probabilities[0] if answered else None,
+        answered and any(_same([_read(effect) for effect in given[0]], t)
                          for t in (truth, _visible(case, truth)) if t),
-        _within(case["base"], diagnosis), _held_out(diagnosis))
+        _within(case["base"], answer.after), answer.held_out)
 
 
 def tally(scores: Iterable[Score]) -> dict[str, Share]:
@@ -214,7 +208,7 @@ def reliability(scores: Iterable[Score],
 
 
 def _outcome(case: Entry, truth: list[set[str]], verdict: str, mismatch: bool,
-             explanations: list[list[set[str]]]) -> tuple[Outcome, str]:
+             explanations: Sequence[list[set[str]]]) -> tuple[Outcome, str]:
     if verdict not in ANSWERS:
         if not truth:
             return ("alarm" if mismatch else "right"), ""
@@ -263,24 +257,19 @@ def _reason(case: Entry, truth: list[set[str]], explanations: list[list[set[str]
 
 def _contains(larger: Sequence[set[str]], smaller: Sequence[set[str]]) -> bool:
     """Whether every effect of the smaller has a partner of its own in the larger."""
-    return any(all(a & b for a, b in zip(smaller, chosen, strict=True))
-               for chosen in permutations(larger, len(smaller)))
+    if len(smaller) > len(larger):
+        return False
+    apart = np.array([[not a & b for b in larger] for a in smaller]).reshape(-1, len(larger))
+    return not apart[linear_sum_assignment(apart)].any()
 
 
 def _same(explanation: Sequence[set[str]], truth: Sequence[set[str]]) -> bool:
     return len(explanation) == len(truth) and _contains(explanation, truth)
 
 
-def _within(base: Entry, diagnosis: Entry) -> bool | None:
-    after = (diagnosis.get("parameters") or {}).get("after") or {}
-    both = [(base[name]["value"], after[name]) for name in base if name in after]
-    both = [(value, fit) for value, fit in both if fit.get("std")]
+def _within(base: Entry, after: Mapping[str, tuple[float, float]]) -> bool | None:
+    both = [(base[name]["value"], *after[name]) for name in base if name in after]
+    both = [(value, fit, std) for value, fit, std in both if std]
     if not both:
         return None
-    return all(abs(fit["value"] - value) <= 3 * fit["std"] for value, fit in both)
-
-
-def _held_out(diagnosis: Entry) -> float | None:
-    later = diagnosis.get("held_out") or {}
-    after, noise = later.get("rmse_after"), later.get("noise")
-    return float(after) / float(noise) if after is not None and noise else None
+    return all(abs(fit - value) <= 3 * std for value, fit, std in both)

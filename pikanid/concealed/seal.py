@@ -8,7 +8,6 @@ anyone from changing the truth later.
 from __future__ import annotations
 
 import hashlib
-import json
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from pikanid import errors
 from pikanid.concealed import files
+from pikanid.stored import json_content
 
 SCHEMA_VERSION = 1
 GENERATOR = "pikanid.concealed 1"
@@ -88,14 +88,12 @@ def read_truth(path: str | Path) -> dict[str, object]:
     Raises:
         BadSetting: If it cannot be read or is no truth file.
     """
-    try:
-        content = json.loads(Path(path).read_bytes())
-    except (OSError, ValueError) as failure:
-        detail = getattr(failure, "strerror", None) or "it is no JSON"
-        raise errors.BadSetting(errors.truth_unreadable(str(path), detail)) from None
+    def wrong(detail: str) -> errors.BadSetting:
+        return errors.BadSetting(errors.truth_unreadable(str(path), detail.rstrip(".")))
+
+    content = json_content(path, wrong)
     if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
-        detail = "it is none of this version"
-        raise errors.BadSetting(errors.truth_unreadable(str(path), detail))
+        raise wrong("it is none of this version")
     return content
 
 
@@ -110,7 +108,8 @@ def matches(folder: str | Path, truth: str | Path) -> bool:
     if hashlib.sha256(Path(truth).read_bytes()).hexdigest() != seal.get("sha256"):
         return False
     cases = content.get("cases")
-    return isinstance(cases, list) and all(intact(Path(folder), case) for case in cases)
+    return isinstance(cases, list) and all(
+        isinstance(case, dict) and intact(Path(folder), case) for case in cases)
 
 
 def intact(folder: Path, case: Mapping[str, object]) -> bool:
@@ -119,6 +118,9 @@ def intact(folder: Path, case: Mapping[str, object]) -> bool:
     if not isinstance(hashes, dict):
         return False
     for name, wanted in hashes.items():
+        # a name that leads out of the folder, or is none
+        if Path(name).name != name or len(name) > 200:
+            return False
         path = folder / name
         if not path.is_file() or hashlib.sha256(path.read_bytes()).hexdigest() != wanted:
             return False

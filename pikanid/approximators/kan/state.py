@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 import json
 import os
-import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,9 @@ from pikanid.approximators.kan.build import blank_kan, plan_of, read, write
 from pikanid.approximators.kan.kinks import Kink
 from pikanid.approximators.kan.plan import Arity, Array, Base, KanPlan
 from pikanid.approximators.kan.shallow import ShallowKAN
+from pikanid.entries import Entry
 from pikanid.outputs import atomically
+from pikanid.stored import MOST_JSON, archived, file_bytes, json_content, parsed
 
 _FORMAT = "pikanid-kan"
 _VERSION = 1
@@ -158,49 +160,111 @@ def load(path: str | os.PathLike[str], device: str = "cpu") -> Any:
     Raises:
         BadSetting: If the file is missing, foreign or damaged.
     """
-    try:
-        with open(path, "rb") as file:
-            header, arrays = _read_file(file, Path(path).suffix)
-        state, kinks = _state(header, arrays)
-    except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as fault:
-        raise errors.BadSetting(errors.kan_file(str(path), str(fault))) from fault
+    def wrong(detail: str) -> errors.BadSetting:
+        return errors.BadSetting(errors.kan_file(str(path), detail.rstrip(".")))
+
+    if Path(path).suffix == ".json":
+        header = json_content(path, wrong)
+        arrays = header.pop("arrays", None) if isinstance(header, dict) else None
+    else:
+        arrays = archived(file_bytes(path, wrong, MOST_JSON), wrong)
+        header = parsed(str(arrays.pop("header", "")).encode(errors="replace"), wrong)
+    state, kinks = from_content(header, arrays, wrong)
     kan = from_state(state, device)
     return kan if kinks is None else ShallowKAN(kan, kinks)
 
 
-def _read_file(file: BinaryIO, suffix: str) -> tuple[dict[str, Any], dict[str, Array]]:
-    if suffix == ".json":
-        header = json.load(file)
-        arrays = {n: np.array(a, dtype=float) for n, a in header.pop("arrays").items()}
-        return header, arrays
-    with np.load(file, allow_pickle=False) as stored:
-        arrays = {n: np.asarray(stored[n]) for n in stored.files}
-    return json.loads(str(arrays.pop("header"))), arrays
+MOST_NODES = 1000  # of all layers together
+MOST_EDGES = 50_000  # of all layers together: each is a Python object in pykan
+_HEADER = ("format", "version", "width", "k", "base", "arity", "symbols", "kinks")
 
 
-def _state(header: dict[str, Any], arrays: dict[str, Array]) -> tuple[KanState, list[Kink] | None]:
-    if header["format"] != _FORMAT or header["version"] > _VERSION:
-        raise ValueError(f"its format is {header['format']} {header['version']}")
-    width = tuple((int(sums), int(products)) for sums, products in header["width"])
-    k, base, arity = int(header["k"]), header["base"], header["arity"]
-    if base not in ("zero", "silu"):
-        raise ValueError(f"its base function is {base}")
-    layers = []
-    for number, symbols in enumerate(header["symbols"]):
-        mine = {name: arrays[f"layer{number}_{name}"] for name in _ARRAYS}
-        if mine["grid"].ndim != 2 or np.any(np.diff(mine["grid"], axis=1) <= 0.0):
-            raise ValueError(f"the knots of layer {number} do not increase")
-        layers.append(LayerState(**mine, symbols=tuple(tuple(row) for row in symbols)))
-    if len(layers) != len(width) - 1:
-        raise ValueError("its number of layers does not fit its width")
-    factors = arity if isinstance(arity, int) else tuple(tuple(row) for row in arity)
-    batch = arrays["batch"].reshape(-1, sum(width[0]))
-    state = KanState(width, k, base, factors, tuple(layers), batch)
-    if header["kinks"] is None:
+def from_content(header: Any, arrays: Any,
+                 wrong: Callable[[str], errors.PikanidError]) -> tuple[KanState, list[Kink] | None]:
+    """The network that a file's content describes; `wrong` makes the exception from a sentence.
+
+    Raises:
+        PikanidError: If anything in it is of another type, shape or size.
+    """
+    get = Entry(header, "its header", wrong).table(_HEADER)
+    get["format"].text((_FORMAT,))
+    get["version"].integer(1, _VERSION)
+    width = tuple((a.integer(0, MOST_NODES), b.integer(0, MOST_NODES))
+                  for a, b in (e.pair() for e in get["width"].items(least=2, most=MOST_NODES)))
+    k, base = get["k"].integer(1, 9), get["base"].text(("zero", "silu"))
+    if width[0][1] or min(map(sum, width)) < 1 or sum(map(sum, width)) > MOST_NODES:
+        raise wrong(errors.kan_width(width))
+    factors = _arity(get["arity"], width)
+    plan = KanPlan(width, k, base, factors, ())  # type: ignore[arg-type]  # one of the two
+    if sum(plan.nodes(n) * plan.subnodes(n + 1) for n in range(plan.depth)) > MOST_EDGES:
+        raise wrong(errors.too_many_entries("its list of edges", MOST_EDGES + 1, MOST_EDGES))
+    found = Entry(arrays, "its arrays", wrong).table(optional=None)
+    symbols = get["symbols"].items(most=plan.depth)
+    if len(symbols) != plan.depth:
+        raise wrong("its number of layers does not fit its width")
+    layers = tuple(_layer(found, plan, n, symbols[n], wrong) for n in range(plan.depth))
+    batch = _array(found, "batch", wrong, None, plan.nodes(0))
+    state = KanState(width, k, plan.base, factors, layers, batch)
+    if get["kinks"].value is None:
         return state, None
-    knots = layers[0].grid[0]
-    return state, [
-        Kink(q["time"], q["order"], np.array(q["jump"]), knots, k) for q in header["kinks"]]
+    return state, [_kink(e, layers[0].grid[0], k, plan.nodes(1)) for e in get["kinks"].items()]
+
+
+def _arity(entry: Entry, width: tuple[tuple[int, int], ...]) -> Arity:
+    if not isinstance(entry.value, list):
+        return entry.integer(2, MOST_NODES)
+    rows = tuple(tuple(f.integer(2, MOST_NODES) for f in row.items(most=MOST_NODES))
+                 for row in entry.items(most=MOST_NODES))
+    if [len(row) for row in rows] != [products for _, products in width]:
+        raise entry.fail("a number for every product node")
+    return rows
+
+
+def _layer(found: dict[str, Entry], plan: KanPlan, number: int, symbols: Entry,
+           wrong: Callable[[str], errors.PikanidError]) -> LayerState:
+    inputs, subnodes, nodes = plan.nodes(number), plan.subnodes(number + 1), plan.nodes(number + 1)
+    grid = _array(found, f"layer{number}_grid", wrong, inputs, None)
+    if grid.shape[1] < 2 * plan.k + 2 or np.any(np.diff(grid, axis=1) <= 0.0):
+        raise wrong(f"the knots of layer {number} are too few or do not increase")
+    shapes = {
+        "coef": (inputs, subnodes, grid.shape[1] - plan.k - 1),
+        **dict.fromkeys(("scale_base", "scale_sp", "mask"), (inputs, subnodes)),
+        **dict.fromkeys(("node_scale", "node_bias"), (nodes,)),
+        **dict.fromkeys(("subnode_scale", "subnode_bias"), (subnodes,)),
+        "symbolic_mask": (subnodes, inputs), "symbolic_affine": (subnodes, inputs, 4)}
+    arrays = {name: _array(found, f"layer{number}_{name}", wrong, *shape)
+              for name, shape in shapes.items()}
+    rows = [[name.text(longest=50) for name in row.items(most=MOST_NODES)]
+            for row in symbols.items(most=MOST_NODES)]
+    if len(rows) != subnodes or any(len(row) != inputs for row in rows):
+        raise symbols.fail(f"a table of {subnodes} times {inputs} names")
+    return LayerState(grid=grid, **arrays, symbols=tuple(map(tuple, rows)))
+
+
+def _array(found: dict[str, Entry], name: str, wrong: Callable[[str], errors.PikanidError],
+           *shape: int | None) -> Array:
+    """An array of the file, finite and of this shape (None: any length)."""
+    if name not in found:
+        raise wrong(errors.entry_lacks("it", [name]))
+    entry = found[name].called(f"its array {name}")
+    values = entry.value
+    if isinstance(values, np.ndarray):
+        fits = values.dtype.kind in "fiu" and values.ndim == len(shape) and all(
+            n in (None, m) for n, m in zip(shape, values.shape, strict=True))
+        if not fits:
+            raise entry.fail(f"numbers of shape {shape}")
+        values = values.astype(float)
+    else:
+        values = entry.array(*shape)
+    if not np.all(np.isfinite(values)):
+        raise wrong(f"its array {name} is not finite")
+    return values
+
+
+def _kink(entry: Entry, knots: Array, k: int, outputs: int) -> Kink:
+    get = entry.table(("time", "order", "jump"))
+    return Kink(get["time"].number(float(knots[k]), float(knots[-k - 1])),
+                get["order"].integer(1, k), get["jump"].array(outputs), knots, k)
 
 
 def _places(kan: Any, number: int) -> dict[str, Any]:
