@@ -13,7 +13,9 @@ from pikanid import errors
 from pikanid.mismatch import diagnose
 from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
+from pikanid.mismatch.detect import project
 from pikanid.mismatch.preparation import EXACT, FREEDOM, MOST, beginnings, loud_enough
+from pikanid.mismatch.remainder import condensed, lines, residual_tests
 from pikanid.mismatch.result import Diagnosis
 from pikanid.mismatch.screen import best_level
 from pikanid.mismatch.tangent import CELLS, Tangent, directions
@@ -140,3 +142,29 @@ def test_few_signs_are_followed_at_once_along_a_long_recording(
     few = directions(whitened, theta, case.candidates).D
     assert np.array_equal(few, whole) and len(sizes) > 3
     assert max(sizes) <= CELLS // 20
+
+
+def test_the_signs_of_a_long_recording_are_shortened_one_after_the_other(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """All at once they would take gigabytes; what is tested is the same."""
+    case = opened(swing())
+    h = case.base
+    whole, _ = lines(h.whitened, case.rate, 3)
+    made: list[int] = []
+
+    def short(rows: np.ndarray) -> np.ndarray:
+        made.append(rows.shape[1])
+        return condensed(rows, h.whitened.rows, 5)
+
+    bands, inputs = lines(h.whitened, case.rate, 3, short)
+    assert made == [*(b.shape[1] for b in whole), inputs.shape[1]]
+    assert all(len(b) == -(-h.whitened.rows // 5) + 3 for b in (*bands, inputs))
+    monkeypatch.setattr("pikanid.mismatch.remainder.MOST_ROWS", h.whitened.rows // 5)
+    found = residual_tests(h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, case.candidates,
+                           case.rate)
+    assert found.p_value < 1e-6
+    # what is left of noise stays noise
+    rng = np.random.default_rng(4)
+    noise = project(h.minimum.J, rng.standard_normal(h.whitened.rows))
+    assert residual_tests(h.whitened, h.minimum.theta, noise, h.minimum.J, case.candidates,
+                          case.rate).p_value > 0.01

@@ -211,6 +211,8 @@ def test_what_happened_once_is_proved_by_a_motion_without_it() -> None:
 
 def test_what_proves_an_effect_grows_with_the_certainty_that_is_asked() -> None:
     assert least_proof(0.01) == pytest.approx(13.02, abs=0.01)
+    asked = [least_proof(alpha) for alpha in (0.999, 0.5, 0.05, 0.01, 1e-9, 1e-300)]
+    assert asked == sorted(asked) and asked[0] == 0.0 and np.isfinite(asked[-1])
     # two predictions that far apart: right at the level α, and wrong in one case of ten
     rng = np.random.default_rng(8)
     apart = np.sqrt(least_proof(0.01))

@@ -57,7 +57,9 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
 
     The model is refitted, its residual whitened by the noise and tested against all that the
     catalogue could have left there; entries, and pairs of them, are added inside the equations and
-    refitted; what explains the recording must then predict `held_out`.
+    refitted; what explains the recording must then predict `held_out`.  That proves an effect only
+    if it could have refuted it.  Of very long recordings the beginnings are diagnosed; a note says
+    so.
 
     Args:
         model: Nominal model with a second-order coordinate (a state that is the rate of another).
@@ -75,9 +77,10 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
 
     Raises:
         BadModel: No coordinate is found, or nothing is free.
-        BadRecording: A channel is missing or unusable; train and held-out are the same.
+        BadRecording: A channel is missing or unusable; there are too few samples; train and
+            held-out are the same.
         BadSetting: alpha is no probability, or workers is not positive.
-        SimulationFailed: The model cannot be simulated.
+        SimulationFailed: The model cannot be simulated, or not as exactly as the noise asks.
 
     >>> import pikanid as pk
     >>> truth = pk.systems.sloshing().with_term(

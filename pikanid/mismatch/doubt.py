@@ -38,7 +38,7 @@ def least_proof(alpha: float) -> float:
     13.0
     """
     z = NormalDist().inv_cdf
-    return (z(1 - alpha) + z(POWER)) ** 2
+    return max(z(POWER) - z(alpha), 0.0) ** 2
 
 
 def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale: float,

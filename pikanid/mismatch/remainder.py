@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
@@ -18,16 +20,19 @@ def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.n
 
     r and J may have more rows than there are samples: those of a prior.
     """
-    found = directions(whitened, theta, candidates)
     more = len(r) - whitened.rows
-    D = np.vstack([found.D, np.zeros((more, found.D.shape[1]))])
-    bands, inputs = lines(whitened, rate, more)
     count = -(-whitened.rows // MOST_ROWS)
-    if count > 1:
-        r, J, D, inputs, *bands = (
-            condensed(part, whitened.rows, count) for part in (r, J, D, inputs, *bands))
-    units, _ = unit_columns(D, J)
-    return detect(-r, J, units, found.one_sided, bands, inputs, whitened.records.spread, seed)
+
+    def short(rows: np.ndarray) -> np.ndarray:
+        return rows if count == 1 else condensed(rows, whitened.rows, count)
+
+    found = directions(whitened, theta, candidates)
+    D, one_sided = short(_above(found.D, more)), found.one_sided
+    del found  # of a long recording there is no room for all at once
+    bands, inputs = lines(whitened, rate, more, short)
+    units, _ = unit_columns(D, short(J))
+    return detect(-short(r), short(J), units, one_sided, bands, inputs, whitened.records.spread,
+                  seed)
 
 
 def condensed(rows: np.ndarray, samples: int, count: int) -> np.ndarray:
@@ -40,8 +45,12 @@ def condensed(rows: np.ndarray, samples: int, count: int) -> np.ndarray:
                            rows[samples:]])
 
 
-def lines(whitened: Whitened, rate: float, more: int) -> tuple[list[np.ndarray], np.ndarray]:
-    """Bands of frequency and the inputs' past, for all rows (and `more` rows of zeros)."""
+def lines(whitened: Whitened, rate: float, more: int,
+          short: Callable[[np.ndarray], np.ndarray] = lambda rows: rows
+          ) -> tuple[list[np.ndarray], np.ndarray]:
+    """Bands of frequency and the inputs' past, for all rows (and `more` rows of zeros), each made
+    `short` at once.
+    """
     blocks: list[list[np.ndarray]] = []
     pasts: list[np.ndarray] = []
     for experiment in whitened.problem.experiments:
@@ -50,12 +59,16 @@ def lines(whitened: Whitened, rate: float, more: int) -> tuple[list[np.ndarray],
             blocks.append(frequency_bands(s.t, rate))
             pasts.append(past_inputs(s.t, held, rate))
     count = min(len(b) for b in blocks)
-    bands = [_stacked([b[k] for b in blocks], more) for k in range(count)]
-    return bands, _stacked(pasts, more)
+    bands = [short(_stacked([b[k] for b in blocks], more)) for k in range(count)]
+    return bands, short(_stacked(pasts, more))
 
 
 def _stacked(blocks: list[np.ndarray], more: int) -> np.ndarray:
     from scipy.linalg import block_diag
 
-    whole = block_diag(*blocks)
-    return np.vstack([whole, np.zeros((more, whole.shape[1]))])
+    return _above(block_diag(*blocks), more)
+
+
+def _above(rows: np.ndarray, more: int) -> np.ndarray:
+    """Rows (N, k) with `more` rows of zeros below them."""
+    return rows if more == 0 else np.vstack([rows, np.zeros((more, rows.shape[1]))])

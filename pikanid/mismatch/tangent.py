@@ -64,11 +64,13 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
         places.append(list(listed))
         known = {**listed, **known}
     every = {place: column for column, place in enumerate(sorted(known))}
-    wide = [np.zeros((len(block), len(every))) for block in blocks]
-    for block, whole, own in zip(blocks, wide, places, strict=True):
-        whole[:, [every[place] for place in own]] = block
-    return Directions(np.concatenate(wide) if wide else np.empty((0, 0)), tuple(chosen),
-                      np.array([k for k, _ in every], int), tuple(known[p] for p in every))
+    D, first = np.zeros((sum(map(len, blocks)), len(every))), 0
+    for own in places:
+        block = blocks.pop(0)  # of a long recording there is no room for two
+        D[first:first + len(block), [every[place] for place in own]] = block
+        first += len(block)
+    return Directions(D, tuple(chosen), np.array([k for k, _ in every], int),
+                      tuple(known[p] for p in every))
 
 
 class Tangent:
