@@ -9,9 +9,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pikanid.mismatch.decisions import BAND, RELATIVE, below, in_order, smaller
+from pikanid.mismatch.decisions import BAND, RELATIVE, below, in_order, smaller, steady
 
 ULP = 2.0**-52
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_numbers_that_differ_by_rounding_are_sorted_alike(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    exact = np.repeat(np.round(rng.uniform(1, 1e6, 20), 2), 3)
+    wanted = np.argsort(-exact, kind="stable")
+    for _ in range(20):
+        noisy = exact * (1 + 1e-13 * rng.uniform(-1, 1, len(exact)))
+        assert np.array_equal(np.argsort(-steady(noisy), kind="stable"), wanted)
+    assert np.isfinite(steady(np.array([0.0, 1e-300, -1e300]))).all()
+    assert np.allclose(steady(exact), exact, rtol=1e-8)
 
 
 @given(st.floats(0.0, 1e12), st.floats(-100, 100))

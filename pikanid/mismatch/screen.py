@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from pikanid.mismatch.candidate import Candidate
+from pikanid.mismatch.decisions import steady
 from pikanid.mismatch.descent import GLANCE, Start, start_from
 from pikanid.mismatch.detect import unit_columns
 from pikanid.mismatch.hypothesis import Hypothesis
@@ -118,7 +119,7 @@ class Screen:
         """A candidate's most telling signs, no two neighbours."""
         own = np.flatnonzero(self.found.owner == candidate)
         chosen: list[int] = []
-        for k in own[np.argsort(-self.gain[own], kind="stable")]:
+        for k in own[np.argsort(-steady(self.gain[own]), kind="stable")]:
             if self.gain[k] > 0 and all(abs(int(k) - c) > 1 for c in chosen):
                 chosen.append(int(k))
             if len(chosen) == count:
@@ -141,8 +142,9 @@ class Screen:
             always: Says which ones are listed besides, whatever they promise.
         """
         several = [self.best(c, 3) for c in range(len(self.found.candidates))]
+        promised = steady(self.gain)
         order = sorted((k for k, s in enumerate(several) if s),
-                       key=lambda k: -self.gain[several[k][0]])
+                       key=lambda k: -promised[several[k][0]])
         listed: list[tuple[Candidate, list[Start | Mapping[str, float]]]] = []
         for k in order:
             if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < FAINT and listed):
@@ -221,7 +223,7 @@ class Screen:
         gain = np.triu(np.where(bad, 0.0, gain), 1)
         listed: list[tuple[tuple[Candidate, Candidate], list[Start]]] = []
         taken: set[tuple[int, int]] = set()
-        for flat in np.argsort(-gain, axis=None, kind="stable")[:4000]:
+        for flat in np.argsort(-steady(gain), axis=None, kind="stable")[:4000]:
             i, j = divmod(int(flat), len(z))
             pair = (int(owner[i]), int(owner[j]))
             a, b = (self.found.candidates[k] for k in pair)
