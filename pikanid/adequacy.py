@@ -14,6 +14,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pikanid.noise_floor import rounding_noise
+
 Verdict = Literal["fits", "misfit", "unknown"]
 
 
@@ -75,7 +77,8 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
 
 
 def difference_noise(y: np.ndarray, order: int = 4) -> float:
-    """σ of white noise on a smooth, evenly sampled signal, from its differences.
+    """σ of white noise on a smooth, evenly sampled signal, from its differences; at least that of
+    rounding to the sensor's step.
 
     The `order`-th difference removes polynomials below that degree and multiplies the variance of
     white noise by binomial(2 order, order) (Rice, Annals of Statistics 12, 1984, p. 1215).
@@ -90,4 +93,4 @@ def difference_noise(y: np.ndarray, order: int = 4) -> float:
     d = np.diff(y, order)
     # median, not mean: a few kinks must not count
     spread = float(np.median(np.abs(d))) / 0.6744897501960817
-    return spread / float(np.sqrt(comb(2 * order, order)))
+    return max(spread / float(np.sqrt(comb(2 * order, order))), rounding_noise(y))

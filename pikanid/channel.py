@@ -117,6 +117,17 @@ class Channel:
         steps = np.diff(self.time)
         return bool(np.all(np.abs(steps - self.interval) <= 1e-3 * self.interval))
 
+    @property
+    def changes_at(self) -> float:
+        """Time [s] of the first sample that differs from those before it; infinite if none does.
+
+        >>> Channel("y", [0.0, 1.0, 3.0], [2.0, 2.0, 1.0]).changes_at
+        3.0
+        """
+        seen = np.flatnonzero(np.isfinite(self.values))
+        other = seen[self.values[seen] != self.values[seen[:1]]] if seen.size else seen
+        return float(self.time[other[0]]) if other.size else float("inf")
+
     def converted(self, unit: str) -> Channel:
         """The same signal in another unit; its sigma goes along.
 
@@ -173,9 +184,9 @@ def check_values(channel: Channel, where: str, missing_allowed: bool) -> None:
 
 def check_alive(channel: Channel, where: str) -> None:
     """Raise BadRecording if an output never changes: a dead sensor says nothing."""
-    finite = channel.values[np.isfinite(channel.values)]
-    if np.all(finite == finite[0]):
-        raise errors.BadRecording(errors.constant_output(where, channel.name, float(finite[0])))
+    if np.isinf(channel.changes_at):
+        value = float(channel.values[np.isfinite(channel.values)][0])
+        raise errors.BadRecording(errors.constant_output(where, channel.name, value))
 
 
 def summary(ch: Channel) -> tuple[str, ...]:

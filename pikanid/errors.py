@@ -267,6 +267,13 @@ def missing_input(where: str, name: str, sample: int, time: float) -> str:
     )
 
 
+def rounded_repeats(where: str, name: str, count: int) -> str:
+    return (
+        f"Recording '{where}': '{name}' is rounded and often does not change; {count} samples "
+        "that repeat their neighbours are left out."
+    )
+
+
 def constant_output(where: str, name: str, value: float) -> str:
     return (
         f"'{where}': output '{name}' is {value:g} throughout; a signal that never changes (a dead "

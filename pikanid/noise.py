@@ -18,7 +18,8 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.channel import Array, Channel, check_times, check_values
-from pikanid.noise_ar import autocorrelation, fit
+from pikanid.noise_ar import AR, autocorrelation, fit
+from pikanid.noise_floor import rounding_noise
 from pikanid.noise_quiet import SHORTEST, even_parts, find_quiet
 from pikanid.recording import Recording
 
@@ -168,8 +169,7 @@ def high_band_sigma(channel: Channel) -> tuple[float, float]:
         raise errors.BadRecording(errors.noise_short(channel.name, len(differences) + 4))
     # 0.6745: the median absolute deviation of a unit Gaussian; 70 = Σ weights².
     sigma = float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(70.0))
-    step = _quantum(channel.values)
-    sigma = max(sigma, step / np.sqrt(12.0))
+    sigma = max(sigma, rounding_noise(channel.values))
     if sigma == 0:
         raise errors.BadRecording(errors.noise_none(channel.name))
     lags = np.correlate(weights, weights, "full") / 70.0
@@ -208,12 +208,12 @@ def _from_quiet(channel: Channel, start: float, stop: float) -> NoiseModel:
     time, values = channel.time[inside], channel.values[inside]
     if len(values) < SHORTEST:
         raise errors.BadRecording(errors.noise_short(channel.name, len(values)))
-    centred = values - values.mean()
-    if not np.any(centred):
+    centred, least = values - values.mean(), rounding_noise(channel.values)
+    if not np.any(centred) and not least:
         raise errors.BadRecording(errors.noise_none(channel.name))
-    found = fit(centred)
-    # Rounding to the sensor's step hides noise below it.
-    sigma = max(found.sigma, _quantum(channel.values) / np.sqrt(12.0))
+    # a rounded signal at rest: all that is known of its noise is that rounding hides it
+    found = fit(centred) if np.ptp(values) > 0 else _hidden(least, len(values))
+    sigma = max(found.sigma, least)
     scale = sigma / found.sigma
     return NoiseModel(
         sigma,
@@ -246,13 +246,9 @@ def _from_highest(channel: Channel) -> NoiseModel:
     )
 
 
-def _quantum(values: Array) -> float:
-    """The step of a rounded signal: its smallest change, if samples often repeat; else 0."""
-    finite = values[np.isfinite(values)]
-    changes = np.abs(np.diff(finite))
-    scale = float(np.max(np.abs(finite), initial=0.0))
-    real = changes[changes > 1e-12 * scale]
-    return float(real.min()) if len(real) and len(real) < 0.8 * len(changes) else 0.0
+def _hidden(sigma: float, n: int) -> AR:
+    """White noise of σ, as well known as from n samples."""
+    return AR(np.empty(0), sigma, np.empty((0, 0)), sigma, sigma / float(np.sqrt(2 * n)))
 
 
 def _example() -> Channel:

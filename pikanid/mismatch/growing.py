@@ -119,7 +119,12 @@ def _beginnings(whitened: Whitened) -> list[float]:
     """How much of the records to fit at a time: where nothing moves, nothing is hit or learnt."""
     samples = [s for e in whitened.problem.experiments for s in e.samples]
     place = np.concatenate([np.linspace(0, 1, len(s.t)) for s in samples])
-    moved = np.concatenate([(s.y - np.median(s.y)) ** 2 for s in samples])
+    squares = [(s.y - np.median(s.y)) ** 2 for s in samples]
+    # of each output as a share of all that it moves: outputs have units of their own
+    whole = {o: sum(float(q.sum()) for s, q in zip(samples, squares, strict=True) if s.output == o)
+             for o in {s.output for s in samples}}
+    moved = np.concatenate([q / max(whole[s.output], 1e-300)
+                            for s, q in zip(samples, squares, strict=True)])
     order = np.argsort(place, kind="stable")
     so_far = np.cumsum(moved[order])
     return [float(place[order][np.searchsorted(so_far, share * so_far[-1])]) for share in SHARES]

@@ -14,6 +14,7 @@ import numpy as np
 
 from pikanid import noise
 from pikanid.channel import Channel
+from pikanid.noise_floor import rounding_noise
 from pikanid.noise_quiet import SHORTEST
 from pikanid.recording import Recording
 
@@ -171,7 +172,8 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
         source = "the residual at all frequencies"
     if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)
-    return Level(sigma, rho, spread, h, source, level.stretch)
+    # a fit leaves nothing of a rounded signal at rest: where it moves there is more
+    return Level(max(sigma, rounding_noise(channel.values)), rho, spread, h, source, level.stretch)
 
 
 def bridged(grid: np.ndarray) -> np.ndarray:

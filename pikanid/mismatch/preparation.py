@@ -14,6 +14,7 @@ from pikanid.mismatch.noise_level import Level, first_level, refined
 from pikanid.mismatch.outliers import without_lone, without_outliers
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
+from pikanid.noise_floor import repeated
 from pikanid.recording import Recording
 
 LONG = 4000  # samples below which none are put together
@@ -42,13 +43,23 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
             if count:
                 notes.append(f"Recording '{recording.name}': {count} outliers of "
                              f"'{output.name}' are left out.")
+            again = repeated(recording[output.name].values)
             if together > 1:
                 recording = recording.with_channels(averaged(recording[output.name], together))
+                windows = np.lib.stride_tricks.sliding_window_view(again, together)[::together]
+                again = np.asarray(windows.all(axis=1))
+            own = recording[output.name]
+            if again.any():
+                notes.append(errors.rounded_repeats(recording.name, output.name, int(again.sum())))
+                recording = recording.with_channels(
+                    replace(own, values=np.where(again, np.nan, own.values)))
             if levels is not None:
                 found[output.name] = levels[output.name]
                 continue
-            level = first_level(recording, output.name, quiet, model.input_names)
-            found[output.name] = loud_enough(level, recording[output.name])
+            # of a signal at rest the noise is seen where it still holds all its samples
+            whole = recording.with_channels(own)
+            level = first_level(whole, output.name, quiet, model.input_names)
+            found[output.name] = loud_enough(level, own)
             if found[output.name] is not level:
                 notes.append(f"Recording '{recording.name}': noise of '{output.name}' below "
                              f"{EXACT:.0e} of its swing counts as that.")
@@ -189,6 +200,8 @@ def set_aside(train: tuple[Recording, ...], model: Model, notes: list[str]
         unseen = [replace(r[o], values=np.where(r[o].time < cut, np.nan, r[o].values))
                   for o in model.output_names]
         ends.append(r.with_channels(*unseen))
+    if any(np.isinf(r[o].changes_at) for r in (*kept, *ends) for o in model.output_names):
+        return train, None  # what does not change proves nothing
     notes.append(f"The last {100 * ASIDE:.0f} % of the recording are set aside: what is found has "
                  "to predict them.")
     return tuple(kept), tuple(ends)

@@ -34,13 +34,19 @@ class Records:
         return max(level.spread for found in self.levels for level in found.values())
 
     def beginning(self, rows: int) -> Records:
-        """The same with about so many rows in all, each recording cut alike, from its start."""
-        total = sum(len(r[o].time) for r, found in zip(self.recordings, self.levels, strict=True)
-                    for o in found)
-        share = rows / max(total, 1)
-        return self if share >= 1 else Records(
-            tuple(_cut(r, r.start + share * (r.stop - r.start)) for r in self.recordings),
-            self.levels)
+        """The same with about so many rows in all, each recording cut alike, from its start; not
+        before each output has changed: a rig may rest at first.
+        """
+        times = [np.sort(np.concatenate([r[o].time[np.isfinite(r[o].values)] for o in found]))
+                 for r, found in zip(self.recordings, self.levels, strict=True)]
+        share = rows / max(sum(map(len, times)), 1)
+        if share >= 1:
+            return self
+        cut = []
+        for r, found, t in zip(self.recordings, self.levels, times, strict=True):
+            moved = (min(r[o].changes_at, r.stop) for o in found)
+            cut.append(_cut(r, max(float(t[int(share * (len(t) - 1))]), *moved)))
+        return Records(tuple(cut), self.levels)
 
     def with_levels(self, levels: dict[str, Level]) -> Records:
         """The same with one noise level of each output for all recordings."""
