@@ -876,8 +876,23 @@ def no_recordings() -> str:
 
 def too_few_samples(samples: int, parameters: int) -> str:
     return (
-        f"There are {samples} usable samples for {parameters} free parameters: record more, or fix "
-        "parameters."
+        f"There are {samples} usable samples for {parameters} free parameters; a fit needs "
+        f"{parameters + 1} or more, since any model explains fewer: record more, or fix parameters."
+    )
+
+
+def too_few_of_its_own(where: str, samples: int, parameters: Sequence[str]) -> str:
+    return (
+        f"Recording '{where}' has {samples} usable samples for {len(parameters)} parameters of "
+        f"its own ({_listed(parameters)}); at least {len(parameters)} are needed: record more, or "
+        "share or fix them."
+    )
+
+
+def undetermined(name: str, value: float, std: float) -> str:
+    return (
+        f"The recording does not determine '{name}': its standard error ({std:.2g}) is far larger "
+        f"than its value ({value:.3g}).  Fix it, or excite what depends on it."
     )
 
 

@@ -243,8 +243,11 @@ class Estimate:
         """The verdict as a sentence."""
         a = self.adequacy
         stop = "converged" if self.converged else "stopped before it converged"
-        if a.verdict == "unknown":
+        if a.verdict == "unknown" and not self.n:
             return f"The fit {stop}; nothing was measured that could judge it."
+        if a.verdict == "unknown":
+            return (f"The fit {stop}; whether the model explains the recording cannot be judged: "
+                    f"{self.n} samples for {len(self.free)} free parameters are too few.")
         ratio = np.sqrt(a.value / a.dof)
         what = ("explains the recording" if a.verdict == "fits"
                 else "does NOT explain the recording")

@@ -10,6 +10,8 @@ import numpy as np
 from pikanid import errors
 from pikanid.problem import FreeParameter
 
+FAR, FURTHER = 10.0, 100.0  # times a parameter's size, from which on its standard error is told of
+
 
 def covariance(jacobian: np.ndarray, estimated: np.ndarray) -> np.ndarray:
     """(JᵀJ)⁻¹ (n, n) of standardised residuals, by singular values of the scaled Jacobian.
@@ -54,6 +56,23 @@ def identifiability_warnings(jacobian: np.ndarray, free: Sequence[FreeParameter]
         parts = [f"{w:+.2g}·{n}" for w, n in zip(weights, visible, strict=True) if abs(w) > 0.1]
         notes.append(errors.unidentifiable(" ".join(parts), s[0] / max(s[-1], 1e-300)))
     return notes
+
+
+def undetermined_warnings(free: Sequence[FreeParameter], theta: np.ndarray,
+                          covariance: np.ndarray) -> list[str]:
+    """Sentences about parameters whose standard errors say that they could be anything.
+
+    Beside a value, and a guess, that are not zero ten times are far; beside an estimate near zero
+    alone (an offset, an initial state), which has no size of its own, only hundreds are.
+    """
+    with np.errstate(invalid="ignore"):
+        std = np.sqrt(np.diag(covariance))
+    found = []
+    for f, value, error in zip(free, theta, std, strict=True):
+        limit = FAR * max(abs(value), abs(f.guess)) if f.guess else FURTHER * abs(value)
+        if np.isfinite(error) and error > limit > 0:
+            found.append(errors.undetermined(f.label, float(value), float(error)))
+    return found
 
 
 @dataclass(frozen=True)

@@ -145,8 +145,17 @@ class Problem:
             raise errors.BadRecording(errors.no_recordings())
         self.experiments = tuple(bind(model, r, need_outputs) for r in self.recordings)
         self.free = self._layout()
-        if need_outputs and self.n_samples < len(self.free):
+        if need_outputs:
+            self._check_freedom()
+
+    def _check_freedom(self) -> None:
+        """Refuse what leaves no degree of freedom: any model explains as many numbers as it has."""
+        if 0 < len(self.free) >= self.n_samples:
             raise errors.BadRecording(errors.too_few_samples(self.n_samples, len(self.free)))
+        for r, e in enumerate(self.experiments):
+            own = [f.name for f in self.free if f.recording == r]
+            if e.n_samples < len(own):
+                raise errors.BadRecording(errors.too_few_of_its_own(e.name, e.n_samples, own))
 
     def _layout(self) -> tuple[FreeParameter, ...]:
         free = []

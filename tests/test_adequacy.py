@@ -41,10 +41,29 @@ def test_nothing_measured_is_unknown() -> None:
     assert judge([], [], [], 0).verdict == "unknown"
 
 
-def test_no_more_samples_than_parameters_leaves_one_degree_of_freedom() -> None:
-    r = np.zeros(3)
-    found = judge([r], [np.ones(3)], [r], 5)
-    assert (found.dof, found.p_value, found.verdict) == (1, 1.0, "fits")
+def test_no_more_samples_than_parameters_decide_nothing() -> None:
+    for size in (0.0, 1e9):
+        r = np.full(3, size)
+        for sigma in (np.ones(3), None):
+            assert judge([r], [sigma], [np.arange(3.0)], 3).verdict == "unknown"
+            assert judge([r], [sigma], [np.arange(3.0)], 5).verdict == "unknown"
+
+
+@pytest.mark.parametrize("dof", [1, 6, 7, 30])
+def test_a_model_that_few_samples_cannot_refute_is_not_confirmed_by_them(dof: int) -> None:
+    """The chance to see a residual of twice the noise, counted; half is asked for."""
+    rng, runs = np.random.default_rng(5), 4000
+    seen = sum(judge([r], [np.ones(dof + 2)], [r], 2).verdict == "misfit"
+               for r in np.pad(rng.normal(0, 2.0, (runs, dof)), ((0, 0), (0, 2))))
+    verdict = judge([np.zeros(dof + 2)], [np.ones(dof + 2)], [np.zeros(dof + 2)], 2).verdict
+    assert verdict == ("fits" if seen >= 0.5 * runs else "unknown")
+
+
+def test_a_few_samples_without_sigma_show_no_noise_to_judge_by() -> None:
+    y = np.sin(np.arange(11.0))
+    for r in (0.0 * y, 100.0 * y):
+        assert judge([r], [None], [y], 1).verdict == "unknown"
+    assert judge([0.0 * y], [np.ones(11)], [y], 1).verdict == "fits"
 
 
 def test_unknown_noise_is_taken_from_the_recording() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
-from pikanid.information import covariance, identifiability_warnings
+from pikanid.information import covariance, identifiability_warnings, undetermined_warnings
 from pikanid.problem import Problem
 from pikanid.shooting import Shooting
 from pikanid.version import __version__
@@ -42,6 +42,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
                      "they are biased or make up for missing physics, and standard errors mean "
                      "little.")
     notes += identifiability_warnings(jacobian, problem.free, ~at_bound)
+    notes += undetermined_warnings(problem.free, theta, cov)
     for e in problem.experiments:
         if e.unused:
             notes.append(f"Recording '{e.name}': the model does not use {', '.join(e.unused)}.")

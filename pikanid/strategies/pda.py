@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.linalg import LinAlgError
 
 from pikanid import errors
 from pikanid.approximators import Array, LinearApproximator
@@ -218,7 +219,11 @@ def _covariance(functional: Functional, system: BandedSystem, point: Point, rho:
     meat, first = np.zeros_like(bread), 0
     for r, part in enumerate(functional.parts):
         columns, order = system.columns[r], system.assemblers[r].order
-        factor = factor_band(penalised.blocks[r].band)
+        try:
+            factor = factor_band(penalised.blocks[r].band)
+        except LinAlgError:  # a handful of samples: the cross-validated weight can vanish
+            names = problem.model.state_names
+            raise errors.BadSetting(errors.smoothing_undetermined(list(names))) from None
         border = coupled.blocks[r].border - alone.blocks[r].border
         carried = np.zeros((part.n_coefficients, columns.size))
         carried[order[part.held.size:]] = solve_band(factor, border)
