@@ -124,8 +124,8 @@ def test_a_force_that_acts_once_is_found_when_it_acts() -> None:
     assert force.resolved and force.unit == "rad/s^2" and 0.9 < force.left < 1.1
     assert np.max(force.values) == pytest.approx(2.0, abs=0.5)
     answer = Answer("unnamed", (), ())
-    assert locate(case.base, case.base, answer, case.sites, None, force, 0.01).time == (window,)
-    coarse = locate(case.base, case.base, answer, case.sites, None, None, 0.01).time
+    assert locate(case.base, case.base, answer, case.sites[0], None, force, 0.01).time == (window,)
+    coarse = locate(case.base, case.base, answer, case.sites[0], None, None, 0.01).time
     assert sum(b - a for a, b in coarse) > 2 * (window[1] - window[0])
 
 

@@ -9,10 +9,13 @@ import pytest
 
 import pikanid as pk
 from pikanid.expressions import symbol
+from pikanid.mismatch.catalogue import candidates
 from pikanid.mismatch.hypothesis import fitted
 from pikanid.mismatch.judge import HeldOut, held_out
+from pikanid.mismatch.locate import affected, loud_windows
 from pikanid.mismatch.noise_level import Level
 from pikanid.mismatch.result import OutputError, Proof
+from pikanid.mismatch.site import sites
 from pikanid.mismatch.whitened import Records
 from pikanid.model_parts import Output
 from pikanid.reporting import strict_json
@@ -91,3 +94,21 @@ def test_a_proof_is_told_output_by_output() -> None:
     assert content["outputs"]["swing"] == {
         "rmse_before": 4.0, "rmse_after": 0.31, "noise": 0.3, "unit": "mm"}
     assert "outputs" not in Proof({"theta": proof.first}, 0.4, *(np.zeros(3),) * 5).to_dict()
+
+
+def test_what_is_missing_in_the_second_coordinate_is_found_there() -> None:
+    truth = swinging().with_term("phi_dot", "-200*phi**3")
+    plan = pk.excitation.two_pulse()
+    recording = pk.simulate(truth, plan.with_channels(replace(plan["u_x"], name="u_y")),
+                            sigma=SIGMA, seed=3)
+    levels = {o: Level(s, 0.0, 0.0, 0.01, "given") for o, s in SIGMA.items()}
+    # one parameter for each, so that the first coordinate keeps what it needs
+    base = fitted(swinging().fix("l_theta", "d_theta").free("m"), (),
+                  Records((recording,), (levels,)), [{}], 1)
+    assert base is not None
+    found = sites(base.model, (recording,))
+    assert [s.q for s in found] == ["theta", "phi"]
+    assert affected(base, (), found, candidates(found)).q == "phi"
+    assert loud_windows(base)
+    quiet = base.minimum.r[: len(recording.t)]
+    assert np.sum(quiet**2) < 1.3 * len(quiet)  # nothing is loud in the first output

@@ -65,7 +65,7 @@ def chain() -> pk.Model:
         "equations": {"x1": "v1", "v1": f"(u - ({links[0]}) + {links[1]})/m",
                       "x2": "v2", "v2": f"(-({links[1]}) + {links[2]})/m",
                       "x3": "v3", "v3": f"(-({links[2]}) + {links[3]})/m"},
-        "outputs": {"y1": {"unit": "mm", "expression": "1000*x1"},
+        "outputs": {"y1": {"unit": "mm", "expression": "x1"},
                     "x2": {"unit": "m", "expression": "x2"},
                     "volt": {"unit": "V", "expression": "s*x3"}}})
 

@@ -19,7 +19,7 @@ from pikanid.mismatch.force_shape import ForceShape, force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.in_turn import blas_on_one_thread, threads
 from pikanid.mismatch.latent_force import force_over_time
-from pikanid.mismatch.locate import locate, smallest
+from pikanid.mismatch.locate import affected, locate, smallest
 from pikanid.mismatch.patch import patch
 from pikanid.mismatch.preparation import (
     beginnings,
@@ -36,7 +36,7 @@ from pikanid.mismatch.preparation import (
 from pikanid.mismatch.repeats import repeats
 from pikanid.mismatch.result import Diagnosis, OutputError, Proof
 from pikanid.mismatch.search import Search
-from pikanid.mismatch.site import sites
+from pikanid.mismatch.site import Site, sites
 from pikanid.mismatch.symbols import symbolic_candidates
 from pikanid.mismatch.verdict import Answer, settle, with_formulas
 from pikanid.model import Model
@@ -141,20 +141,21 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
             # one that is better has rivals of its own
             known = search.ranked()[0].fit in before
             answer = _settled(case, search.ranked() if known else search.grow(case.adequate), alpha)
-    shape = None
+    shape, site = None, case.sites[0]
     if answer.verdict != "none":
-        shape = force_shape(case.base, case.sites[0], case.candidates)
+        site = affected(case.base, answer.given, case.sites, case.candidates)
+        shape = force_shape(case.base, site, case.candidates)
     if shape is not None and answer.verdict == "unnamed":
         tell("laws outside the catalogue")
         search = case.search
-        search.offer(symbolic_candidates(shape, case.sites[0]))
+        search.offer(symbolic_candidates(shape, site))
         answer = with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
                                case.later is not None, case.proves, alpha)
     mend = None
     if shape is not None and answer.verdict == "unnamed" and case.later is not None:
-        mend = patch(case.base, case.model, shape, case.sites[0], case.records, case.later,
+        mend = patch(case.base, case.model, shape, site, case.records, case.later,
                      case.predicted)
-    return replace(_diagnosis(case, detection, answer, shape, alpha), patch=mend)
+    return replace(_diagnosis(case, detection, answer, site, shape, alpha), patch=mend)
 
 
 def _settled(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
@@ -218,8 +219,8 @@ def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, 
     return case
 
 
-def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceShape | None,
-               alpha: float) -> Diagnosis:
+def _diagnosis(case: Case, detection: Detection, answer: Answer, site: Site,
+               shape: ForceShape | None, alpha: float) -> Diagnosis:
     if case.excuse:
         case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
     best = answer.given[0] if answer.given else case.base
@@ -237,10 +238,10 @@ def _diagnosis(case: Case, detection: Detection, answer: Answer, shape: ForceSha
             f"{base.motion:.2g} of chi-squared, and {least_proof(alpha):.0f} are needed to confirm "
             "anything.")
     levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
-    force = None if answer.verdict == "none" else force_over_time(case.base, case.sites[0])
+    force = None if answer.verdict == "none" else force_over_time(case.base, site)
     return Diagnosis(
         answer.verdict, detection.p_value, alpha,
-        locate(case.base, best, answer, case.sites, shape, force, alpha),
+        locate(case.base, best, answer, site, shape, force, alpha),
         given, rejected, case.before, after, proof, tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves,

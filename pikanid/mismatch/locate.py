@@ -23,7 +23,23 @@ WINDOWS = 40
 CLEAR = 5.0  # standard errors from which on an effect counts as detectable
 
 
-def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[Site],
+def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site],
+             candidates: Sequence[Candidate]) -> Site:
+    """The coordinate in which something is missing: that of the effects given or, without any, of
+    the entry whose sign takes most of the nominal residual away by itself.
+    """
+    if given:
+        return given[0].effects[0].site
+    if len(sites) == 1:
+        return sites[0]
+    found = directions(base.whitened, base.minimum.theta, candidates)
+    units, _ = unit_columns(found.D, base.minimum.J)
+    z = -units.T @ base.minimum.r
+    size = np.where(found.one_sided, z, np.abs(z))
+    return found.candidates[found.owner[int(np.argmax(size))]].site if len(size) else sites[0]
+
+
+def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
            shape: ForceShape | None, force: ForceOverTime | None, alpha: float) -> Where:
     """The place of a mismatch, as far as the answer and the nominal residual tell.
 
@@ -33,7 +49,6 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, sites: Sequence[S
     Without an answer the shape of the missing force says what it depends on, and whether a static
     law can be all that is missing.
     """
-    site = sites[0]
     channels: set[Channel] = {e.channel for h in answer.given for e in h.effects}
     ambiguous = any(len(ids) > 1 for table in answer.twins.values() for ids in table.values())
     channel: Channel | Literal["undecided"] = "undecided"
@@ -82,15 +97,20 @@ STATIC = frozenset({"coulomb_friction", "quadratic_drag", "power_drag", "amplitu
 
 
 def loud_windows(base: Hypothesis) -> tuple[tuple[float, float], ...]:
-    """Seconds in which the whitened nominal residual is louder than noise can be."""
-    samples = base.whitened.problem.experiments[0].samples[0]
-    r = base.minimum.r[: len(samples.t)]
-    edges = np.linspace(samples.t[0], samples.t[-1], WINDOWS + 1)
+    """Seconds in which the whitened nominal residual of an output of the first recording is louder
+    than noise can be.
+    """
+    outputs = base.whitened.problem.experiments[0].samples
+    t = np.concatenate([s.t for s in outputs])
+    owner = np.repeat(np.arange(len(outputs)), [len(s.t) for s in outputs])
+    r = base.minimum.r[: len(t)]
+    edges = np.linspace(t.min(), t.max(), WINDOWS + 1)
     loud = []
     for a, b in pairwise(edges):
-        inside = (samples.t >= a) & (samples.t < b)
-        n = int(inside.sum())
-        if n > 3 and np.sum(r[inside] ** 2) > n + 4 * np.sqrt(2 * n):
+        inside = (t >= a) & (t < b)
+        counts = np.bincount(owner[inside], minlength=len(outputs))
+        powers = np.bincount(owner[inside], r[inside] ** 2, len(outputs))
+        if np.any((counts > 3) & (powers > counts + 4 * np.sqrt(2 * counts))):
             loud.append((float(a), float(b)))
     joined: list[tuple[float, float]] = []
     for a, b in loud:

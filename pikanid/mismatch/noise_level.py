@@ -55,7 +55,8 @@ class Level:
     def sentence(self, output: str) -> str:
         """What was found."""
         colour = f"correlation {self.rho:.2f} between neighbours" if self.rho else "white"
-        return f"Noise of '{output}': sigma = {self.sigma:.3g}, {colour}, from {self.source}."
+        source = "as given" if self.source == "given" else f"from {self.source}"
+        return f"Noise of '{output}': sigma = {self.sigma:.3g}, {colour}, {source}."
 
     def whiten(self, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Rows (N,) or (N, k) at times t as white noise of unit variance.
