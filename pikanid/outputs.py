@@ -7,6 +7,7 @@ are checked before they are used, does without.
 
 Files of one run are all written before the first is renamed.  A full disk, a closed folder or an
 interrupt then changes none of them; only a kill within the microseconds between two renames could.
+A kill while they are written leaves hidden files (`STAGED`) that nobody reads.
 """
 
 from __future__ import annotations
