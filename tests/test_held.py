@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import oracle
@@ -10,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pikanid import errors
 from pikanid.concealed import signals
 from pikanid.held import HeldInput, PiecewiseInput, acting
 from pikanid.model import Model
-from pikanid.problem import bind
+from pikanid.problem import Problem, bind
 from pikanid.recording import Channel, Recording
 
 T = np.array([0.2, 0.5, 0.6, 1.1, 1.3])
@@ -93,3 +95,17 @@ def test_a_simulation_begins_with_the_first_and_ends_with_the_last_of_what_is_us
         np.testing.assert_array_equal(e.initial(np.array([1.0])), [1.0])
     alone = bind(model, Recording({"u": Channel("u", T, U)}), need_outputs=False)
     assert (alone.t0, alone.t1) == (0.2, 1.3)
+    none = model.replace(inputs=(replace(model.inputs[0], default=2.0),))
+    idle = bind(none, Recording({"spare": spare}), need_outputs=False)
+    assert (idle.t0, idle.t1) == (-5.0, 50.0)
+    np.testing.assert_array_equal(idle.inputs(np.array([0.0])), [[2.0]])
+
+
+def test_fewer_samples_than_parameters_are_refused() -> None:
+    model = Model.from_dict({
+        "states": {"x": {"initial": "a"}}, "equations": {"x": "b + c*x"},
+        "parameters": {n: {"guess": 1.0} for n in "abc"}, "outputs": {"x": {"expression": "x"}}})
+    few = Recording.from_arrays(np.arange(4.0), {"x": np.array([1.0, np.nan, 2.0, np.nan])})
+    with pytest.raises(errors.BadRecording, match=r"2.*3|3.*2"):
+        Problem(model, few)
+    Problem(model, [few, few])

@@ -121,6 +121,7 @@ class _Residuals:
         self.shooting, self.segments, self.n_theta, self.shape = shooting, segments, n_theta, shape
         self.closing = 1.0
         self.steps: list[Steps] = []
+        self.sizes = np.ones(shape[1])
         outputs = shooting.problem.model.outputs
         sizes = np.maximum(np.ptp(np.array([_span(shooting, k) for k in range(len(outputs))]),
                                   axis=1), 1e-300)
@@ -137,9 +138,14 @@ class _Residuals:
         return np.concatenate([p, start])
 
     def choose_steps(self, z: np.ndarray) -> None:
-        """Choose integration steps of every segment at z, for 1e-5 of each signal."""
+        """Choose integration steps of every segment at z, for 1e-5 of each signal.
+
+        From here on a gap counts relative to how large that state is anywhere at z: a size that
+        moved along could be made large instead of a gap small.
+        """
         self._at = None
         nodes = np.abs(z[self.n_theta:].reshape(self.shape)).max(axis=0, initial=0.0)
+        self.sizes = np.maximum(nodes, 1e-9)
         states = np.where(nodes > 0, nodes, np.inf)
         self.steps = [g.simulator.choose_steps(
             self.parameters(z, g), 1e-5, self.shooting.method,
@@ -160,8 +166,7 @@ class _Residuals:
         sh, (count, n) = self.shooting, self.shape
         base = len(sh.problem.model.parameters)
         nodes = z[self.n_theta:].reshape(self.shape)
-        # a gap counts relative to how large that state is anywhere
-        weight = self.closing * self.scale / np.maximum(np.max(np.abs(nodes), axis=0), 1e-9)
+        weight = self.closing * self.scale / self.sizes
         r, J = np.zeros(sh.rows + count * n), np.zeros((sh.rows + count * n, len(z)))
         for g, following, h in zip(self.segments, [*self.segments[1:], None], self.steps,
                                    strict=True):
