@@ -74,6 +74,16 @@ def test_fitted_model_simulates_the_fit(estimate: Estimate) -> None:
     np.testing.assert_allclose(again["theta"].values, estimate.fits[0].fitted, atol=1e-7)
 
 
+def test_good_is_what_converged_and_is_no_misfit(estimate: Estimate) -> None:
+    assert estimate.ok and estimate.converged
+    misfit = dataclasses.replace(estimate.adequacy, verdict="misfit", value=9.0 * estimate.n)
+    assert not dataclasses.replace(estimate, adequacy=misfit).ok
+    assert not dataclasses.replace(estimate, converged=False).ok
+    ratio = np.sqrt(9.0 * estimate.n / misfit.dof)
+    assert f"{ratio:.3g} times the stated noise" in dataclasses.replace(
+        estimate, adequacy=misfit).sentence()
+
+
 def test_prints_everything_that_matters(estimate: Estimate) -> None:
     text = str(estimate)
     assert repr(estimate) == text
@@ -89,7 +99,11 @@ def test_tables_and_plain_numbers(estimate: Estimate) -> None:
     frame = estimate.to_frame()
     assert list(frame.index) == [f.label for f in estimate.free]
     assert frame.loc["l_theta", "value"] == estimate.value("l_theta")
-    assert (frame["lower"] < frame["value"]).all()
+    for f in estimate.free:
+        row = frame.loc[f.label]
+        assert (row["lower"], row["upper"]) == estimate.interval(f.name, recording=f.recording)
+        assert (row["value"], row["std"], row["unit"]) == (
+            estimate.value(f.name, f.recording), estimate.std(f.name, f.recording), f.unit)
     content = json.loads(json.dumps(estimate.to_dict(), allow_nan=False))
     assert content["schema_version"] == 1
     for key in ("model", "strategy", "parameters", "cost", "chi2", "n", "warnings", "seconds",

@@ -92,9 +92,11 @@ def test_residual_by_hand() -> None:
     assert spline.basis(np.zeros(1)) @ c == pytest.approx(0.0)
 
 
-def test_any_approximator_fits_the_same_functional() -> None:
+@pytest.mark.parametrize("model", [guessed(), guessed().with_initial(theta="free")],
+                         ids=["fixed start", "free start"])
+def test_any_approximator_fits_the_same_functional(model: pk.Model) -> None:
     assert isinstance(Sines(), Approximator)
-    problem = Problem(guessed(), slosh(0.1, stride=5))
+    problem = Problem(model, slosh(0.1, stride=5))
     chains = find_chains(problem.model)
     t = np.linspace(0.005, 4.995, 100)
     functional = bind(problem, VectorField(problem.model), chains, [(Sines(),)],
@@ -165,7 +167,7 @@ def coupled() -> pk.Model:
         "inputs": {"u": {"hold": "first", "delay": "0.03"}},
         "parameters": {"a": {"guess": 0.2}, "k": {"guess": 5.0}, "c": {"guess": 0.7}},
         "equations": {"heat": "c*v**2 - heat", "x": "v", "v": "-k*sin(x) - 0.4*v + u"},
-        "outputs": {"y": {"expression": "k*x*v", "delay": "0.05"},
+        "outputs": {"y": {"expression": "k*x*v + u", "delay": "0.05"},
                     "z": {"expression": "heat**2 + c*u"}}})
     return model.per_recording("c")
 
@@ -212,7 +214,8 @@ def test_every_family_by_hand(form: str) -> None:
         start = np.array([state(i, np.zeros(1))[0] for i in range(3)])
         assert start == pytest.approx([0.3, a + 0.5 * u(np.zeros(1))[0], k / 9])
         at = [np.maximum(recording["y"].time - 0.05, 0.0), recording["z"].time]
-        models = [k * state(1, at[0]) * state(2, at[0]), state(0, at[1]) ** 2 + own * u(at[1])]
+        models = [k * state(1, at[0]) * state(2, at[0]) + u(at[0]),
+                  state(0, at[1]) ** 2 + own * u(at[1])]
         spreads = [np.linspace(0.1, 0.3, 41) if r == 0 else visible(recording["y"].values),
                    visible(recording["z"].values)]
         wanted = [(model - recording[name].values) / spread for model, name, spread in zip(
@@ -238,6 +241,8 @@ def test_every_family_by_hand(form: str) -> None:
         assert np.sum(part.physics.weight[:, 0] ** 2) == pytest.approx(2.0)
         deviations = [sites.deviation for sites in part.data]
         assert deviations[1] is None and (deviations[0] is None) == (r == 1)
+        if deviations[0] is not None:
+            np.testing.assert_allclose(deviations[0], 1.0)  # of rows that σ divides
     assert functional.n_data == count == 2 * (41 + 23)
     square = sum(float(np.sum((recording[name].values / spread) ** 2))
                  for recording, spread in zip(data, (np.linspace(0.1, 0.3, 41),
@@ -246,9 +251,13 @@ def test_every_family_by_hand(form: str) -> None:
     assert functional.data_square == pytest.approx(square)
 
 
+@pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("form", ["second_order", "state"])
-def test_held_coefficients_follow_the_start(form: str) -> None:
-    functional = collocated(coupled(), [seen(0, True), seen(1, False)], form, intervals=12)
+def test_held_coefficients_follow_the_start(form: str, turned: bool) -> None:
+    model = coupled()
+    if turned:
+        model = model.replace(states=model.states[::-1])
+    functional = collocated(model, [seen(0, True), seen(1, False)], form, intervals=12)
     assert functional.start_moves
     theta = np.array([0.25, 6.0, 0.5, 0.9])
     for r, part in enumerate(functional.parts):
@@ -259,10 +268,16 @@ def test_held_coefficients_follow_the_start(form: str) -> None:
             ends = [functional.complete(r, np.zeros(part.n_coefficients), theta + h)[part.held]
                     for h in (1e-5 * np.eye(4)[k], -1e-5 * np.eye(4)[k])]
             np.testing.assert_allclose(slopes[:, column], (ends[0] - ends[1]) / 2e-5, atol=1e-8)
+        start = functional.problem.experiments[r].initial(functional.problem.parameters(theta, r))
+        c = functional.complete(r, np.ones(part.n_coefficients), theta)
+        pieces = np.split(c, np.cumsum([s.n_coefficients for s in part.approximators])[:-1])
+        for i, (chain, q) in enumerate(zip(functional.chains.root, functional.chains.order,
+                                           strict=True)):
+            found = part.approximators[chain].basis(np.zeros(1), q) @ pieces[chain]
+            assert found == pytest.approx([start[i]])
         c = functional.resting(r, theta)
         values = functional.states(part.physics, c)
         roots = [i for i, q in enumerate(functional.chains.order) if q == 0]
-        start = functional.problem.experiments[r].initial(functional.problem.parameters(theta, r))
         inner = part.physics.t > 0.8  # behind the first splines, which hold rates too
         for i in roots:
             np.testing.assert_allclose(values[inner, i], start[i], atol=1e-12)
@@ -290,6 +305,7 @@ def test_unweighted_data_are_as_they_are() -> None:
     known = made.rows(0, c[0], problem.guess, LAM)[0].residual
     found = plain.rows(0, c[0], problem.guess, LAM)[0].residual
     np.testing.assert_allclose(found, known * 0.1 * DEGREE)
+    np.testing.assert_allclose(plain.parts[0].data[0].deviation, 0.1 * DEGREE)
     loose = bind(problem, made.vector_field, made.chains, [made.parts[0].approximators], nodes,
                  given_start=False, like=made)
     assert loose.parts[0].held.size == 0 and loose.parts[0].start is None

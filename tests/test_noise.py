@@ -301,3 +301,13 @@ def test_the_step_of_a_rounded_signal_in_any_unit(scale: float) -> None:
 def test_a_channel_that_never_changes_is_named() -> None:
     with pytest.raises(BadRecording, match="gauge"):
         noise.high_band_sigma(Channel("gauge", np.linspace(0.0, 3.0, 300), np.full(300, 2.0)))
+
+
+def test_coloured_noise_counts_as_quiet_only_beside_something_louder() -> None:
+    """What is as loud as all the rest may be a motion."""
+    for seed in range(5):
+        y = coloured(300, 0.6, seed)
+        assert not _is_quiet(y, 2.0 * float(np.var(y)))
+    quiet = sum(_is_quiet(y, 8.0 * float(np.var(y)))
+                for y in (coloured(300, 0.6, seed) for seed in range(20)))
+    assert quiet >= 16

@@ -143,6 +143,8 @@ STARTS = {
     "clipped": ("clip(u_x, -m, m)", lambda p, u: np.clip(u, -p["m"], p["m"])),
     "kinked": ("abs(max(u_x, m)) - sign(g)", lambda p, u: abs(max(u, p["m"])) - 1),
     "power": ("signed_power(u_x, m)", lambda p, u: np.sign(u) * abs(u) ** p["m"]),
+    "negative power": ("signed_power(u_x - 2, m)", lambda p, u: -((2 - u) ** p["m"])),
+    "size": ("abs_power(u_x - 2, m)", lambda p, u: (2 - u) ** p["m"]),
 }
 
 

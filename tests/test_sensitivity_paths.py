@@ -33,7 +33,7 @@ def model(friction: bool) -> Model:
     return Model.from_dict({
         "states": {"x": {"initial": "x0 + 0.1*w"}, "v": {"initial": "x0*d"}},
         "inputs": {"u": {"delay": "tau", "hold": "zero"}, "w": {"delay": "late", "hold": "first"}},
-        "parameters": {n: {"guess": v} for n, v in TRUTH.items()},
+        "parameters": {n: {"guess": 1.2 * v} for n, v in TRUTH.items()},
         "equations": {"x": "v", "v": "-k*sin(x) - d*v + b*u**2 + c*w*cos(x)" + stick},
         "outputs": {"z": {"expression": "gain*x + path*w", "delay": "seen"},
                     "y": {"expression": "x*v"}}})
