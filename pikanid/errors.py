@@ -316,6 +316,10 @@ def damaged(where: str, kind: str) -> str:
     return f"'{where}' cannot be read as {kind}: it is damaged or cut off."
 
 
+def cannot_unpack(where: str, reason: str) -> str:
+    return f"'{where}' cannot be unpacked: {reason}."
+
+
 def binary_junk(where: str) -> str:
     return f"'{where}' is not text: it holds binary data, so it is no CSV."
 
@@ -330,6 +334,10 @@ def no_rows(where: str) -> str:
 
 def no_vectors(where: str) -> str:
     return f"'{where}' holds no numeric vector of two or more values."
+
+
+def too_many_cells(where: str, most: int) -> str:
+    return f"'{where}' holds more than {most} cells: save what you need as CSV or Parquet."
 
 
 def no_sheet(where: str, sheet: str, known: Iterable[str]) -> str:
@@ -552,6 +560,13 @@ def detail_too_large(given: int, most: int) -> str:
 
 
 def detail_unpacks(most: int) -> str:
+    return (
+        f"it would unpack to more than {most / 2**20:.4g} MiB of memory; unpack it yourself if "
+        "you trust it"
+    )
+
+
+def detail_memory(most: int) -> str:
     return f"what it holds would take more than {most / 2**20:.4g} MiB of memory"
 
 

@@ -69,12 +69,14 @@ def _without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
-def gunzipped(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> bytes:
+def gunzipped(content: bytes, wrong: Wrong, most: int | None = None) -> bytes:
     """What a gzip file holds, all of its members.
 
     Raises:
-        PikanidError: If it is damaged, or unpacks to more than `most` bytes.
+        PikanidError: If it is damaged, or unpacks to more than `most` bytes, which are
+            `MOST_UNPACKED` if None.
     """
+    most = MOST_UNPACKED if most is None else most
     parts, rest, room = [], content, most
     try:
         while rest:
@@ -84,10 +86,10 @@ def gunzipped(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> bytes:
             if room < 0:
                 raise wrong(errors.detail_unpacks(most))
             if not unpacker.eof:
-                raise wrong("it is no complete gzip file")
+                raise wrong("it is damaged or cut off")
             rest = unpacker.unused_data.lstrip(b"\0")  # padding, as of tapes
     except zlib.error:
-        raise wrong("it is no complete gzip file") from None
+        raise wrong("it is damaged or cut off") from None
     return b"".join(parts)
 
 
@@ -113,15 +115,20 @@ def parsed(content: bytes, wrong: Wrong) -> Any:
     needed = len(content) + 64 * content.count(b",") + 110 * content.count(b":") + (
         64 * content.count(b"[") + 250 * content.count(b"{"))
     if needed > MOST_PARSED + len(content):
-        raise wrong(errors.detail_unpacks(MOST_PARSED))
+        raise wrong(errors.detail_memory(MOST_PARSED))
     try:
         return json.loads(content)
     except (ValueError, RecursionError):
         raise wrong("it is no JSON") from None
 
 
-def unpacked_size(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> int:
+def unpacked_size(content: bytes, wrong: Wrong, most: int | None = None) -> int:
     """Bytes of all members of a ZIP archive (.npz, .xlsx), which it states and cannot exceed.
+
+    Args:
+        content: Of the file.
+        wrong: Makes the exception from what is wrong.
+        most: Bytes; `MOST_UNPACKED` if None.
 
     Raises:
         PikanidError: If it is no archive, or these are more than `most`.
@@ -131,12 +138,13 @@ def unpacked_size(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> in
             size = sum(member.file_size for member in archive.infolist())
     except (zipfile.BadZipFile, ValueError, NotImplementedError, LookupError, OSError, EOFError):
         raise wrong("it is damaged or cut off") from None
+    most = MOST_UNPACKED if most is None else most
     if size > most:
         raise wrong(errors.detail_unpacks(most))
     return size
 
 
-def archived(content: bytes, wrong: Wrong, most: int = MOST_UNPACKED) -> dict[str, np.ndarray]:
+def archived(content: bytes, wrong: Wrong, most: int | None = None) -> dict[str, np.ndarray]:
     """The arrays of an NPZ archive; pickled objects are refused.
 
     Raises:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import gzip
 import os
-import struct
-import zipfile
-import zlib
 from pathlib import Path
 
 from pikanid import errors
+from pikanid.stored import DAMAGE, file_bytes, gunzipped, unpacked_size
 
 ENDINGS = {
     ".csv": "csv",
@@ -36,12 +33,7 @@ NAMES = {
     "zip": "a ZIP archive",
     "gzip": "gzip-compressed",
 }
-# What the parsers of other people raise on damaged bytes: they promise no closed list.
-FOREIGN_FAILURES: tuple[type[Exception], ...] = (
-    ValueError, TypeError, LookupError, AttributeError, ArithmeticError, AssertionError, OSError,
-    EOFError, RuntimeError, NameError, MemoryError, SyntaxError, BufferError, struct.error,
-    zlib.error, zipfile.BadZipFile,
-)  # fmt: skip
+FOREIGN_FAILURES = DAMAGE
 
 
 def kind_and_content(path: str | os.PathLike[str]) -> tuple[str, bytes, str]:
@@ -67,15 +59,13 @@ def kind_and_content(path: str | os.PathLike[str]) -> tuple[str, bytes, str]:
     if kind is None or (packed and kind != "csv"):
         known = [*ENDINGS, ".csv.gz"]
         raise errors.BadRecording(errors.unknown_ending(where, known))
-    try:
-        content = file.read_bytes()
-    except OSError as failure:
-        raise errors.BadRecording(errors.cannot_open(where, failure.strerror or "")) from None
+    content = file_bytes(file, lambda why: errors.BadRecording(errors.cannot_open(where, why)))
     if not content:
         raise errors.BadRecording(errors.empty_file(where))
     actual = _sniff(content)
     if actual == "gzip" and kind == "csv":
-        content = _unpacked(content, where)
+        content = gunzipped(content, lambda why: errors.BadRecording(
+            errors.cannot_unpack(where, why)))
         if not content:
             raise errors.BadRecording(errors.empty_file(where))
         actual = _sniff(content)
@@ -87,6 +77,8 @@ def kind_and_content(path: str | os.PathLike[str]) -> tuple[str, bytes, str]:
         raise errors.BadRecording(errors.wrong_ending(where, NAMES[actual], NAMES[kind]))
     if not actual and kind != "csv":
         raise errors.BadRecording(errors.damaged(where, NAMES[kind]))
+    if kind in ("xlsx", "npz"):
+        unpacked_size(content, lambda why: errors.BadRecording(errors.cannot_unpack(where, why)))
     stem = Path(file.stem).stem if packed else file.stem
     return kind, content, stem or where
 
@@ -112,10 +104,3 @@ def _sniff(content: bytes) -> str:
     if b"xl/" in content or b"[Content_Types].xml" in content:
         return "xlsx"
     return "npz" if b".npy" in content else "zip"
-
-
-def _unpacked(content: bytes, where: str) -> bytes:
-    try:
-        return gzip.decompress(content)
-    except (OSError, EOFError, zlib.error):
-        raise errors.BadRecording(errors.damaged(where, "a gzip file")) from None

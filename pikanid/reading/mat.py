@@ -17,6 +17,7 @@ from pikanid.reading import mat5
 from pikanid.reading.arrays import columns
 from pikanid.reading.door import FOREIGN_FAILURES, NAMES
 from pikanid.reading.table import Table
+from pikanid.stored import MOST_UNPACKED
 
 _DEEPEST = 8
 _MOST_CELLS = 1000
@@ -54,25 +55,40 @@ def _v73(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
         raise errors.BadSetting(errors.extra_missing("MAT 7.3", "h5py", "mat")) from None
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
+            room = [MOST_UNPACKED]
             return [
                 leaf
                 for name in file
-                if not name.startswith("#")
-                for leaf in _flat_hdf5(name, file[name], file, 0)
+                if not name.startswith("#") and _inside(file, name)
+                for leaf in _flat_hdf5(name, file[name], file, 0, room)
             ]
     except FOREIGN_FAILURES:
         raise errors.BadRecording(errors.damaged(where, NAMES["mat"])) from None
 
 
-def _flat_hdf5(path: str, node: Any, file: Any, depth: int) -> Iterator[tuple[str, np.ndarray]]:
+def _inside(group: Any, name: str) -> bool:
+    """Whether a member lies in this file: one may name another file, or a pipe that never ends."""
+    import h5py
+
+    return not isinstance(group.get(name, getlink=True), h5py.ExternalLink)
+
+
+def _flat_hdf5(path: str, node: Any, file: Any, depth: int,
+               room: list[int]) -> Iterator[tuple[str, np.ndarray]]:
     import h5py
 
     if depth > _DEEPEST:
         return
     if isinstance(node, h5py.Group):
         for field in node:
-            yield from _flat_hdf5(f"{path}.{field}", node[field], file, depth + 1)
+            if _inside(node, field):
+                yield from _flat_hdf5(f"{path}.{field}", node[field], file, depth + 1, room)
         return
+    if node.external is not None or node.is_virtual:  # its values lie in other files
+        return
+    room[0] -= node.size * max(node.dtype.itemsize, 8) if node.size else 0
+    if room[0] < 0:  # a shape takes no bytes of the file: what is not written reads as zeros
+        raise ValueError("more than is read")
     if "MATLAB_empty" in node.attrs or node.attrs.get("MATLAB_class", b"") == b"char":
         return
     if node.dtype.kind == "O":
@@ -80,6 +96,6 @@ def _flat_hdf5(path: str, node: Any, file: Any, depth: int) -> Iterator[tuple[st
         if h5py.check_ref_dtype(node.dtype) is h5py.Reference:
             for k, reference in enumerate(np.asarray(node[()]).ravel()[:_MOST_CELLS]):
                 if reference:
-                    yield from _flat_hdf5(f"{path}.{k + 1}", file[reference], file, depth + 1)
+                    yield from _flat_hdf5(f"{path}.{k + 1}", file[reference], file, depth + 1, room)
     elif node.dtype.kind in "fiub":
         yield path, np.asarray(node[()]).T  # HDF5 counts axes the other way round

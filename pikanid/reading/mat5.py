@@ -15,6 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pikanid.stored import MOST_UNPACKED
+
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
 _NUMBERS = {
@@ -43,11 +45,19 @@ def leaves(content: bytes) -> Iterator[Leaf]:
         raise ValueError("no level 5 header")
     for kind, data in _elements(memoryview(content)[_HEADER:], order):
         if kind == _COMPRESSED:
-            for inner, unpacked in _elements(memoryview(zlib.decompress(data)), order):
+            for inner, unpacked in _elements(memoryview(_unpacked(data)), order):
                 if inner == _MATRIX:
                     yield from _Matrix.read(unpacked, order).leaves("", 0)
         elif kind == _MATRIX:
             yield from _Matrix.read(data, order).leaves("", 0)
+
+
+def _unpacked(data: memoryview) -> bytes:
+    unpacker = zlib.decompressobj()
+    found = unpacker.decompress(data, MOST_UNPACKED)
+    if not unpacker.eof:
+        raise ValueError("cut off, or more than is read")
+    return found
 
 
 def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:

@@ -10,6 +10,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.reading.door import FOREIGN_FAILURES, NAMES
 from pikanid.reading.table import Column, Table, from_cells
+from pikanid.stored import MOST_UNPACKED
 
 
 def read(content: bytes, where: str) -> Table:
@@ -24,6 +25,11 @@ def read(content: bytes, where: str) -> Table:
     except ImportError:
         raise errors.BadSetting(errors.extra_missing(".parquet", "pyarrow", "parquet")) from None
     try:
+        about = pq.read_metadata(io.BytesIO(content))
+        # runs of one value take no bytes of the file
+        if 8 * about.num_rows * about.num_columns > MOST_UNPACKED:
+            raise errors.BadRecording(errors.cannot_unpack(
+                where, errors.detail_unpacks(MOST_UNPACKED)))
         table = pq.read_table(io.BytesIO(content), use_threads=False)
         rows = range(1, table.num_rows + 1)
         columns = tuple(

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from pikanid import errors
 from pikanid.reading.door import FOREIGN_FAILURES, NAMES
 from pikanid.reading.table import Table, from_rows
+
+MOST_CELLS = 20_000_000  # of a sheet, up to the last one of each row that holds something
 
 
 def read(content: bytes, where: str, kind: str, sheet: str | int | None) -> Table:
@@ -57,11 +60,24 @@ def _xlsx(content: bytes, where: str, sheet: str | int | None) -> list[list[obje
                 page = book[_sheet(book.sheetnames, sheet, where)]
                 # Some writers understate the size of the sheet.
                 getattr(page, "reset_dimensions", lambda: None)()
-                return [list(row) for row in page.iter_rows(values_only=True)]
+                return _within(page.iter_rows(values_only=True), where)
             finally:
                 book.close()
     except FOREIGN_FAILURES:
         raise errors.BadRecording(errors.damaged(where, NAMES["xlsx"])) from None
+
+
+def _within(rows: Iterable[Sequence[object]], where: str) -> list[list[object]]:
+    """Rows up to their last cell that holds something; a cell far off makes a row of thousands."""
+    kept: list[list[object]] = []
+    room = MOST_CELLS
+    for row in rows:
+        width = next((k for k in range(len(row), 0, -1) if row[k - 1] is not None), 0)
+        kept.append(list(row[:width]))
+        room -= width + 1
+        if room < 0:
+            raise errors.BadRecording(errors.too_many_cells(where, MOST_CELLS))
+    return kept
 
 
 def _xls(content: bytes, where: str, sheet: str | int | None) -> list[list[object]]:
@@ -72,7 +88,8 @@ def _xls(content: bytes, where: str, sheet: str | int | None) -> list[list[objec
     try:
         book: Any = xlrd.open_workbook(file_contents=content, logfile=io.StringIO())
         page = book.sheet_by_name(_sheet(book.sheet_names(), sheet, where))
-        return [[_xls_cell(cell, book.datemode) for cell in page.row(k)] for k in range(page.nrows)]
+        return _within(([_xls_cell(cell, book.datemode) for cell in page.row(k)]
+                        for k in range(page.nrows)), where)
     except (*FOREIGN_FAILURES, xlrd.XLRDError, xlrd.compdoc.CompDocError):
         raise errors.BadRecording(errors.damaged(where, NAMES["xls"])) from None
 
