@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pikanid import errors, units
+from pikanid import errors, units, units_quantity
 
 Hold = Literal["zero", "first"]
 Array = NDArray[np.float64]
@@ -29,7 +29,8 @@ class Channel:
         time: (N,) sample times [s].
         values: (N,) samples in `unit`; NaN where a sample is missing.
         unit: Unit text, ``""`` for dimensionless.
-        sigma: Standard deviation of the noise in `unit`: scalar, (N,), or None if unknown.
+        sigma: Standard deviation of the noise in `unit`: scalar, (N,), or None if unknown; on
+            making a channel also a text with a unit, such as ``"0.1deg"``.
         hold: How an input runs between samples, ``"zero"`` or ``"first"``; None leaves it to the
             model.
 
@@ -57,7 +58,13 @@ class Channel:
         object.__setattr__(self, "time", _frozen(self.time, self.name, "times"))
         object.__setattr__(self, "values", _frozen(self.values, self.name, "values"))
         if not isinstance(self.unit, units.Unread):
-            object.__setattr__(self, "unit", str(self.unit or "").strip())
+            given: object = self.unit
+            if not isinstance(given, str | None):
+                kind = type(given).__name__
+                raise errors.BadUnit(
+                    errors.not_of_kind(f"The unit of channel '{self.name}'", kind, "text")
+                )
+            object.__setattr__(self, "unit", (self.unit or "").strip())
             units.check(self.unit, f"channel '{self.name}'")
         if len(self.time) != len(self.values):
             raise errors.BadRecording(
@@ -69,6 +76,9 @@ class Channel:
             object.__setattr__(self, "sigma", self._checked_sigma(self.sigma))
 
     def _checked_sigma(self, sigma: ArrayLike) -> float | Array:
+        if isinstance(sigma, str):
+            where = f"sigma of '{self.name}'"
+            sigma = units_quantity.quantity(sigma, self.unit, where, difference=True)
         array = _numbers(sigma, self.name, "sigma")
         if array.shape not in ((), self.values.shape):
             raise errors.BadRecording(

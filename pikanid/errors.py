@@ -58,6 +58,13 @@ def _did_you_mean(close: Sequence[str]) -> str:
 # --- formulas ------------------------------------------------------------------------------------
 
 
+def no_model(kind: str) -> str:
+    return (
+        f"A model is needed, not a {kind}: give a Model (Model.load(path), Model.from_dict(...), "
+        "pikanid.systems); the model comes before the recordings."
+    )
+
+
 def bad_name(name: str, what: str) -> str:
     return f"'{name}' cannot name a {what}: use letters, digits and '_', starting with a letter."
 
@@ -189,6 +196,46 @@ def channel_name(name: object) -> str:
 
 def channel_twice(name: str, where: str) -> str:
     return f"'{where}' would have two channels called '{name}': rename one of them."
+
+
+def no_recording(kind: str) -> str:
+    return (
+        f"A recording is needed, not a {kind}: give a Recording, the path of its file, or a "
+        "DataFrame with a column or an index of times; a model comes before its recordings."
+    )
+
+
+def no_channel_table(kind: str) -> str:
+    return (
+        f"A recording is made of a dictionary: name -> Channel, not of a {kind}; see "
+        "Recording.from_arrays, Recording.from_frame and Recording.read."
+    )
+
+
+def detail_no_path(kind: str) -> str:
+    return f"the path of a file is needed, not a {kind}"
+
+
+def no_path(kind: str) -> str:
+    return f"The path of a file is needed, not a {kind}."
+
+
+def not_of_kind(what: str, kind: str, wanted: str) -> str:
+    return f"{what} must be {wanted}, not {kind}."
+
+
+def split_outside(where: str, at: float, begin: float, end: float) -> str:
+    return (
+        f"'{where}' cannot be split at {at:g} s, which leaves nothing on one side: it runs from "
+        f"{begin:g} s to {end:g} s."
+    )
+
+
+def outside_the_record(where: str, start: float, stop: float, begin: float, end: float) -> str:
+    return (
+        f"'{where}' has nothing from {start:g} s to {stop:g} s: it runs from {begin:g} s to "
+        f"{end:g} s."
+    )
 
 
 def no_channels(where: str) -> str:

@@ -21,6 +21,7 @@ import sympy as sp
 
 from pikanid import errors, model_units
 from pikanid.expressions import parse, symbol, to_real
+from pikanid.model_arguments import limits, number, parameters_of, table
 from pikanid.model_checks import check_types, validate
 from pikanid.model_lookup import Lookup
 from pikanid.model_parts import Input, Output, Parameter, Spline, State
@@ -116,6 +117,7 @@ class Model(Lookup):
 
     def with_parameters(self, *new: Parameter) -> Model:
         """Add parameters; one that exists already is replaced."""
+        parameters_of(new)
         old = {p.name: p for p in self.parameters}
         return self.replace(parameters=tuple({**old, **{p.name: p for p in new}}.values()))
 
@@ -146,7 +148,7 @@ class Model(Lookup):
 
         `model.substitute([Parameter("r", 0.0)], l="l*(1 + r*t)")` makes a parameter drift.
         """
-        model = self.with_parameters(*parameters)
+        model = self.with_parameters(*parameters_of(parameters))
         swap = {}
         for name, text in formulas.items():
             if name not in model.symbols:
@@ -190,27 +192,32 @@ class Model(Lookup):
             model = model.replace(states=tuple(new if s.name == name else s for s in model.states))
         return model
 
-    def fix(self, *names: str, **values: float) -> Model:
-        """Hold parameters fixed, at their present values or at the given ones."""
+    def fix(self, *names: str, **values: float | str) -> Model:
+        """Hold parameters fixed, at their present values or at the given ones ("50 mm", too)."""
         changes = {n: self.parameter(n).value for n in names} | values
-        return self._change({n: {"value": float(v), "free": False} for n, v in changes.items()})
+        return self._change({n: {"value": number(self, n, v), "free": False}
+                             for n, v in changes.items()})
 
-    def free(self, *names: str, **guesses: float) -> Model:
+    def free(self, *names: str, **guesses: float | str) -> Model:
         """Estimate parameters, from their present values or from the given guesses."""
         changes = {n: self.parameter(n).value for n in names} | guesses
-        return self._change({n: {"value": float(v), "free": True} for n, v in changes.items()})
+        return self._change({n: {"value": number(self, n, v), "free": True}
+                             for n, v in changes.items()})
 
-    def with_values(self, values: Mapping[str, float] | None = None, **more: float) -> Model:
+    def with_values(self, values: Mapping[str, float | str] | None = None,
+                    **more: float | str) -> Model:
         """Set guesses (free) and values (fixed) without changing which are estimated."""
-        return self._change({n: {"value": float(v)} for n, v in {**(values or {}), **more}.items()})
+        return self._change({n: {"value": number(self, n, v)}
+                             for n, v in {**table(values), **more}.items()})
 
-    def with_bounds(self, **bounds: tuple[float, float]) -> Model:
+    def with_bounds(self, **bounds: tuple[float | str, float | str]) -> Model:
         """Set the bounds of parameters."""
-        return self._change({n: {"bounds": (float(b[0]), float(b[1]))} for n, b in bounds.items()})
+        return self._change({n: {"bounds": limits(self, n, b)} for n, b in bounds.items()})
 
     def per_recording(self, *names: str) -> Model:
         """Give every recording of a joint fit its own value of these parameters."""
-        return self._change({n: {"scope": "recording"} for n in names})
+        known = [self.parameter(n).name for n in names]
+        return self._change({n: {"scope": "recording"} for n in known})
 
     def _change(self, changes: Mapping[str, Mapping[str, Any]]) -> Model:
         for name in changes:

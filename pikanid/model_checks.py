@@ -27,6 +27,9 @@ MAX_DEGREE = 20  # of a spline
 
 def find(items: Iterable[Any], name: str, what: str) -> Any:
     """The item of that name; a `BadModel` that lists the names if there is none."""
+    if not isinstance(name, str):
+        raise errors.BadModel(errors.not_of_kind(
+            f"The name of the {what}", type(name).__name__, "text"))
     names = []
     for item in items:
         if item.name == name:

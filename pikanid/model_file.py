@@ -60,6 +60,8 @@ def save(model: Model, path: str | os.PathLike[str]) -> None:
     """Write a model file; an existing one is replaced only once the new one is complete."""
     import tomli_w
 
+    if not isinstance(path, str | os.PathLike):
+        raise errors.BadModel(errors.no_path(type(path).__name__))
     atomically(Path(path), tomli_w.dumps(to_dict(model)).encode())
 
 
@@ -71,7 +73,8 @@ def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
     pikanid.errors.BadModel : anything in it is of another type, unknown or inconsistent
     """
     if not isinstance(content, Mapping):
-        raise errors.BadModel(errors.bad_value(f"The model '{source}'", content, "a table"))
+        raise errors.BadModel(errors.not_of_kind(
+            f"The model '{source}'", type(content).__name__, "a table"))
     _known_keys(content, SECTIONS, source, "the file")
     tables = {section: _table(content, section, source) for section in KEYS}
     equations = content.get("equations", {})
@@ -163,8 +166,8 @@ def _drop(entry: dict[str, Any]) -> dict[str, Any]:
 def _known_keys(table: Mapping[str, Any], known: tuple[str, ...], source: str, where: str) -> None:
     for key in table:
         if key not in known:
-            close = difflib.get_close_matches(key, known, 1)
-            raise errors.BadModel(errors.model_file_key(source, where, key, close or known))
+            close = difflib.get_close_matches(str(key), known, 1)
+            raise errors.BadModel(errors.model_file_key(source, where, str(key), close or known))
 
 
 def _table(content: Mapping[str, Any], name: str, source: str) -> dict[str, Mapping[str, Any]]:

@@ -17,6 +17,7 @@ from pikanid import errors
 from pikanid.evaluated import InitialState, delays, initial_state, paths
 from pikanid.held import HeldInput, PiecewiseInput, acting
 from pikanid.model import Input, Model, Output
+from pikanid.problem_arguments import a_model, several
 from pikanid.recording import Recording
 
 
@@ -127,7 +128,7 @@ class Problem:
     Parameters
     ----------
     model : the model
-    recordings : one recording or several
+    recordings : one recording or several; a DataFrame or the path of a file stands for one
     need_outputs : whether the recordings must hold the model's outputs (False to simulate only)
 
     Raises
@@ -138,11 +139,8 @@ class Problem:
 
     def __init__(self, model: Model, recordings: Recording | Sequence[Recording],
                  need_outputs: bool = True):
-        self.model = model
-        self.recordings = (
-            (recordings,) if isinstance(recordings, Recording) else tuple(recordings))
-        if not self.recordings:
-            raise errors.BadRecording(errors.no_recordings())
+        self.model = a_model(model)
+        self.recordings = several(recordings)
         self.experiments = tuple(bind(model, r, need_outputs) for r in self.recordings)
         self.free = self._layout()
         if need_outputs:

@@ -13,13 +13,12 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pikanid import channel as channels_of
 from pikanid import errors
 from pikanid.channel import Array, Channel, Hold
-from pikanid.recording_operations import Operations
+from pikanid.recording_leaving import Leaving
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
 __all__ = ["Channel", "Hold", "Recording"]
 
 
-@dataclass(frozen=True, eq=False)
-class Recording(Operations):
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Leaving):
     """Signals measured together.
 
     Attributes:
@@ -49,7 +48,11 @@ class Recording(Operations):
     unreadable: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        channels = {name: replace(ch, name=name) for name, ch in dict(self.channels).items()}
+        given: object = self.channels
+        for made in [given, *(given.values() if isinstance(given, Mapping) else ())]:
+            if not isinstance(made, Mapping if made is given else Channel):
+                raise errors.BadRecording(errors.no_channel_table(type(made).__name__))
+        channels = {name: replace(ch, name=name) for name, ch in self.channels.items()}
         if not channels:
             raise errors.BadRecording(errors.no_channels(self.name))
         object.__setattr__(self, "channels", MappingProxyType(channels))
@@ -83,14 +86,18 @@ class Recording(Operations):
         >>> Recording.from_arrays([0, 1], {"u": [0, 1]}, hold={"u": "zero"})["u"].hold
         'zero'
         """
+        found: object = values
+        if not isinstance(found, Mapping):
+            kind, wanted = type(found).__name__, "a dictionary: channel -> samples"
+            raise errors.BadRecording(errors.not_of_kind("'values'", kind, wanted))
         for what, given in (("units", units), ("sigma", sigma), ("hold", hold)):
             for unknown in set(given or ()) - set(values):
                 raise errors.BadSetting(errors.unknown_channel_setting(what, unknown, values))
         made = {
             key: Channel(
                 key,
-                np.asarray(t),
-                np.asarray(y),
+                t,  # type: ignore[arg-type]  # made an array by Channel
+                y,  # type: ignore[arg-type]  # likewise
                 (units or {}).get(key, ""),
                 (sigma or {}).get(key),  # type: ignore[arg-type]  # checked by Channel
                 (hold or {}).get(key),
@@ -98,6 +105,44 @@ class Recording(Operations):
             for key, y in values.items()
         }
         return cls(made, name)
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: pd.DataFrame,
+        columns: Mapping[str, str | int] | None = None,
+        units: Mapping[str, str] | None = None,
+        sigma: Mapping[str, ArrayLike] | None = None,
+        name: str = "recording",
+    ) -> Recording:
+        """A recording of a DataFrame; its times are a column or an index called t or time.
+
+        Headers may carry units, as those of a file: ``"theta [deg]"``, ``"t [h]"``.  Dates count
+        in seconds from the first one.
+
+        Args:
+            frame: The table.
+            columns, units, sigma: As in `read`.
+            name: Of the recording.
+
+        Raises:
+            BadRecording: If there are no times, or a column cannot be used.
+
+        >>> import pandas as pd
+        >>> frame = pd.DataFrame({"t [min]": [0, 1], "theta [deg]": [1.0, 2.0]})
+        >>> Recording.from_frame(frame)
+        Recording 'recording': 0 s to 60 s
+          theta  [deg]  2 samples, every 60 s  1 to 2
+        """
+        from pikanid.reading import columns as made_of
+        from pikanid.reading import frame as frames
+
+        if not (hasattr(frame, "columns") and hasattr(frame, "index")):
+            raise errors.BadRecording(errors.no_recording(type(frame).__name__))
+        request = made_of.Request(columns or {}, None, units or {})
+        found = made_of.channels(frames.read(frame, name), request, name)
+        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable)
+        return rec.with_sigma(sigma) if sigma else rec
 
     @classmethod
     def read(
@@ -162,6 +207,8 @@ class Recording(Operations):
         """
         together: dict[str, Channel] = {}
         for rec in recordings:
+            if not isinstance(rec, Recording):
+                raise errors.BadRecording(errors.no_recording(type(rec).__name__))
             for key, ch in rec.channels.items():
                 if key in together:
                     raise errors.BadRecording(errors.channel_twice(key, rec.name))
@@ -176,6 +223,10 @@ class Recording(Operations):
     # --- looking ---------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Channel:
+        asked: object = name
+        if not isinstance(asked, str):
+            kind = type(asked).__name__
+            raise errors.BadRecording(errors.not_of_kind("The name of a channel", kind, "text"))
         if name in self.channels:
             return self.channels[name]
         if name in self.unreadable:
@@ -247,43 +298,3 @@ class Recording(Operations):
 
     def _with(self, channels: Mapping[str, Channel], *notes: str) -> Self:
         return replace(self, channels=channels, notes=(*self.notes, *notes))
-
-    # --- leaving ---------------------------------------------------------------------------------
-
-    def to_frame(self) -> pd.DataFrame:
-        """A DataFrame indexed by time; with several time bases, their union and NaN between.
-
-        >>> Recording.from_arrays([0, 1], {"y": [5, 6]}).to_frame()["y"].tolist()
-        [5.0, 6.0]
-        """
-        import pandas as pd
-
-        every = np.unique(np.concatenate([ch.time for ch in self.channels.values()]))
-        series = {key: pd.Series(ch.values, ch.time) for key, ch in self.channels.items()}
-        return pd.DataFrame(series, index=pd.Index(every, name="t"))
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write a ``.csv``, ``.csv.gz`` or ``.parquet`` file; see `pikanid.writing`."""
-        from pikanid import writing
-
-        writing.write(self.channels, path)
-
-    def __repr__(self) -> str:
-        rows = [channels_of.summary(ch) for ch in self.channels.values()]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = [f"Recording '{self.name}': {self.start:g} s to {self.stop:g} s"]
-        for row in rows:
-            cells = (part.ljust(width) for part, width in zip(row, widths, strict=True))
-            lines.append("  " + "  ".join(cells).rstrip())
-        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
-
-    def _repr_html_(self) -> str:
-        from html import escape
-
-        rows = "".join(
-            "<tr>"
-            + "".join(f"<td>{escape(part)}</td>" for part in channels_of.summary(ch))
-            + "</tr>"
-            for ch in self.channels.values()
-        )
-        return f"<table><caption>{escape(self.name)}</caption>{rows}</table>"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from numbers import Real
 from typing import Any, Self
 
 from numpy.typing import ArrayLike
@@ -43,24 +45,39 @@ class Operations(ABC):
     def window(self, start: float | None = None, stop: float | None = None) -> Self:
         """The part with start <= t <= stop; times stay as they are.
 
+        Raises:
+            BadRecording: If nothing was recorded between them.
+            BadSetting: If one of them is no number.
+
         >>> from pikanid import Recording
         >>> rec = Recording.from_arrays([0, 1, 2, 3], {"y": [0, 1, 2, 3]})
         >>> rec.window(1, 2)["y"].values.tolist()
         [1.0, 2.0]
         """
-        a = self.start if start is None else start
-        b = self.stop if stop is None else stop
+        a = self.start if start is None else _real(start, "The start of a window")
+        b = self.stop if stop is None else _real(stop, "The end of a window")
         cut = {key: resampling.window(ch, a, b) for key, ch in self.channels.items()}
+        if not any(map(len, cut.values())):
+            raise errors.BadRecording(
+                errors.outside_the_record(self.name, a, b, self.start, self.stop)
+            )
         return self._with(cut)
 
     def split(self, at: float) -> tuple[Self, Self]:
         """The part with t < at, and the part with t >= at.
+
+        Raises:
+            BadRecording: If one of them would be empty.
+            BadSetting: If `at` is no number.
 
         >>> from pikanid import Recording
         >>> a, b = Recording.from_arrays([0, 1, 2, 3], {"y": [0, 1, 2, 3]}).split(2)
         >>> a.t.tolist(), b.t.tolist()
         ([0.0, 1.0], [2.0, 3.0])
         """
+        at = _real(at, "The time of a split")
+        if not self.start < at <= self.stop:
+            raise errors.BadRecording(errors.split_outside(self.name, at, self.start, self.stop))
         before = {
             key: resampling.window(ch, self.start, at, closed=False)
             for key, ch in self.channels.items()
@@ -88,7 +105,8 @@ class Operations(ABC):
         >>> rec.decimate(2)["y"].values.tolist()
         [0.0, 2.0, 4.0]
         """
-        if n != int(n) or n < 1:
+        count = _real(n, "The stride")
+        if not count.is_integer() or count < 1:
             raise errors.BadSetting(errors.bad_stride(n))
         thin, notes = dict(self.channels), []
         for key in self.names if channels is None else channels:
@@ -111,6 +129,7 @@ class Operations(ABC):
         >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).rename({"y": "theta"}).names
         ('theta',)
         """
+        _mapping(names, "What is renamed", "a dictionary: old name -> new name")
         for old in names:
             self[old]
         renamed = [names.get(key, key) for key in self.names]
@@ -127,6 +146,11 @@ class Operations(ABC):
         >>> rec.with_channels(Channel("u", [0, 1], [1, 1])).names
         ('y', 'u')
         """
+        for ch in channels:
+            if not isinstance(ch, Channel):
+                raise errors.BadRecording(
+                    errors.not_of_kind("What is added", type(ch).__name__, "a Channel")
+                )
         return self._with({**self.channels, **{ch.name: ch for ch in channels}})
 
     def with_channel(self, channel: Channel) -> Self:
@@ -147,12 +171,16 @@ class Operations(ABC):
     def with_sigma(
         self, sigma: Mapping[str, Any] | None = None, /, **more: ArrayLike | None
     ) -> Self:
-        """With noise standard deviations, in the channels' own units; None takes one away.
+        """With noise standard deviations; None takes one away.
+
+        Numbers are in the channels' own units, texts may carry one: ``"0.1deg"``.
 
         >>> from pikanid import Recording
         >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).with_sigma(y=0.1)["y"].sigma
         0.1
         """
+        if sigma is not None:
+            _mapping(sigma, "The noise", "a dictionary: channel -> standard deviation")
         given = {**(sigma or {}), **more}
         return self.with_channels(*(replace(self[k], sigma=s) for k, s in given.items()))
 
@@ -163,7 +191,8 @@ class Operations(ABC):
         >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).with_unit("y", "mm")["y"].unit
         'mm'
         """
-        return self.with_channels(replace(self[name], unit=units.parse(unit)))
+        ch = replace(self[name], unit=unit)  # checks it
+        return self.with_channels(replace(ch, unit=units.parse(ch.unit)))
 
     def with_hold(self, **hold: Hold) -> Self:
         """With the hold of inputs declared.
@@ -181,4 +210,17 @@ class Operations(ABC):
         >>> Recording.from_arrays([0, 1], {"y": [0, 1]}).shift("y", 0.5)["y"].time.tolist()
         [0.5, 1.5]
         """
-        return self.with_channels(replace(self[name], time=self[name].time + seconds))
+        late = _real(seconds, "The shift")
+        return self.with_channels(replace(self[name], time=self[name].time + late))
+
+
+def _real(value: object, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        shown = repr(value) if isinstance(value, float) else type(value).__name__
+        raise errors.BadSetting(errors.not_of_kind(what, shown, "a finite number"))
+    return float(value)
+
+
+def _mapping(value: object, what: str, wanted: str) -> None:
+    if not isinstance(value, Mapping):
+        raise errors.BadSetting(errors.not_of_kind(what, type(value).__name__, wanted))

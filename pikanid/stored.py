@@ -50,6 +50,8 @@ def file_bytes(path: str | os.PathLike[str], wrong: Wrong, most: int | None = No
     Raises:
         PikanidError: If it is missing, no regular file (a pipe may never end), or too large.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise wrong(errors.detail_no_path(type(path).__name__))
     try:
         with open(path, "rb", opener=_without_waiting) as file:
             about = os.fstat(file.fileno())

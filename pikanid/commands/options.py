@@ -4,9 +4,7 @@ units, places to write to.
 
 from __future__ import annotations
 
-import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -41,8 +39,6 @@ Rate = Annotated[float, typer.Option(
     "--rate", metavar="HZ", help="sampling rate of a built-in excitation")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")]
 
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
-
 
 def assignments(option: str, texts: Sequence[str], example: str) -> dict[str, str]:
     """NAME=VALUE texts as a dictionary.
@@ -65,37 +61,14 @@ def assignments(option: str, texts: Sequence[str], example: str) -> dict[str, st
 
 
 def quantity(text: str, unit: str, where: str, difference: bool = False) -> float:
-    """A number in `unit`; a unit written behind it is converted, none means `unit` itself.
-
-    Args:
-        text: Such as ``"0.1deg"``, ``"45 mm"``, ``"1e-3"``.
-        unit: Wanted.
-        where: Named in messages.
-        difference: Whether it is a difference, as a standard deviation is: a sigma of 1 degC is
-            one of 1 K.
-
-    Raises:
-        BadSetting: If the text does not start with a finite number.
-        BadUnit: If its unit is unknown or of another kind.
+    """A number in `unit`, as `pikanid.units_quantity.quantity` reads it.
 
     >>> quantity("45 mm", "m", "l_theta")
     0.045
     """
-    match = _QUANTITY.fullmatch(text)
-    if match is None or not math.isfinite(float(match[1])):
-        raise errors.BadSetting(errors.not_a_quantity(text, where))
-    value, given = float(match[1]), match[2]
-    if not given:
-        return value
-    from pikanid import units
+    from pikanid import units_quantity
 
-    given = f"1{given}" if given.startswith("/") else given  # 0.3/h
-    units.check(given, where)
-    if not units.convertible(given, unit):
-        raise errors.BadUnit(errors.units_differ(given, unit, where))
-    if difference:
-        return value * units.factor(given, unit)
-    return float(units.convert(value, given, unit))
+    return units_quantity.quantity(text, unit, where, difference)
 
 
 def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),

@@ -22,6 +22,7 @@ from pikanid.discrepancy.result import Discrepancy
 from pikanid.estimate import Estimate, total_cost
 from pikanid.model import Input, Model, Parameter, State
 from pikanid.problem import Problem
+from pikanid.problem_arguments import a_model
 from pikanid.recording import Recording
 from pikanid.strategies.finish import evaluate
 from pikanid.strategies.nls import NLS
@@ -79,7 +80,7 @@ def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], e
     ['theta']
     """
     begun = time.perf_counter()
-    model.state(equation)
+    a_model(model).state(equation)
     if not grid or any(not isinstance(g, int | np.integer) or g < 4 for g in grid) or list(
             grid) != sorted(set(grid)):
         raise errors.BadSetting(errors.bad_value("grid", grid, "rising numbers from 4 on"))

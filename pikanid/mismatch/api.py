@@ -40,6 +40,7 @@ from pikanid.mismatch.site import Site, sites
 from pikanid.mismatch.symbols import symbolic_candidates
 from pikanid.mismatch.verdict import Answer, settle, with_formulas
 from pikanid.model import Model
+from pikanid.problem_arguments import a_model, several
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
@@ -96,11 +97,11 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         raise errors.BadSetting(errors.bad_value("alpha", alpha, "between 0 and 1"))
     if workers is not None and workers < 1:
         raise errors.BadSetting(errors.bad_value("workers", workers, "at least 1"))
-    if not model.free_names:
+    if not a_model(model).free_names:
         raise errors.BadModel(errors.nothing_free(model.name))
-    later = None if held_out is None else _several(held_out)
+    later = None if held_out is None else several(held_out)
     with blas_on_one_thread():
-        found = _diagnosed(model, _several(train), later, alpha, quiet, tell, threads(workers))
+        found = _diagnosed(model, several(train), later, alpha, quiet, tell, threads(workers))
     return replace(found, seconds=time.perf_counter() - begun)
 
 
@@ -161,10 +162,6 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
 def _settled(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
     return settle(ranked, case.search.scale(), case.test, case.predicted, case.later is not None,
                   case.proves, case.ahead, alpha)
-
-
-def _several(recordings: Recordings) -> tuple[Recording, ...]:
-    return (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
 
 
 def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,

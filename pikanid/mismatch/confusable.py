@@ -23,6 +23,7 @@ from pikanid.mismatch.seen import Sigma
 from pikanid.mismatch.site import sites
 from pikanid.mismatch.sizing import Sized, recorded, sized
 from pikanid.model import Model
+from pikanid.problem_arguments import a_model, one_recording
 from pikanid.recording import Recording
 
 DETECTED, SEPARATED = 5.0, 4.0  # [σ] from the nominal model, from the best rival
@@ -151,7 +152,7 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
     """
     if not SEPARATED < strength < inf:
         raise errors.BadSetting(errors.bad_value("strength", strength, f"above {SEPARATED:g}"))
-    nothing = recorded(model, excitation, sigma)
+    nothing = recorded(a_model(model), one_recording(excitation), sigma)
     catalogue = tuple(c for c in catalogue_of(sites(model, nothing.recordings))
                       if c.known and c.fits and c.suits())
     base = fitted(model, (), nothing, [{}], len(catalogue))

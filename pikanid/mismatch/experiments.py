@@ -30,6 +30,7 @@ from pikanid.mismatch.profiles import Bounds, profiles, scaled
 from pikanid.mismatch.seen import Seen, Sigma, Watch, joined, natural_frequency
 from pikanid.mismatch.separation import distance, mean_precision, refitted_within
 from pikanid.model import Model
+from pikanid.problem_arguments import a_model, several
 from pikanid.recording import Recording
 
 if TYPE_CHECKING:
@@ -140,10 +141,13 @@ def next_experiment(
     >>> len(chosen.profile.t), chosen.value > 4
     (2001, True)
     """
+    if not isinstance(hypotheses, Mapping):
+        raise errors.BadSetting(errors.not_of_kind(
+            "'hypotheses'", type(hypotheses).__name__, "a dictionary: name -> model"))
     if len(hypotheses) < 2:
         raise errors.BadSetting(errors.too_few_hypotheses(len(hypotheses)))
-    past = [recorded] if isinstance(recorded, Recording) else list(recorded)
-    models = dict(hypotheses)
+    past = [] if isinstance(recorded, Sequence) and not recorded else list(several(recorded))
+    models = {str(name): a_model(model) for name, model in hypotheses.items()}
     watch = Watch(models, sigma, workers)
     known = watch.seen(past)
 
@@ -179,9 +183,9 @@ def d_optimal(
     >>> chosen.profile["u_x"].values.max(), float(f"{chosen.std['l_theta']:.2e}")
     (np.float64(1.0), 9.89e-06)
     """
-    if not model.free_names:
+    if not a_model(model).free_names:
         raise errors.BadSetting(errors.nothing_to_learn(model.name))
-    past = [recorded] if isinstance(recorded, Recording) else list(recorded)
+    past = [] if isinstance(recorded, Sequence) and not recorded else list(several(recorded))
     models = {model.name: model}
     watch = Watch(models, sigma)
     known = watch.seen(past)

@@ -43,6 +43,8 @@ def kind_and_content(path: str | os.PathLike[str]) -> tuple[str, bytes, str]:
         BadRecording: If it is missing, a directory, empty, unreadable, of unknown ending, or
             something else than its ending says.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise errors.BadRecording(errors.no_path(type(path).__name__))
     file = Path(path)
     where = file.name or str(path)
     try:

@@ -6,15 +6,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pikanid import errors
+from pikanid import errors, units_quantity
 from pikanid.model import Model
 from pikanid.problem import bind
+from pikanid.problem_arguments import a_model, one_recording
 from pikanid.recording import Channel, Recording
 from pikanid.simulation.simulator import MethodChoice, Simulator
 
 
-def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str, float] = 0.0,
-             seed: int | None = None, t: np.ndarray | None = None,
+def simulate(model: Model, excitation: Recording, *,
+             sigma: float | str | Mapping[str, float | str] = 0.0, seed: int | None = None,
+             t: np.ndarray | None = None,
              parameters: Mapping[str, float] | None = None, tolerance: float | None = None,
              method: MethodChoice = "auto") -> Recording:
     """Simulate a model and return what would be recorded.
@@ -24,7 +26,7 @@ def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str,
     model : the model, at its guesses and fixed values
     excitation : a recording that holds the model's inputs
     sigma : standard deviation of added white Gaussian noise, in the outputs' units; one for all
-        outputs or one by name.  It is stored with the channels.
+        outputs or one by name, or a text with a unit ("0.1deg").  It is stored with the channels.
     seed : of the noise
     t : times of the outputs (N,); default: the time base of the excitation
     parameters : values that differ from the model's
@@ -44,7 +46,7 @@ def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str,
     >>> round(float(abs(rec["theta"].values).max()), 4)
     0.1979
     """
-    model = model.with_values(parameters or {})
+    model, excitation = a_model(model).with_values(parameters or {}), one_recording(excitation)
     times = np.asarray(excitation.t if t is None else t, dtype=float)
     ramp = np.linspace(0.0, 1.0, len(times))  # only the times of a placeholder mean something
     wanted = excitation.with_channels(
@@ -61,7 +63,9 @@ def simulate(model: Model, excitation: Recording, *, sigma: float | Mapping[str,
     rng = np.random.default_rng(seed)
     channels = []
     for o, y in zip(model.outputs, response.y.reshape(len(model.outputs), -1), strict=True):
-        s = sigma if isinstance(sigma, int | float) else sigma.get(o.name, 0.0)
+        s = sigma.get(o.name, 0.0) if isinstance(sigma, Mapping) else sigma
+        if isinstance(s, str):
+            s = units_quantity.quantity(s, o.unit, f"sigma of '{o.name}'", difference=True)
         noisy = y + rng.normal(0.0, s, len(y)) if s > 0 else y
         channels.append(Channel(o.name, times, noisy, o.unit, s if s > 0 else None))
     return excitation.with_channels(*channels)
