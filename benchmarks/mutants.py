@@ -16,6 +16,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -160,20 +161,34 @@ def again(jobs: int, pattern: str = "*", tests: Sequence[str] = ()) -> None:
         for data, name, code in pool.map(once, alive):
             print(f"{code:4d}  {name}", flush=True)
             data.load()
-            data.exit_code_by_key[name] = 33 if code == 5 else code
+            data.exit_code_by_key[name] = 33 if code in (4, 5) else code
             data.save()
 
 
 def _in_a_process(name: str, tests: Sequence[str]) -> int:
+    """The exit code of pytest; a test that fails without the mutant, too, kills nothing."""
     if not tests:
         return 5
+    code, failed = _tested(name, tests)
+    while code == 1 and failed and _tested("", failed[-1:])[0] != 0:
+        code, more = _tested(name, tests, failed)
+        failed = [*failed, *more]
+    return code
+
+
+def _tested(name: str, tests: Sequence[str], without: Sequence[str] = ()
+            ) -> tuple[int, list[str]]:
+    """pytest's exit code with a mutant, or without any, and the test that failed."""
     environment = os.environ | {
         "MUTANT_UNDER_TEST": name, "PYTHONPATH": f"{MUTANTS}{os.pathsep}{ROOT / 'benchmarks'}",
-        "PY_IGNORE_IMPORTMISMATCH": "1", "MUTANTS_BUDGET": os.environ.get("MUTANTS_BUDGET", "60")}
-    words = [sys.executable, "-m", "pytest", "--rootdir=.", "-x", "-q", "--tb=no",
-             "-p", "mutants_session", "-p", "no:cacheprovider", *tests]
-    return subprocess.run(words, cwd=MUTANTS, env=environment, stdout=subprocess.DEVNULL,
-                          stderr=subprocess.DEVNULL, check=False).returncode
+        "PY_IGNORE_IMPORTMISMATCH": "1", "MUTANTS_BUDGET": os.environ.get("MUTANTS_BUDGET", "25")}
+    words = [sys.executable, "-m", "pytest", "--rootdir=.", "-x", "-q", "--tb=no", "-rfE",
+             "-p", "mutants_session", "-p", "no:cacheprovider", *tests,
+             *(f"--deselect={test}" for test in without)]
+    done = subprocess.run(words, cwd=MUTANTS, env=environment, capture_output=True, text=True,
+                          check=False)
+    return done.returncode, re.findall(
+        r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, re.MULTILINE)
 
 
 def change(data: Any, name: str) -> str:
