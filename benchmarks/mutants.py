@@ -34,7 +34,7 @@ WORK, MUTANTS = ROOT / "build" / "mutants", ROOT / "mutants"
 REASONS = ROOT / "benchmarks" / "mutants_survivors.toml"
 SEED = 1
 # Share of each room's mutations; "objective" is what builds residuals and judges them.
-SHARES = {"discrepancy": 0.021, "equivalence": 0.028, "mismatch": 0.0095, "noise": 0.05,
+SHARES = {"discrepancy": 0.021, "equivalence": 0.012, "mismatch": 0.0095, "noise": 0.05,
           "objective": 0.035, "optimise": 0.021, "simulation": 0.016, "symbolic": 0.018,
           "uncertainty": 0.065}
 OBJECTIVE = ("adequacy.py", "functional*.py", "held*.py", "problem.py", "shooting.py")
