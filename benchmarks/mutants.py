@@ -155,7 +155,8 @@ def again(jobs: int, pattern: str = "*", tests: Sequence[str] = ()) -> None:
 
     def once(found: tuple[Any, str]) -> tuple[Any, str, int]:
         data, name = found
-        return data, name, _in_a_process(name, tests or sorted(tests_for_mutant_names([name])))
+        return data, name, _in_a_process(
+            name, tests or sorted(tests_for_mutant_names([name])) or named_after(name))
 
     with ThreadPoolExecutor(jobs) as pool:
         for data, name, code in pool.map(once, alive):
@@ -163,6 +164,13 @@ def again(jobs: int, pattern: str = "*", tests: Sequence[str] = ()) -> None:
             data.load()
             data.exit_code_by_key[name] = 33 if code in (4, 5) else code
             data.save()
+
+
+def named_after(name: str) -> list[str]:
+    """The test file that is named after a mutant's module, or its room."""
+    modules = name.partition(".x")[0].split(".")[:0:-1]
+    files = [f"tests/test_{module}.py" for module in modules]
+    return [f for f in files if (MUTANTS / f).exists()][:1]
 
 
 def _in_a_process(name: str, tests: Sequence[str]) -> int:
