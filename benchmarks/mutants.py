@@ -151,7 +151,8 @@ def again(jobs: int, pattern: str = "*", tests: Sequence[str] = ()) -> None:
     load_stats()
     copy_also_copy_files()
     alive = [(data, name) for data, name, verdict in verdicts()
-             if verdict in ("survived", "no tests", "timeout") and fnmatch(name, pattern)]
+             if verdict in ("survived", "no tests", "timeout", "not checked")
+             and fnmatch(name, pattern)]
 
     def once(found: tuple[Any, str]) -> tuple[Any, str, int]:
         data, name = found
