@@ -103,10 +103,8 @@ def test_integration_errors_are_a_stated_share_of_the_noise(accuracy: str) -> No
     allowed = 0.01 * 0.05 / np.sqrt(31) * (1 if accuracy == "fine" else 10)
     for r, response in enumerate(shooting.responses(stiff)):
         error = np.abs(response.y - stiff[r] * np.exp(-stiff[2] * T)).max()
-        assert error < 1.5 * allowed
-        assert shooting.steps[r].error <= allowed
-        # not a hundred times better either: that would be paid for in every fit
-        assert shooting.steps[r].error > allowed / 100
+        # not a thousand times better either: that would be paid for in every fit
+        assert allowed / 1000 < error < 1.5 * allowed
 
 
 def test_what_cannot_be_simulated_is_a_bad_step() -> None:
