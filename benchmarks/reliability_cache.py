@@ -165,8 +165,9 @@ def _damages(number: int, rng: np.random.Generator) -> list[Damaged]:
     assert folder is not None
     titles = {"tape": ("object_",), "function": ("play_", "follow_", "tabulate_"),
               "source": ("model_",), "model": ("integrate_",)}
-    entries = {kind: sorted(p for p in folder.iterdir() if p.name.startswith(titles[kind]))
-               for kind in uses}
+    # The integrator of tapes stays in memory: its entry would not be used again in this process.
+    entries = {kind: sorted(p for p in folder.iterdir() if p.name.startswith(titles[kind])
+                            and not p.name.startswith("integrate_tape_")) for kind in uses}
     found = []
     kinds = list(SHARES)
     for _ in range(number):

@@ -34,12 +34,17 @@ HOW = {
 
 def main(folder: str) -> None:
     """Run what is missing and write the page, atomically."""
-    damages = [d for seed in reliability_cache.SEEDS for d in kept("reliability_cache", str(seed))]
+    by_seed = {seed: kept("reliability_cache", str(seed)) for seed in reliability_cache.SEEDS}
+    damages = [d for found in by_seed.values() for d in found]
+    counts = ", ".join(f"{seed}: {len(found)} damages" for seed, found in by_seed.items())
     kills = [k for name in reliability_kills.KILLS for k in kept("reliability_kills", name)]
-    parts = ["# Reliability", *cache_part(damages), *kills_part(kills), "## Settings", (
+    wanted = len(by_seed) * reliability_cache.DAMAGES, sum(reliability_kills.KILLS.values())
+    made = len(damages), sum(not k["ended"] for k in kills)
+    short = [] if made[0] >= wanted[0] and made[1] >= wanted[1] else [
+        f"Cut short: {made[0]} of {wanted[0]} damages, {made[1]} of {wanted[1]} kills."]
+    parts = ["# Reliability", *short, *cache_part(damages), *kills_part(kills), "## Settings", (
         "Written by `benchmarks/report_reliability.py` from `reliability_cache.py` (seeds "
-        f"{', '.join(map(str, reliability_cache.SEEDS))}, {reliability_cache.DAMAGES} damages "
-        f"each) and `reliability_kills.py` (seed {reliability_kills.SEED}). {provenance()}; "
+        f"{counts}) and `reliability_kills.py` (seed {reliability_kills.SEED}). {provenance()}; "
         f"numba {version('numba')}, llvmlite {version('llvmlite')}.")]
     Path(folder).mkdir(parents=True, exist_ok=True)
     atomically(Path(folder) / "reliability.md", ("\n\n".join(parts) + "\n").encode())
@@ -83,7 +88,8 @@ def kills_part(kills: Sequence[dict[str, Any]]) -> list[str]:
         span = f"{min(after):.1f} to {max(after):.1f}" if after else ""
         rows.append([f"`{name}`: {HOW[name]}", str(len(own)), span,
                      str(sum(bool(k["wrong"]) for k in own)),
-                     "yes" if ends and not any(k["wrong"] for k in ends) else "**no**"])
+                     "not run" if not ends else
+                     "**no**" if any(k["wrong"] for k in ends) else "yes"])
     number = sum(not k["ended"] for k in kills)
     strays = sum(k["strays"] for k in kills if k["command"].endswith("to its end"))
     wrong = [f"- `{k['command']}` after {k['after']:.2f} s: {'; '.join(k['wrong'])}"
@@ -92,9 +98,9 @@ def kills_part(kills: Sequence[dict[str, Any]]) -> list[str]:
         f"{number} kills (SIGKILL) at random moments, about every second one within the last tenth "
         "of the run, where files are written. After each: every file whole, the outputs of a "
         "command all there or none, no worker left after 10 s, no secret of `conceal` readable by "
-        "others or among its recordings. In the end the same command succeeds, and `conceal` has "
-        "gone on from what was finished and left no unfinished set. Hidden files on their way to "
-        f"their names that kills left behind: {strays}."),
+        "others or among its recordings. In the end the same command is to succeed, and `conceal` "
+        "to have gone on from what was finished and left no unfinished set. Hidden files on their "
+        f"way to their names that kills left behind: {strays}."),
         table(["command", "kills", "after [s]", "with something wrong", "succeeds in the end"],
               rows), *(["What was wrong:", "\n".join(wrong)] if wrong else [])]
 
