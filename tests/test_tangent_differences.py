@@ -243,3 +243,16 @@ def test_steps_are_as_fine_in_millimetres_as_in_metres() -> None:
         one.at(theta)
     assert watched[0].steps is not None and watched[1].steps is not None
     assert watched[0].steps.longest == watched[1].steps.longest
+
+
+@pytest.mark.parametrize("model", [oscillator(), chain(), pk.systems.sloshing_2d()],
+                         ids=["one", "chain", "two"])
+def test_every_effect_has_the_units_of_its_equation(model: pk.Model) -> None:
+    """Also beside outputs in millimetres and volts, inputs in newtons and a spare channel."""
+    t = np.arange(100) * STEP
+    drives = {i.name: i.unit for i in model.inputs if i.default is None}
+    recording = pk.Recording.from_arrays(
+        t, {name: np.sin(5 * t) for name in (*drives, *model.output_names, "spare")},
+        {**drives, **{o.name: o.unit for o in model.outputs}, "spare": "K"})
+    for candidate in candidates(sites(model, (recording,))):
+        assert candidate.applied(model).states

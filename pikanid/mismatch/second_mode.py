@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 
+from pikanid import units
 from pikanid.expressions import symbol
 from pikanid.mismatch.candidate import Candidate, Sign, View
 from pikanid.mismatch.site import Site
@@ -18,7 +19,9 @@ def second_mode(site: Site) -> list[Candidate]:
     if not site.inputs or not site.rate:
         return []
     u = site.inputs[0]
-    a = Parameter(site.name("a_2"), 0.0, "")
+    drive, shown = site.model.input(u).unit, site.output.unit
+    gain = units.product((shown, 1), ("s", -2), (drive, -1)) if drive and shown else ""
+    a = Parameter(site.name("a_2"), 0.0, gain)
     w2 = Parameter(site.name("omega_2"), 2 * site.rate, "rad/s",
                    (0.3 * site.rate, 12 * site.rate))
     z2 = Parameter(site.name("zeta_2"), 0.02, "", (0.0, 1.0))
