@@ -172,17 +172,17 @@ class Problem:
     @property
     def guess(self) -> np.ndarray:
         """θ at the model's guesses (n_free,)."""
-        return np.array([f.guess for f in self.free])
+        return np.array([f.guess for f in self.free], float)
 
     @property
     def lower(self) -> np.ndarray:
         """Lower bounds of θ."""
-        return np.array([f.bounds[0] for f in self.free])
+        return np.array([f.bounds[0] for f in self.free], float)
 
     @property
     def upper(self) -> np.ndarray:
         """Upper bounds of θ."""
-        return np.array([f.bounds[1] for f in self.free])
+        return np.array([f.bounds[1] for f in self.free], float)
 
     def columns(self, r: int) -> tuple[np.ndarray, np.ndarray]:
         """Positions in p and in θ of the parameters that recording r is estimated with."""

@@ -213,3 +213,13 @@ def test_excitation_alone_binds_without_outputs() -> None:
     e = bind(systems.sloshing(), excitation.two_pulse(), need_outputs=False)
     assert e.samples == ()
     assert (e.t0, e.t1) == (0.0, 5.0)
+
+
+def test_whole_numbers_as_bounds_and_guesses_are_numbers_like_any() -> None:
+    model = Model.from_dict({
+        "name": "whole", "states": {"x": {"unit": "m"}}, "equations": {"x": "-k*x"},
+        "parameters": {"k": {"guess": 2, "bounds": [0, 100]}},
+        "outputs": {"x": {"unit": "m", "expression": "x"}}})
+    t = np.arange(9) * 0.1
+    problem = Problem(model, Recording.from_arrays(t, {"x": np.exp(-t)}, {"x": "m"}))
+    assert {a.dtype for a in (problem.guess, problem.lower, problem.upper)} == {np.dtype(float)}
