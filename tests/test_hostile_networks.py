@@ -16,7 +16,8 @@ torch = pytest.importorskip("torch", reason="needs the `kan` extra")
 pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 
 from pikanid.approximators.kan import ShallowKAN, build_kan, load, save  # noqa: E402
-from pikanid.approximators.kan.state import from_content, from_state  # noqa: E402
+from pikanid.approximators.kan.build import from_state  # noqa: E402
+from pikanid.approximators.kan.file import from_content  # noqa: E402
 
 pytestmark = pytest.mark.kan
 __all__ = ["nothing_evaluated"]

@@ -15,7 +15,7 @@ torch = pytest.importorskip("torch", reason="needs the `kan` extra")
 pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 
 from pikanid.approximators.kan import DeepKAN, build_kan  # noqa: E402
-from pikanid.approximators.kan.build import write  # noqa: E402
+from pikanid.approximators.kan.tensors import write  # noqa: E402
 
 pytestmark = pytest.mark.kan
 

@@ -10,7 +10,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the `kan` extra")
 pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 
-from pikanid.approximators.kan.build import build_kan, write  # noqa: E402
+from pikanid.approximators.kan.build import build_kan  # noqa: E402
 from pikanid.approximators.kan.deep import DeepKAN  # noqa: E402
 from pikanid.approximators.kan.edges import (  # noqa: E402
     arguments,
@@ -19,6 +19,7 @@ from pikanid.approximators.kan.edges import (  # noqa: E402
     plain,
     without_edge,
 )
+from pikanid.approximators.kan.tensors import write  # noqa: E402
 
 pytestmark = pytest.mark.kan
 

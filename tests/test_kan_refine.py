@@ -14,9 +14,9 @@ torch = pytest.importorskip("torch", reason="needs the `kan` extra")
 pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 
 from pikanid.approximators.kan import DeepKAN, build_kan, prune, refine, regrid  # noqa: E402
-from pikanid.approximators.kan.build import write  # noqa: E402
 from pikanid.approximators.kan.prune import scores  # noqa: E402
 from pikanid.approximators.kan.quiet import pykan_module, undisturbed  # noqa: E402
+from pikanid.approximators.kan.tensors import write  # noqa: E402
 
 pytestmark = pytest.mark.kan
 

@@ -15,7 +15,7 @@ pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 from pikanid.approximators import LinearApproximator, local_rows  # noqa: E402
 from pikanid.approximators.kan import ShallowKAN, build_kan  # noqa: E402
 from pikanid.approximators.kan.bases import silu  # noqa: E402
-from pikanid.approximators.kan.build import read, write  # noqa: E402
+from pikanid.approximators.kan.tensors import read, write  # noqa: E402
 
 pytestmark = pytest.mark.kan
 

@@ -20,9 +20,9 @@ from scipy.linalg import LinAlgError
 from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.approximators.kan import ShallowKAN, build_kan
-from pikanid.approximators.kan.build import read, write
 from pikanid.approximators.kan.curve import HIGHEST, KanCurve
 from pikanid.approximators.kan.plan import Base, KanPlan
+from pikanid.approximators.kan.tensors import read, write
 from pikanid.approximators.tables import gauss_nodes
 from pikanid.functional import Functional, Part, bind
 from pikanid.functional_rows import AnyApproximator

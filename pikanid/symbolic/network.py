@@ -9,7 +9,6 @@ import numpy as np
 import sympy as sp
 
 from pikanid import errors
-from pikanid.approximators.kan.build import read
 from pikanid.approximators.kan.edges import (
     arguments,
     beside,
@@ -18,6 +17,7 @@ from pikanid.approximators.kan.edges import (
     plain,
     without_edge,
 )
+from pikanid.approximators.kan.tensors import read
 from pikanid.approximators.kan.train import PointFit, fit_points
 from pikanid.expressions import symbol
 from pikanid.symbolic.composed import Place

@@ -7,15 +7,16 @@
 
 from __future__ import annotations
 
-from pikanid.approximators.kan.build import build_kan
+from pikanid.approximators.kan.build import build_kan, from_state
 from pikanid.approximators.kan.curve import KanCurve
 from pikanid.approximators.kan.deep import DeepKAN
+from pikanid.approximators.kan.file import load, save
 from pikanid.approximators.kan.kinks import Kink
 from pikanid.approximators.kan.plot import plot
 from pikanid.approximators.kan.prune import prune
 from pikanid.approximators.kan.refine import Refinement, refine, regrid
 from pikanid.approximators.kan.shallow import ShallowKAN
-from pikanid.approximators.kan.state import from_state, load, save, to_state
+from pikanid.approximators.kan.state import to_state
 from pikanid.approximators.kan.sweeps import KanJet
 
 __all__ = [

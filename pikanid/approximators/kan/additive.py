@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pikanid.approximators.kan.build import build_kan, read, write
+from pikanid.approximators.kan.build import build_kan
 from pikanid.approximators.kan.plan import Array, uniform_extended_knots
+from pikanid.approximators.kan.tensors import read, write
 
 K = 3
 

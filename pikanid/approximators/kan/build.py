@@ -9,13 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache, wraps
-from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
 
+from pikanid.approximators.kan.blank import blank_kan
 from pikanid.approximators.kan.plan import Array, Base, KanPlan, plan_kan
+from pikanid.approximators.kan.plot import plot
+from pikanid.approximators.kan.prune import prune
 from pikanid.approximators.kan.quiet import pykan_module, undisturbed
+from pikanid.approximators.kan.refine import refine
+from pikanid.approximators.kan.state import KanState, restored, to_state
+from pikanid.approximators.kan.tensors import tensor, write
 
 # pykan methods that seed, make tensors of the default dtype or construct models.
 _GUARDED = (
@@ -71,7 +76,7 @@ def build_kan(
     (torch.float64, torch.Size([1, 1, 13]))
     """
     plan = plan_kan(width, grid, k, grid_range, base, mult_arity)
-    kan = blank_kan(plan, device)
+    kan = blank_kan(plan, kan_class(), device)
     generator = np.random.default_rng(seed)
     for layer in range(plan.depth):
         shape = (plan.nodes(layer), plan.subnodes(layer + 1), plan.knots[layer].shape[1] - k - 1)
@@ -86,66 +91,13 @@ def build_kan(
     return kan
 
 
-def blank_kan(plan: KanPlan, device: str = "cpu") -> Any:
-    """A KAN of this plan whose coefficients are zero and whose edges are all active."""
-    torch = import_module("torch")
-    kind = kan_class()
-    arity = plan.arity if isinstance(plan.arity, int) else [list(row) for row in plan.arity]
-    with undisturbed():
-        # One interval is enough to construct: pykan's own start is a dense least-squares solve
-        # in the default dtype, and both are replaced right below.
-        kan = kind(
-            width=[list(layer) for layer in plan.width],
-            grid=1,
-            k=plan.k,
-            mult_arity=arity,
-            base_fun=plan.base,
-            sp_trainable=False,
-            sb_trainable=plan.base != "zero",
-            auto_save=False,
-            device=device,
-        ).double()
-    for layer in range(plan.depth):
-        edges, knots = kan.act_fun[layer], plan.knots[layer]
-        edges.num = plan.intervals(layer)
-        edges.grid = torch.nn.Parameter(_tensor(knots, device), requires_grad=False)
-        shape = (*edges.mask.shape, knots.shape[1] - plan.k - 1)
-        edges.coef = torch.nn.Parameter(_tensor(np.zeros(shape), device))
-        write(edges.scale_sp, np.full(shape[:2], 1.0 / np.sqrt(shape[0])))
-        write(edges.scale_base, np.zeros(shape[:2]))
-        # pykan lets the affine map of an unused symbolic edge ask for gradients.
-        kan.symbolic_fun[layer].affine.requires_grad_(False)
-    grids = [plan.intervals(layer) for layer in range(plan.depth)]
-    kan.grid = grids[0] if len(set(grids)) == 1 else grids
-    kan.grid_range = [float(plan.knots[0][0, plan.k]), float(plan.knots[0][0, -plan.k - 1])]
-    return kan
+def from_state(state: KanState, device: str = "cpu") -> Any:
+    """A pykan model with this state, without pykan's side effects.
 
-
-def plan_of(kan: Any) -> KanPlan:
-    """The plan of an existing pykan model, its knots as they are now."""
-    arity = kan.mult_arity
-    return KanPlan(
-        width=tuple((int(sums), int(products)) for sums, products in kan.width),
-        k=int(kan.act_fun[0].k),
-        base=kan.base_fun_name,
-        arity=int(arity) if kan.mult_homo else tuple(tuple(map(int, row)) for row in arity),
-        knots=tuple(read(edges.grid) for edges in kan.act_fun),
-    )
-
-
-def read(parameter: Any) -> Array:
-    """A torch parameter as a NumPy array of its own."""
-    return np.array(parameter.detach().cpu().numpy(), dtype=float)
-
-
-def write(parameter: Any, values: Array) -> None:
-    """Put a NumPy array of the same shape into a torch parameter, in place."""
-    parameter.data = _tensor(values, parameter.device)
-
-
-def _tensor(values: Array, device: Any) -> Any:
-    torch = import_module("torch")
-    return torch.from_numpy(np.array(values, dtype=float, order="C")).to(device)
+    Raises:
+        BadSetting: If arrays do not fit together or a symbolic function is unknown to pykan.
+    """
+    return restored(state, kan_class(), device)
 
 
 def _default_batch(plan: KanPlan, device: str) -> Any:
@@ -157,7 +109,7 @@ def _default_batch(plan: KanPlan, device: str) -> Any:
         if n == 1
         else np.random.default_rng(0).uniform(size=(500, n))
     )
-    return _tensor(low + (high - low) * unit, device)
+    return tensor(low + (high - low) * unit, device)
 
 
 def _waves(
@@ -186,26 +138,18 @@ def kan_class() -> type:
 
         def refine(self, new_grid: int) -> Any:
             """The same function on a finer grid, exactly where the finer grid contains this one."""
-            from pikanid.approximators.kan.refine import refine
-
             return refine(self, new_grid).kan
 
         def prune(self, node_th: float = 1e-2, edge_th: float = 3e-2) -> Any:
             """Without the nodes and edges that hardly matter on the batch last seen."""
-            from pikanid.approximators.kan.prune import prune
-
             return prune(self, node_threshold=node_th, edge_threshold=edge_th)
 
         def plot(self, **options: Any) -> Any:
             """pykan's diagram as a matplotlib figure."""
-            from pikanid.approximators.kan.plot import plot
-
             return plot(self, **options)
 
         def copy(self) -> Any:
             """A model of its own with the same state."""
-            from pikanid.approximators.kan.state import from_state, to_state
-
             return from_state(to_state(self))
 
         def fit(self, dataset: Any, *args: Any, update_grid: bool = False, **options: Any) -> Any:
@@ -214,8 +158,6 @@ def kan_class() -> type:
                 return super().fit(dataset, *args, update_grid=update_grid, **options)
 
         def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-            from pikanid.approximators.kan.state import from_state, to_state
-
             return from_state, (to_state(self),)
 
     for name in _GUARDED:

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from pikanid import errors
 from pikanid.approximators.kan.bases import silu
-from pikanid.approximators.kan.build import plan_of, read, write
+from pikanid.approximators.kan.blank import plan_of
 from pikanid.approximators.kan.cells import local_bases
 from pikanid.approximators.kan.jets import BINOMIAL, chain, matrix_product, product
 from pikanid.approximators.kan.layers import Layer, read_layer, through_nodes
 from pikanid.approximators.kan.plan import Array
 from pikanid.approximators.kan.sweeps import KanJet, LocalJet, Sweep, edge_parts
+from pikanid.approximators.kan.tensors import read, write
 
 
 class DeepKAN:

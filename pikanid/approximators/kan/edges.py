@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from pikanid.approximators.kan.bases import silu
+from pikanid.approximators.kan.build import from_state
 from pikanid.approximators.kan.deep import DeepKAN
 from pikanid.approximators.kan.plan import Array, KanPlan, uniform_extended_knots
-from pikanid.approximators.kan.state import KanState, from_state, to_state
+from pikanid.approximators.kan.state import KanState, to_state
 
 LEAST_INTERVALS = 12
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from pikanid import errors
-from pikanid.approximators.kan.build import read
 from pikanid.approximators.kan.jets import product
 from pikanid.approximators.kan.plan import Array, KanPlan
+from pikanid.approximators.kan.tensors import read
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pikanid.approximators.kan.build import read
 from pikanid.approximators.kan.plan import Array
 from pikanid.approximators.kan.quiet import undisturbed
-from pikanid.approximators.kan.state import KanState, LayerState, from_state, to_state
+from pikanid.approximators.kan.state import KanState, LayerState, restored, to_state
+from pikanid.approximators.kan.tensors import read
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +74,14 @@ def prune(
         good = np.flatnonzero(score > node_threshold)
         kept.append(good if good.size else np.array([int(np.argmax(score))]))
     kept.append(np.arange(found.nodes[-1].size))
-    smaller = from_state(_subset(to_state(kan), kept))
+    smaller = restored(_subset(to_state(kan), kept), type(kan))
     weak = scores(smaller, x).edges
     state = to_state(smaller)
     layers = tuple(
         replace(layer, mask=np.where(score.transpose() > edge_threshold, layer.mask, 0.0))
         for layer, score in zip(state.layers, weak, strict=True)
     )
-    return from_state(replace(state, layers=layers))
+    return restored(replace(state, layers=layers), type(kan))
 
 
 def _subset(state: KanState, kept: list[NDArray[np.int64]]) -> KanState:

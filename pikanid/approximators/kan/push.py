@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from pikanid.approximators.kan.build import read, write
+from pikanid.approximators.kan.build import from_state
 from pikanid.approximators.kan.plan import Array
 from pikanid.approximators.kan.quiet import undisturbed
-from pikanid.approximators.kan.state import from_state, to_state
+from pikanid.approximators.kan.state import to_state
+from pikanid.approximators.kan.tensors import read, write
 
 
 @dataclass(frozen=True, eq=False)

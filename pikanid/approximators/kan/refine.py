@@ -18,7 +18,7 @@ from pikanid import errors
 from pikanid.approximators.kan.bases import spline_rows
 from pikanid.approximators.kan.cells import local_bases
 from pikanid.approximators.kan.plan import Array, uniform_extended_knots
-from pikanid.approximators.kan.state import LayerState, from_state, to_state
+from pikanid.approximators.kan.state import LayerState, restored, to_state
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def refine(kan: Any, grid: int | Sequence[int]) -> Refinement:
             coefs.append(coef @ matrix.T)
             knots.append(new)
         layers.append(replace(layer, grid=np.array(knots), coef=np.array(coefs)))
-    return Refinement(from_state(replace(state, layers=tuple(layers))), exact, worst)
+    return Refinement(restored(replace(state, layers=tuple(layers)), type(kan)), exact, worst)
 
 
 def regrid(kan: Any, ranges: Sequence[Sequence[float]], grid: int | None = None) -> Refinement:
@@ -110,7 +110,7 @@ def regrid(kan: Any, ranges: Sequence[Sequence[float]], grid: int | None = None)
             coefs.append(found.T)
         knots = np.tile(new, (layer.grid.shape[0], 1))
         layers.append(replace(layer, grid=knots, coef=np.array(coefs)))
-    return Refinement(from_state(replace(state, layers=tuple(layers))), False, worst)
+    return Refinement(restored(replace(state, layers=tuple(layers)), type(kan)), False, worst)
 
 
 def change_of_knots(old: Array, new: Array, degree: int) -> tuple[Array, bool]:

@@ -17,9 +17,11 @@ from scipy import sparse
 
 from pikanid import errors
 from pikanid.approximators.kan.bases import power_blossom, silu, spline_rows
-from pikanid.approximators.kan.build import plan_of, read, write
+from pikanid.approximators.kan.blank import plan_of
 from pikanid.approximators.kan.kinks import Kink, KinkTable
 from pikanid.approximators.kan.plan import Array
+from pikanid.approximators.kan.refine import change_of_knots, refine
+from pikanid.approximators.kan.tensors import read, write
 
 # A kink of the spline's own degree this near to a knot (in spacings) is what the knot does already.
 _NEAR_KNOT = 0.05
@@ -191,8 +193,6 @@ class ShallowKAN:
 
         A kink of order k that now falls on a knot goes into the spline, which contains it.
         """
-        from pikanid.approximators.kan.refine import change_of_knots, refine
-
         kan = refine(self.kan, grid).kan
         knots, k = plan_of(kan).knots[0][0], self.degree
         finer, _ = change_of_knots(self.knots, knots, k)

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pikanid import errors
+from pikanid.approximators.kan.build import from_state
 from pikanid.approximators.kan.deep import DeepKAN
 from pikanid.approximators.kan.edges import edges_of
 from pikanid.approximators.kan.plan import Array
-from pikanid.approximators.kan.state import from_state, to_state
+from pikanid.approximators.kan.state import to_state
 
 RIDGE = 1e-8
 
