@@ -8,27 +8,28 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import sympy as sp
 
 from pikanid import errors, expression_functions
 from pikanid.expressions import TIME, symbol
-from pikanid.model import Formula, Model, Parameter, State
-from pikanid.model_parts import Hold
+from pikanid.model_operations import Operations
+from pikanid.model_parts import Formula, Hold, Parameter, State
 
+M = TypeVar("M", bound=Operations)
 INPUT_MAPS = ("backlash", "rate_limit", "gain", "offset", "saturation", "dead_zone", "function",
               "lag", "delay")
 OUTPUT_MAPS = ("lag", "gain", "offset", "drift", "function", "clip", "delay")
 
 
-def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
+def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
               hold: Hold | None = None, backlash: Formula | None = None,
               rate_limit: Formula | None = None,
               gain: Formula | None = None, offset: Formula | None = None,
               saturation: Formula | None = None, dead_zone: Formula | None = None,
               function: Formula | None = None, lag: Formula | None = None,
-              delay: Formula | None = None) -> Model:
+              delay: Formula | None = None) -> M:
     """The model whose input `name` passes through the given maps before it acts.
 
     They apply in the order of the keywords: u -> behind a play of ±backlash -> changing no faster
@@ -94,11 +95,11 @@ def map_input(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
                       for o in model.outputs))
 
 
-def map_output(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
+def map_output(model: M, name: str, parameters: Sequence[Parameter] = (), *,
                lag: Formula | None = None, gain: Formula | None = None,
                offset: Formula | None = None, drift: Formula | None = None,
                function: Formula | None = None, clip: Sequence[Any] | None = None,
-               delay: Formula | None = None) -> Model:
+               delay: Formula | None = None) -> M:
     """The model whose output `name` is seen through the given sensor maps.
 
     They apply in the order of the keywords: y -> first-order lag [s] -> gain·y -> + offset ->
@@ -141,7 +142,7 @@ def map_output(model: Model, name: str, parameters: Sequence[Parameter] = (), *,
     return model.replace(outputs=tuple(changed if o.name == name else o for o in model.outputs))
 
 
-def _fresh(model: Model, wanted: str) -> str:
+def _fresh(model: Operations, wanted: str) -> str:
     name, number = wanted, 2
     while name in model.symbols:
         name, number = f"{wanted}{number}", number + 1

@@ -13,13 +13,17 @@ the relative error over the band.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import sympy as sp
 
 from pikanid import errors, model_units
 from pikanid.expressions import symbol
-from pikanid.model import Formula, Model, State
+from pikanid.model_operations import Operations
+from pikanid.model_parts import Formula, State
+
+M = TypeVar("M", bound=Operations)
 
 
 @dataclass(frozen=True)
@@ -56,8 +60,8 @@ def design(band: tuple[float, float], order: int) -> HalfDerivative:
     return HalfDerivative(rates, weights[1:], float(weights[0]), error)
 
 
-def with_half_derivative(model: Model, of: Formula, name: str, band: tuple[float, float],
-                         order: int = 10) -> tuple[Model, sp.Expr]:
+def with_half_derivative(model: M, of: Formula, name: str, band: tuple[float, float],
+                         order: int = 10) -> tuple[M, sp.Expr]:
     """Add the states of D^½ of a formula; returns the new model and the formula of D^½.
 
     The filters start in equilibrium with the formula's initial value, as if it had always had it.

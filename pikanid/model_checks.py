@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -16,30 +15,14 @@ from pikanid.entries import Entry, is_integer
 from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
 from pikanid.expression_limits import MAX_NAME
 from pikanid.expressions import TIME, check_name
-
-if TYPE_CHECKING:
-    from pikanid.model import Model
+from pikanid.model_lookup import Lookup
 
 # Far more than any model has, and few enough that checking them takes no time.
 MOST = {"states": 1000, "inputs": 200, "parameters": 20_000, "outputs": 500, "splines": 200,
         "knots": 10_000}
 MAX_DEGREE = 20  # of a spline
 
-def find(items: Iterable[Any], name: str, what: str) -> Any:
-    """The item of that name; a `BadModel` that lists the names if there is none."""
-    if not isinstance(name, str):
-        raise errors.BadModel(errors.not_of_kind(
-            f"The name of the {what}", type(name).__name__, "text"))
-    names = []
-    for item in items:
-        if item.name == name:
-            return item
-        names.append(item.name)
-    close = difflib.get_close_matches(name, names, 1)
-    raise errors.BadModel(errors.not_in_model(what, name, names, close))
-
-
-def check_types(model: Model) -> None:
+def check_types(model: Lookup) -> None:
     """Raise `BadModel` unless every part of the model is of its type, and of a sensible size.
 
     Formulas are left to `pikanid.expressions.to_real`.
@@ -87,7 +70,7 @@ def entry(value: Any, where: str) -> Entry:
     return Entry(value, where, errors.BadModel)
 
 
-def validate(model: Model) -> None:
+def validate(model: Lookup) -> None:
     """Raise `BadModel` unless names, symbols, values and bounds of the model are consistent."""
     if not model.states:
         raise errors.BadModel(errors.no_states())
@@ -121,7 +104,7 @@ def validate(model: Model) -> None:
                 f"The scope of parameter '{p.name}'", p.scope, "'shared' or 'recording'"))
 
 
-def _check_names(model: Model) -> None:
+def _check_names(model: Lookup) -> None:
     seen: dict[str, str] = {}
     groups: list[tuple[str, Iterable[Any]]] = [
         ("state", model.states), ("input", model.inputs),
@@ -152,7 +135,7 @@ _NODES = (sp.Add, sp.Mul, sp.Pow, sp.Symbol, sp.Rational, sp.Float, sp.exp, type
           log_abs, sp.core.function.AppliedUndef)
 
 
-def _check_symbols(expr: sp.Expr, known: Iterable[str], where: str, model: Model) -> None:
+def _check_symbols(expr: sp.Expr, known: Iterable[str], where: str, model: Lookup) -> None:
     names, functions, forbidden = _content(expr)
     unknown = sorted(names - set(known))
     unknown += sorted(functions - {s.name for s in model.splines})

@@ -11,9 +11,9 @@ import difflib
 import math
 import os
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import sympy as sp
 
@@ -22,11 +22,14 @@ from pikanid.channel_maps import INPUT_MAPS, OUTPUT_MAPS, map_input, map_output
 from pikanid.entries import Entry
 from pikanid.expression_limits import Work
 from pikanid.expressions import check_name, parse, symbol, to_text
-from pikanid.model import Input, Model, Output, Parameter, Spline, State
 from pikanid.model_checks import MOST
+from pikanid.model_lookup import Lookup
+from pikanid.model_operations import Operations
+from pikanid.model_parts import Input, Output, Parameter, Spline, State
 from pikanid.outputs import atomically
 from pikanid.stored import MOST_MODEL, file_bytes
 
+M = TypeVar("M", bound=Operations)
 SECTIONS = ("name", "states", "inputs", "parameters", "equations", "outputs", "splines")
 KEYS = {
     "states": ("unit", "initial", "guess", "bounds", "scope", "description"),
@@ -37,8 +40,8 @@ KEYS = {
 }
 
 
-def load(path: str | os.PathLike[str]) -> Model:
-    """Read a model file.
+def load(path: str | os.PathLike[str], kind: Callable[..., M]) -> M:
+    """Read a model file; `kind` makes the model of its fields.
 
     Raises
     ------
@@ -53,10 +56,10 @@ def load(path: str | os.PathLike[str]) -> Model:
         raise wrong("it is not text") from None
     except (ValueError, RecursionError) as problem:  # also an integer of thousands of digits
         raise wrong(str(problem) or "it is nested too deep") from None
-    return from_dict(content, str(path))
+    return from_dict(content, str(path), kind)
 
 
-def save(model: Model, path: str | os.PathLike[str]) -> None:
+def save(model: Lookup, path: str | os.PathLike[str]) -> None:
     """Write a model file; an existing one is replaced only once the new one is complete."""
     import tomli_w
 
@@ -65,8 +68,8 @@ def save(model: Model, path: str | os.PathLike[str]) -> None:
     atomically(Path(path), tomli_w.dumps(to_dict(model)).encode())
 
 
-def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
-    """Build a `Model` from the file's content; `source` names it in error messages.
+def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -> M:
+    """Build a model from the file's content; `source` names it in error messages, `kind` makes it.
 
     Raises
     ------
@@ -101,7 +104,7 @@ def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
         number = Entry(value, f"The {where}", errors.BadModel).number()
         return sp.Float(number) if number else sp.Integer(0)
 
-    model = Model(
+    model = kind(
         name=content.get("name", Path(source).stem),
         states=tuple(_state(n, e, formula) for n, e in tables["states"].items()),
         inputs=tuple(Input(n, e.get("unit", ""), e.get("hold", "zero"), e.get("default"))
@@ -119,7 +122,7 @@ def from_dict(content: Mapping[str, Any], source: str = "model") -> Model:
     return model
 
 
-def to_dict(model: Model) -> dict[str, Any]:
+def to_dict(model: Lookup) -> dict[str, Any]:
     """The content of the model file.  Maps of channels stand in the equations that they became."""
     content: dict[str, Any] = {"name": model.name}
     content["states"] = {s.name: _drop({"unit": s.unit, "initial": _plain(s.initial)})
@@ -147,7 +150,7 @@ def to_dict(model: Model) -> dict[str, Any]:
     return content
 
 
-def latex(model: Model) -> str:
+def latex(model: Lookup) -> str:
     """The equations and outputs as LaTeX."""
     rows = [rf"\dot{{{sp.latex(symbol(n))}}} &= {sp.latex(e)}" for n, e in model.equations.items()]
     rows += [rf"y_{{\mathrm{{{o.name.replace('_', ' ')}}}}} &= {sp.latex(o.expression)}"

@@ -2,17 +2,45 @@
 
 from __future__ import annotations
 
-from pikanid.model_checks import find
-from pikanid.model_parts import Input, Output, Parameter, State
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import sympy as sp
+
+from pikanid import errors
+from pikanid.model_parts import Input, Output, Parameter, Spline, State
+
+
+def find(items: Iterable[Any], name: str, what: str) -> Any:
+    """The item of that name; a `BadModel` that lists the names if there is none."""
+    if not isinstance(name, str):
+        raise errors.BadModel(errors.not_of_kind(
+            f"The name of the {what}", type(name).__name__, "text"))
+    names = []
+    for item in items:
+        if item.name == name:
+            return item
+        names.append(item.name)
+    close = difflib.get_close_matches(name, names, 1)
+    raise errors.BadModel(errors.not_in_model(what, name, names, close))
 
 
 class Lookup:
     """What `Model` answers about its parts."""
 
+    name: str
     states: tuple[State, ...]
     inputs: tuple[Input, ...]
     parameters: tuple[Parameter, ...]
+    equations: Mapping[str, sp.Expr]
     outputs: tuple[Output, ...]
+    splines: tuple[Spline, ...]
+
+    @property
+    def symbols(self) -> frozenset[str]:
+        """Every name that a formula of this model may use."""
+        return frozenset([*self.state_names, *self.input_names, *self.parameter_names])
 
     @property
     def state_names(self) -> tuple[str, ...]:

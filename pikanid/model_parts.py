@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import sympy as sp
 
 Hold = Literal["zero", "first"]
 Scope = Literal["shared", "recording"]
+Formula: TypeAlias = "str | float | sp.Expr"
 
 @dataclass(frozen=True)
 class State:

@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -26,6 +26,7 @@ from sympy.core.function import AppliedUndef
 from pikanid import errors, units
 from pikanid.expression_functions import abs_power, clip, signed_power
 from pikanid.expressions import TIME, symbol, to_text
+from pikanid.model_lookup import Lookup
 from pikanid.model_parts import Input, Output, Parameter, State
 from pikanid.model_units_algebra import (
     BARE,
@@ -38,9 +39,6 @@ from pikanid.model_units_algebra import (
     of_other_zero,
     simple,
 )
-
-if TYPE_CHECKING:
-    from pikanid.model import Model
 
 _ALIKE = 1e-3  # relative difference of a number and a factor that it may stand for
 _OF_ANGLES = (sp.sin, sp.cos, sp.tan, sp.sinh, sp.cosh, sp.tanh, sp.exp, sp.log, sp.asin, sp.acos,
@@ -58,7 +56,7 @@ def check(parts: Iterable[State | Input | Parameter | Output]) -> None:
         units.check(part.unit, f"{type(part).__name__.lower()} '{part.name}'")
 
 
-def coherent(model: Model) -> dict[str, Any]:
+def coherent(model: Lookup) -> dict[str, Any]:
     """The fields of a model in which factors between units are missing; none as a rule.
 
     Returns:
@@ -91,7 +89,7 @@ def coherent(model: Model) -> dict[str, Any]:
     return {**changes, "parameters": (*model.parameters, *conversion.added)}
 
 
-def of_formula(model: Model, expr: sp.Expr) -> str:
+def of_formula(model: Lookup, expr: sp.Expr) -> str:
     """The unit in which a formula of a model comes out, "" where it has none."""
     named: list[State | Input | Parameter] = [*model.states, *model.inputs, *model.parameters]
     return Conversion({p.name: p for p in named}).walk(expr, "The formula")[1].text
