@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pikanid import errors
-from pikanid.adequacy import Adequacy
+from pikanid import errors, estimate_file
+from pikanid.estimate_data import EstimateData, Fit
 from pikanid.model import Model
-from pikanid.problem import FreeParameter
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -20,38 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """Measured against fitted, for an output of a recording; arrays (N,) in the model's unit."""
-
-    recording: str
-    output: str
-    unit: str
-    t: np.ndarray
-    measured: np.ndarray
-    fitted: np.ndarray
-    sigma: np.ndarray | None = None
-
-    @property
-    def residual(self) -> np.ndarray:
-        """measured - fitted (N,)."""
-        return self.measured - self.fitted
-
-    @property
-    def rmse(self) -> float:
-        """Root mean square of the residual."""
-        return float(np.sqrt(np.mean(self.residual**2)))
-
-
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """The states of one recording on a time grid: t (L,), x (L, n)."""
-
-    t: np.ndarray
-    x: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(EstimateData):
     """Estimated parameters with everything that says how far to trust them.
 
     Attributes
@@ -68,26 +36,6 @@ class Estimate:
     seconds, seed, version : provenance
     approximator : the fitted curve of a relaxation strategy, else None
     """
-
-    model: Model
-    strategy: str
-    free: tuple[FreeParameter, ...]
-    theta: np.ndarray
-    covariance: np.ndarray
-    fits: tuple[Fit, ...]
-    trajectories: tuple[Trajectory, ...]
-    cost: float
-    adequacy: Adequacy
-    converged: bool
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    history: tuple[Mapping[str, float], ...] = ()
-    warnings: tuple[str, ...] = ()
-    seconds: float = float("nan")
-    seed: int | None = None
-    version: str = ""
-    approximator: Any = None
-
-    # --- parameters ------------------------------------------------------------------------------
 
     def index(self, name: str, recording: int | None = None) -> int:
         """Position in θ of a parameter.
@@ -219,16 +167,12 @@ class Estimate:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write everything but the approximator's object to one file (JSON, gzip if *.gz)."""
-        from pikanid.estimate_file import save
+        estimate_file.save(self, path)
 
-        save(self, path)
-
-    @staticmethod
-    def load(path: str | os.PathLike[str]) -> Estimate:
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Estimate:
         """Read what `save` wrote."""
-        from pikanid.estimate_file import load
-
-        return load(path)
+        return estimate_file.load(path, cls)
 
     def __str__(self) -> str:
         lines = [f"{self.strategy} estimate of {self.model.name} ({self.n} samples, "

@@ -11,23 +11,24 @@ import os
 from collections.abc import Callable
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
 from pikanid import errors
 from pikanid.adequacy import Adequacy, Verdict
 from pikanid.entries import MOST_ENTRIES, Entry
-from pikanid.estimate import Estimate, Fit, Trajectory
+from pikanid.estimate_data import EstimateData, Fit, Trajectory
 from pikanid.model import Model
 from pikanid.outputs import atomically
 from pikanid.problem import FreeParameter
 from pikanid.stored import json_content
 
 SCHEMA = 1
+E = TypeVar("E", bound=EstimateData)
 
 
-def save(estimate: Estimate, path: str | os.PathLike[str]) -> None:
+def save(estimate: EstimateData, path: str | os.PathLike[str]) -> None:
     """Write `estimate`; an existing file is replaced only once the new one is complete.
 
     Raises
@@ -37,7 +38,7 @@ def save(estimate: Estimate, path: str | os.PathLike[str]) -> None:
     atomically(path, content(estimate, path))
 
 
-def content(estimate: Estimate, path: str | os.PathLike[str]) -> bytes:
+def content(estimate: EstimateData, path: str | os.PathLike[str]) -> bytes:
     """What `save` writes to `path`."""
     entries: dict[str, Any] = {
         "pikanid_estimate": SCHEMA,
@@ -60,8 +61,8 @@ def content(estimate: Estimate, path: str | os.PathLike[str]) -> bytes:
     return gzip.compress(data, mtime=0) if Path(path).suffix == ".gz" else data
 
 
-def load(path: str | os.PathLike[str]) -> Estimate:
-    """Read an estimate.
+def load(path: str | os.PathLike[str], kind: Callable[..., E]) -> E:
+    """Read an estimate; `kind` makes it of its fields.
 
     Raises
     ------
@@ -74,7 +75,7 @@ def load(path: str | os.PathLike[str]) -> Estimate:
     content = json_content(path, wrong)
     if not isinstance(content, dict) or content.get("pikanid_estimate") != SCHEMA:
         raise wrong("it does not hold a saved estimate")
-    return from_content(content, wrong)
+    return from_content(content, wrong, kind)
 
 
 _KEYS = ("pikanid_estimate", "model", "strategy", "free", "theta", "covariance", "fits",
@@ -82,7 +83,8 @@ _KEYS = ("pikanid_estimate", "model", "strategy", "free", "theta", "covariance",
          "seconds", "seed", "version")
 
 
-def from_content(content: dict[str, Any], wrong: Callable[[str], errors.PikanidError]) -> Estimate:
+def from_content(content: dict[str, Any], wrong: Callable[[str], errors.PikanidError],
+                 kind: Callable[..., E]) -> E:
     """The estimate that a file's content describes; `wrong` makes the exception from a sentence.
 
     Raises
@@ -99,7 +101,7 @@ def from_content(content: dict[str, Any], wrong: Callable[[str], errors.PikanidE
     if np.any(np.diag(covariance) < 0):
         raise wrong(errors.entry_negative("the diagonal of its covariance"))
     seed = get["seed"]
-    return Estimate(
+    return kind(
         model=model, strategy=get["strategy"].text(), free=free, theta=get["theta"].array(n),
         covariance=covariance, fits=fits,
         trajectories=tuple(_trajectory(e, len(model.states)) for e in get["trajectories"].items()),

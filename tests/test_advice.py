@@ -10,8 +10,8 @@ import pytest
 
 import pikanid as pk
 from pikanid.mismatch.advice import EXPLORE, PROVE, STRENGTHEN, advice
+from pikanid.mismatch.findings import Explanation
 from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.result import Explanation
 from pikanid.mismatch.whitened import Records
 
 RATE = float(np.sqrt(9.81 / 0.045))

@@ -8,7 +8,9 @@ import pytest
 
 from pikanid.estimate import Estimate
 from pikanid.mismatch.explained import _behind
-from pikanid.mismatch.result import Diagnosis, Explanation, NamedEffect, Verdict, Where
+from pikanid.mismatch.findings import Explanation, NamedEffect, Where
+from pikanid.mismatch.result import Diagnosis
+from pikanid.mismatch.verdict import Verdict
 from pikanid.systems import sloshing
 
 

@@ -16,7 +16,8 @@ from pikanid import errors, estimate_file, stored
 from pikanid.adequacy import Adequacy
 from pikanid.concealed import seal
 from pikanid.concealed.score import judge
-from pikanid.estimate import Estimate, Fit, Trajectory
+from pikanid.estimate import Estimate
+from pikanid.estimate_data import Fit, Trajectory
 from pikanid.model import Model
 from pikanid.problem import FreeParameter
 
@@ -59,7 +60,7 @@ def estimate_used(content: Any) -> bool:
         return errors.BadSetting(errors.estimate_file("fit.json", detail.rstrip(".")))
 
     try:
-        found = estimate_file.from_content(content, wrong)
+        found = estimate_file.from_content(content, wrong, Estimate)
     except errors.PikanidError as problem:
         one_sentence(problem)
         return False

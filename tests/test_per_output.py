@@ -10,11 +10,11 @@ import pytest
 import pikanid as pk
 from pikanid.expressions import symbol
 from pikanid.mismatch.catalogue import candidates
+from pikanid.mismatch.findings import OutputError, Proof
 from pikanid.mismatch.hypothesis import fitted
 from pikanid.mismatch.judge import HeldOut, held_out
 from pikanid.mismatch.locate import affected, loud_windows
 from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.result import OutputError, Proof
 from pikanid.mismatch.site import sites
 from pikanid.mismatch.whitened import Records
 from pikanid.model_parts import Output

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pikanid import errors
-from pikanid.estimate import Fit
+from pikanid.estimate_data import Fit
 from pikanid.plots import ENDINGS, image, plot_fits, plot_strategies, save_figure
 
 T = np.linspace(0.0, 2.0, 81)
@@ -91,7 +91,7 @@ def test_pyplot_and_settings_are_left_alone() -> None:
 import sys, matplotlib
 before = dict(matplotlib.rcParams)
 import numpy as np
-from pikanid.estimate import Fit
+from pikanid.estimate_data import Fit
 from pikanid.plots import image, plot_fits
 t = np.linspace(0, 1, 20)
 image(plot_fits([Fit('run', 'y', 'm', t, t, t)]))

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from pikanid.discrepancy.edges import EdgePlan, argument_model
-from pikanid.estimate import Trajectory
+from pikanid.estimate_data import Trajectory
 from pikanid.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 

@@ -11,7 +11,7 @@ from pikanid.discrepancy.edges import OFFSET, EdgePlan
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import Visited, visit
 from pikanid.discrepancy.smoothness import LARGEST, EdgePrior, Smoothness
-from pikanid.estimate import Trajectory
+from pikanid.estimate_data import Trajectory
 from pikanid.problem import Problem
 from pikanid.shooting import Shooting
 

@@ -9,8 +9,9 @@ import numpy as np
 from pikanid import errors
 from pikanid.mismatch.candidate import SYMBOLIC
 from pikanid.mismatch.experiments import TELLS_APART, NextExperiment, next_experiment
+from pikanid.mismatch.findings import Explanation, titles_apart
 from pikanid.mismatch.profiles import profiles
-from pikanid.mismatch.result import Explanation, Verdict, titles_apart
+from pikanid.mismatch.verdict import Verdict
 from pikanid.mismatch.whitened import Records
 from pikanid.model import Model
 from pikanid.model_parts import Input

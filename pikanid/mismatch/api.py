@@ -15,6 +15,7 @@ from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.doubt import least_proof
 from pikanid.mismatch.estimating import as_estimate
 from pikanid.mismatch.explained import explanations
+from pikanid.mismatch.findings import OutputError, Proof
 from pikanid.mismatch.force_shape import ForceShape, force_shape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.in_turn import blas_on_one_thread, threads
@@ -34,7 +35,7 @@ from pikanid.mismatch.preparation import (
     with_sigma,
 )
 from pikanid.mismatch.repeats import repeats
-from pikanid.mismatch.result import Diagnosis, OutputError, Proof
+from pikanid.mismatch.result import Diagnosis
 from pikanid.mismatch.search import Search
 from pikanid.mismatch.site import Site, sites
 from pikanid.mismatch.symbols import symbolic_candidates

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pikanid.mismatch.findings import DiagnosisData
 from pikanid.plots import new_figure
 
 if TYPE_CHECKING:
@@ -14,13 +15,12 @@ if TYPE_CHECKING:
     from pikanid.mismatch.force_shape import ForceShape
     from pikanid.mismatch.latent_force import ForceOverTime
     from pikanid.mismatch.patch import Patch
-    from pikanid.mismatch.result import Diagnosis
 
 BEFORE, AFTER, MOVED = "#c2410c", "#1d4ed8", "#15803d"
 DATA, LOUD = "#9ca3af", "#fde68a"
 
 
-def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
+def plot_diagnosis(dx: DiagnosisData) -> matplotlib.figure.Figure:
     """Residual of the nominal and of the extended model over time, and the force that would explain
     it, the seconds of the mismatch shaded; below, with a held-out recording, its prediction before
     and after and what each leaves; at the bottom the missing force over states and inputs, with its
@@ -74,7 +74,7 @@ def plot_diagnosis(dx: Diagnosis) -> matplotlib.figure.Figure:
     return figure
 
 
-def _train(axis: matplotlib.axes.Axes, dx: Diagnosis) -> None:
+def _train(axis: matplotlib.axes.Axes, dx: DiagnosisData) -> None:
     fit = dx.before.fits[0]
     axis.plot(fit.t, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
     if dx.hypotheses:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pikanid.adequacy import judge
-from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
+from pikanid.estimate import Estimate, total_cost
+from pikanid.estimate_data import Fit, Trajectory
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.version import __version__
 

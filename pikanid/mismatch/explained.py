@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pikanid.mismatch.doubt import Predict
+from pikanid.mismatch.findings import Explanation, NamedEffect, values_of
 from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.result import Explanation, NamedEffect, values_of
 from pikanid.mismatch.verdict import Answer, Test, criterion
 
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from pikanid.mismatch.candidate import SYMBOLIC, Candidate, Channel
 from pikanid.mismatch.detect import unit_columns
+from pikanid.mismatch.findings import Value, Where
 from pikanid.mismatch.force_shape import ForceShape
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.latent_force import ForceOverTime
-from pikanid.mismatch.result import Value, Where
 from pikanid.mismatch.site import Site
 from pikanid.mismatch.tangent import directions
 from pikanid.mismatch.verdict import Answer

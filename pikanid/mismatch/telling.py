@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pikanid.estimate import rounded
-
-if TYPE_CHECKING:
-    from pikanid.mismatch.result import Diagnosis
+from pikanid.mismatch.findings import DiagnosisData
 
 
-def lines_of(dx: Diagnosis) -> list[str]:
+def lines_of(dx: DiagnosisData) -> list[str]:
     """Verdict, where, what, proof, what to do next and notes, line by line."""
     lines = [dx.sentence()]
     if dx.mismatch:

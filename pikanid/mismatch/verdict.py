@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from pikanid.mismatch.detect import Detection
 from pikanid.mismatch.doubt import Predict, speaks, why_not
 from pikanid.mismatch.hypothesis import Hypothesis
 from pikanid.mismatch.judge import HeldOut
-from pikanid.mismatch.result import Verdict
 from pikanid.mismatch.same_law import integer_laws, merged_twins
 from pikanid.mismatch.whitened import GROSS
 
@@ -31,6 +31,9 @@ PREDICTED = 8  # hypotheses of which that is found out
 # or in held-out ones, and in all together: one right hypothesis in a hundred is refused
 ADEQUATE, TOGETHER = 0.005, 0.001
 Test = Callable[[Hypothesis], Detection]
+
+
+Verdict = Literal["none", "named", "set", "unconfirmed", "unnamed"]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from pikanid.estimate import rounded
 
 if TYPE_CHECKING:
-    from pikanid.mismatch.result import Diagnosis, Explanation
+    from pikanid.mismatch.findings import Explanation
+    from pikanid.mismatch.result import Diagnosis
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 60rem; margin: 2rem auto;

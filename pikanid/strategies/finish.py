@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
+from pikanid.estimate import Estimate, total_cost
+from pikanid.estimate_data import Fit, Trajectory
 from pikanid.information import covariance, identifiability_warnings, undetermined_warnings
 from pikanid.problem import Problem
 from pikanid.shooting import Shooting

@@ -20,7 +20,8 @@ from pikanid.adequacy import judge
 from pikanid.approximators import Array
 from pikanid.approximators.bspline import BSpline
 from pikanid.chains import Chains
-from pikanid.estimate import Estimate, Fit, Trajectory, total_cost
+from pikanid.estimate import Estimate, total_cost
+from pikanid.estimate_data import Fit, Trajectory
 from pikanid.functional import Functional
 from pikanid.problem import Problem
 from pikanid.shooting import Shooting
