@@ -243,9 +243,10 @@ def report(folder: str) -> None:
 
 
 def _row(found: Counter[str]) -> tuple[str, ...]:
-    total = found.total()
-    dead = total - found["survived"] - found["no tests"] - found["not checked"]
-    return (str(total), *(str(found[g]) for g in GROUPS), f"{dead / max(total, 1):.1%}")
+    tried = found.total() - found["not checked"]
+    dead = tried - found["survived"] - found["no tests"]
+    return (str(found.total()), *(str(found[g]) for g in GROUPS),
+            f"{dead / tried:.1%}" if tried else "")
 
 
 GROUPS = ("killed", "timeout", "crashed", "survived", "no tests", "not checked")
@@ -257,7 +258,9 @@ share of each room's mutations that is tried: {shares}.
 
 mutmut changes one thing in one function (an operator, a number, a condition, an argument, an \
 assignment) and runs the quick tests that reach the function. A mutant is dead when a test fails \
-(killed), never ends (timeout) or takes the interpreter down (crashed).
+(killed), never ends (timeout) or takes the interpreter down (crashed); the last column is the \
+share of those tried.  Where mutants are "not checked" the run was ended before it came to them: \
+`make mutants` goes on with them.  A survivor that is "open" has no reason yet, and no test.
 
 {sheet}
 
@@ -265,7 +268,7 @@ Not mutated: functions with a decorator other than `staticmethod` and `classmeth
 cached values, functions that numba compiles), the kernels' texts, statements outside functions, \
 drawings, the `strict` flag of `zip` and the type in a `cast`. Left out of the tests: slow ones, \
 docstrings' examples, and those about source text, installation, files, the command line and \
-networks' training.
+networks' training; those that take more than a second or two, too.
 
 ## Survivors
 

@@ -22,7 +22,7 @@ import pytest
 WORK = Path(os.environ["MUTANTS_WORK"])
 BUDGET = float(os.environ.get("MUTANTS_BUDGET", "15"))
 MEMORY = 6 << 30
-SLOW = 3.0  # processor seconds: a test that takes longer is left out
+SLOW = 1.5  # processor seconds: a test that takes longer is left out
 # Tests about the source text, the installation or other programs; mutants are none of theirs.
 LEFT_OUT = ("architecture", "readme", "concealed", "plots", "datasets", "interrupts", "public_api",
             "no_traces", "study", "test_cli.py", "compiled_cache", "diagnosis_memory", "kan_build",
