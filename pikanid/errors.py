@@ -1348,7 +1348,7 @@ def brief(value: Any) -> Any:
         return _Huge(value)
     if isinstance(value, list | tuple) and all(isinstance(v, str | int | float) for v in value):
         kept = [brief(v) if not isinstance(v, str) else _short(brief(v), 60) for v in value[:40]]
-        while len(kept) > 1 and sum(len(str(v)) for v in kept) > 4 * LONGEST_PART:
+        while len(kept) > 1 and sum(len(str(v)) for v in kept) > 3 * LONGEST_PART:
             kept = kept[:-1]
         more = [f"... ({len(value)} in all)"] if len(value) > len(kept) else []
         return tuple(kept + more) if isinstance(value, tuple) else kept + more

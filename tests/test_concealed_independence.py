@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 
 ROOM = Path(__file__).resolve().parents[1] / "pikanid" / "concealed"
-# Keeping compiled code, writing files and ending workers says nothing about any motion.
-PLUMBING = ("pikanid.cache", "pikanid.cache_jit", "pikanid.outputs", "pikanid.workers")
+# Keeping compiled code, reading and writing files, checking types and ending workers says nothing
+# about any motion.
+PLUMBING = ("pikanid.cache", "pikanid.cache_jit", "pikanid.entries", "pikanid.outputs",
+            "pikanid.stored", "pikanid.workers")
 ALLOWED = ("pikanid.errors", *PLUMBING, "pikanid.concealed")
 
 

@@ -39,7 +39,7 @@ def used(content: Any) -> None:
     """A model that can be shown, saved and read again, or one sentence of sensible length."""
     try:
         model = Model.from_dict(content)
-    except errors.BadModel as problem:
+    except (errors.BadModel, errors.BadUnit) as problem:
         text = str(problem)
         assert 10 < len(text) < 3000, text[:200]
         assert text.isprintable(), text[:200]

@@ -204,7 +204,7 @@ def test_unknown_units_in_python(make: Any) -> None:
             model.replace(states=(part,))
         else:
             model.with_parameters(part)
-    with pytest.raises(BadModel, match="unit of 'q'"):
+    with pytest.raises(BadModel, match="unit of parameter 'q'"):
         model.with_parameters(Parameter("q", 1.0, 5))  # type: ignore[arg-type]
 
 
