@@ -1,4 +1,4 @@
-"""What survives damage and violence: cache files damaged, commands killed.
+"""What survives damage and violence: hostile inputs, cache files damaged, commands killed.
 
 Usage: python benchmarks/report_reliability.py FOLDER
 
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import reliability_cache
+import reliability_fuzz
 import reliability_kills
 from provenance import provenance
 
@@ -42,10 +43,13 @@ def main(folder: str) -> None:
     made = len(damages), sum(not k["ended"] for k in kills)
     short = [] if made[0] >= wanted[0] and made[1] >= wanted[1] else [
         f"Cut short: {made[0]} of {wanted[0]} damages, {made[1]} of {wanted[1]} kills."]
-    parts = ["# Reliability", *short, *cache_part(damages), *kills_part(kills), "## Settings", (
-        "Written by `benchmarks/report_reliability.py` from `reliability_cache.py` (seeds "
-        f"{counts}) and `reliability_kills.py` (seed {reliability_kills.SEED}). {provenance()}; "
-        f"numba {version('numba')}, llvmlite {version('llvmlite')}.")]
+    fuzzed = reliability_fuzz.fuzz()
+    parts = ["# Reliability", *short, *fuzz_part(fuzzed), *cache_part(damages), *kills_part(kills),
+             "## Settings", (
+        f"Written by `benchmarks/report_reliability.py` from `reliability_fuzz.py` (seed "
+        f"{fuzzed.seed}), `reliability_cache.py` (seeds {counts}) and `reliability_kills.py` (seed "
+        f"{reliability_kills.SEED}). {provenance()}; numba {version('numba')}, llvmlite "
+        f"{version('llvmlite')}.")]
     Path(folder).mkdir(parents=True, exist_ok=True)
     atomically(Path(folder) / "reliability.md", ("\n\n".join(parts) + "\n").encode())
 
@@ -59,6 +63,15 @@ def kept(script: str, argument: str) -> list[dict[str, Any]]:
                         str(path)], check=True)
     found: list[dict[str, Any]] = json.loads(path.read_bytes())
     return found
+
+
+def fuzz_part(fuzzed: reliability_fuzz.Fuzzed) -> list[str]:
+    """Hostile inputs by reader or loader, and what became of them."""
+    return ["## Hostile inputs", (
+        "Files of every form, altered at random in their bytes or in their structure, and command "
+        "lines. *Read*: an object came of it, which could be used; *refused*: one sentence. A "
+        "failure is any other exception, more than 10 s of processor time for one input, or a "
+        "process of more than 1 GB."), fuzzed.markdown()]
 
 
 def cache_part(damages: Sequence[dict[str, Any]]) -> list[str]:

@@ -168,12 +168,14 @@ def test_no_module_needs_the_front_door() -> None:
     assert through == []
 
 
-def test_no_cycles_at_import_time() -> None:
+def test_no_circle_of_imports() -> None:
+    """Imports inside functions and for type checkers count as well."""
     known = modules()
     graph: dict[str, set[str]] = {name: set() for name in known}
     for i in imports():
-        if not i.deferred and i.imported in known and i.imported != i.importer:
+        if i.imported in known and i.imported != i.importer:
             graph[i.importer].add(i.imported)
+    del graph["pikanid"]  # the front door names everything, and reads the version for all
     try:
         tuple(TopologicalSorter(graph).static_order())
     except CycleError as cycle:
