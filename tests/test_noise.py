@@ -311,3 +311,12 @@ def test_coloured_noise_counts_as_quiet_only_beside_something_louder() -> None:
     quiet = sum(_is_quiet(y, 8.0 * float(np.var(y)))
                 for y in (coloured(300, 0.6, seed) for seed in range(20)))
     assert quiet >= 16
+
+
+def test_one_missing_sample_ends_a_stretch() -> None:
+    model = noise.estimate(swing(0.6, 3))
+    assert len(model.ar)  # neighbours are correlated: it matters who they are
+    t, r = np.delete(np.arange(40) * DT, 20), np.random.default_rng(0).normal(size=39)
+    apart = np.concatenate([model.whiten(r[:20]), model.whiten(r[20:])])
+    np.testing.assert_allclose(model.whiten(r, t), apart)
+    assert np.any(np.abs(model.whiten(r) - apart) > 0.01)

@@ -215,6 +215,10 @@ def test_network_without_data_is_read() -> None:
     reading = extract(kan, x, inputs=["theta", "omega"], library=FEW)
     assert sorted(reading.forms.values()) == ["cubic", "sine"]
     assert reading.p_value is None and reading.error_data is None and reading.ok
+    torch = pytest.importorskip("torch")
+    kan(torch.tensor(x))  # what it saw last stands for inputs that are not given
+    again = extract(kan, inputs=["theta", "omega"], library=FEW)
+    assert again.forms == reading.forms and again.ranges == reading.ranges
 
 
 def test_what_no_form_says_is_not_read() -> None:
