@@ -107,7 +107,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
     """In the first run, of the code as it is: note what runs, and end and note what is slow."""
-    if mutant():
+    if os.environ.get("MUTANT_UNDER_TEST") != "stats":
         return (yield)
 
     def too_long(*_: Any) -> None:
