@@ -338,7 +338,7 @@ def estimate(rng: np.random.Generator, folder: Path) -> None:
 
 def network(rng: np.random.Generator, folder: Path) -> None:
     """Saved networks: JSON, and NPZ of the same content."""
-    from pikanid.approximators.kan.state import load
+    from pikanid.approximators.kan.file import load
 
     packed = rng.random() < 0.3
     path = folder / ("input.npz" if packed else "input.json")
@@ -437,7 +437,7 @@ def _warm(name: str, folder: Path) -> None:
 
     units.is_unit("no unit")
     if name == "network":
-        from pikanid.approximators.kan.state import load
+        from pikanid.approximators.kan.file import load
 
         (folder / "input.json").write_text(json.dumps(network_content()))
         load(folder / "input.json")

@@ -171,5 +171,8 @@ def _array(found: dict[str, Entry], name: str, wrong: Callable[[str], errors.Pik
 
 def _kink(entry: Entry, knots: Array, k: int, outputs: int) -> Kink:
     get = entry.table(("time", "order", "jump"))
+    jump = get["jump"].array(outputs)
+    if not np.all(np.isfinite(jump)):
+        raise get["jump"].fail("finite numbers")
     return Kink(get["time"].number(float(knots[k]), float(knots[-k - 1])),
-                get["order"].integer(1, k), get["jump"].array(outputs), knots, k)
+                get["order"].integer(1, k), jump, knots, k)
