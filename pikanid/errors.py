@@ -644,10 +644,6 @@ def not_a_formula(where: str, value: object) -> str:
     )
 
 
-def model_too_long(limit: int) -> str:
-    return f"The formulas of the model are longer than {limit} characters together."
-
-
 def model_file_unreadable(path: str, detail: str) -> str:
     return f"The model file '{path}' cannot be read: {detail}."
 
@@ -768,13 +764,6 @@ def too_many_events(time: float) -> str:
     return (
         f"The model switches without end near t = {time:g} s (over 1000 events in one step): "
         "a non-smooth term chatters; check its sign."
-    )
-
-
-def tolerance_not_reached(tolerance: float, reached: float) -> str:
-    return (
-        f"The simulation reaches an error of {reached:.2g} at best, not {tolerance:.2g}: "
-        "raise the tolerance or choose method='implicit'."
     )
 
 

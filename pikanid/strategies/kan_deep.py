@@ -63,11 +63,6 @@ class Shape:
     seed: int = 0
 
 
-def is_deep(width: Width) -> bool:
-    """Whether there is a hidden layer."""
-    return len(width) > 2
-
-
 def deep_fit(setup: Setup, start: RelaxedFit, shape: Shape, lam: float | None,
              tell: Callable[[int, Sequence[Stage]], None]) -> RelaxedFit:
     """Train networks of a shape from a shallow fit, at λ or from the shallow fit's λ upwards.
