@@ -13,7 +13,7 @@ collect_ignore_glob = (
     else [
         "pikanid/approximators/kan/*.py",
         "pikanid/approximators/mlp.py",
-        "pikanid/equivalence/*.py",
+        "pikanid/validation/equivalence/*.py",
         "pikanid/optimise/gradient*.py",
         "pikanid/simulation/torch_field.py",
         "pikanid/strategies/pinn*.py",

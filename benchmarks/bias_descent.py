@@ -9,10 +9,10 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from pikanid.approximators.kan import ShallowKAN
-from pikanid.chains import find_chains
-from pikanid.functional import Functional
+from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import BandedSystem, Point, gauss_newton
-from pikanid.problem import Problem
+from pikanid.problem.chains import find_chains
+from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.kan_paper import COLLOCATION, STAGES

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import LinAlgError
 
-from pikanid import excitation, systems
-from pikanid.chains import Chains, find_chains
 from pikanid.errors import PikanidError
 from pikanid.estimate import Estimate
-from pikanid.model import Model
+from pikanid.model import Model, systems
 from pikanid.optimise.schedules import Fixed
-from pikanid.problem import Problem
-from pikanid.recording import Recording
+from pikanid.problem.chains import Chains, find_chains
+from pikanid.problem.problem import Problem
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import simulate
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.grids import Grid, Quadrature, chosen_grid

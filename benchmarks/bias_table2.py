@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from pikanid.chains import Form, find_chains
 from pikanid.optimise.schedules import Fixed
-from pikanid.problem import Problem
+from pikanid.problem.chains import Form, find_chains
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.grids import Grid, Knots, Quadrature, chosen_grid, paper_intervals

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import pikanid as pk
-from pikanid.concealed.score import Share
+from pikanid.validation.concealed.score import Share
 
 SIGMA = 0.1 * math.pi / 180
 CORRELATIONS = {"white": 0.0, "AR(1), ρ = 0.5": 0.5}

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import pikanid as pk
-from pikanid import datasets
-from pikanid.mismatch.result import Diagnosis
+from pikanid.mismatch.report.diagnosis import Diagnosis
+from pikanid.recording import datasets
 from pikanid.study import pendulum
 
 MODELS = {

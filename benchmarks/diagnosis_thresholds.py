@@ -19,26 +19,31 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
 from remembering import Memory
 
 import pikanid as pk
-from pikanid import noise
-from pikanid.concealed.score import judge
 from pikanid.errors import PikanidError
-from pikanid.mismatch import api, case, search, symbols
-from pikanid.outputs import atomically
+from pikanid.mismatch import case
+from pikanid.mismatch import diagnose as api
+from pikanid.mismatch.beyond import formulas as symbols
+from pikanid.mismatch.search import search
+from pikanid.noise import level as noise
+from pikanid.storage.outputs import atomically
 from pikanid.strategies.nls import NLS
+from pikanid.validation.concealed.score import judge
 
 FACTORS = (0.75, 1.25)
 FEW = 3  # cases of each set that thresholds inside fits are tried on: nothing can be remembered
 FOLDER = Path(api.__file__).parent
 PACKAGE = api.__package__
+MODULES = {path.stem: path for path in sorted(FOLDER.rglob("*.py")) if path.stem != "__init__"}
 # a threshold that is looked up nowhere else changes no result of what is remembered
-OUTSIDE = {"api", "case", "doubt", "noise_level", "outliers", "preparation", "screen", "search",
-           "symbols", "verdict"}
+OUTSIDE = {"diagnose", "case", "doubt", "noise_level", "outliers", "preparation", "screen",
+           "search", "formulas", "verdict"}
 REMEMBERED = ((noise, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
               (symbols, "name_curve"), (case, "residual_tests"), (case, "held_out"),
               (api, "force_shape"))
@@ -52,17 +57,18 @@ STEPS = "iterations or steps of a numerical method"
 LEFT_OUT: Mapping[str, Mapping[str, str]] = {
     AFTERWARDS: {"advice": "*", "force_shape": "ADEQUATE OWN", "latent_force": "*", "locate": "*",
                  "patch": "*", "penalised": "*"},
-    BEFOREHAND: {"confusable": "*", "experiments": "*", "profiles": "*", "seen": "*",
-                 "sizing": "*"},
+    BEFOREHAND: {"confusable": "*", "next_experiment": "*", "profiles": "*",
+                 "response": "*", "sizing": "*"},
     LONGER: {"case": "SEARCHED", "preparation": "LONG FINE MOST", "remainder": "MOST_ROWS"},
     REPEATED: {"repeats": "*"},
-    STEPS: {"api": "RELEVELLED ASKED", "case": "AGAIN", "descent": "HILLS COARSE RENEWED",
-            "growing": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED", "judge": "AGAIN",
-            "least_squares": "PATIENCE", "tangent": "*", "whitened": "FINEST"},
-    "number of threads": {"in_turn": "*"},
+    STEPS: {"diagnose": "RELEVELLED ASKED", "case": "AGAIN", "descent": "HILLS COARSE RENEWED",
+            "progressive_horizon": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED",
+            "prediction": "AGAIN", "least_squares": "PATIENCE", "tangent": "*",
+            "whitened": "FINEST"},
+    "number of threads": {"parallel": "*"},
     "far above rounding and far below what decides anything": {"decisions": "*"},
     "number of draws, points or knots": {
-        "detect": "DRAWS BATCH", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
+        "residual_tests": "DRAWS BATCH", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
     "where fits begin": {"beginning": "SHARE", "channels": "LAGS", "late_inputs": "SHIFTS"},
     "acts without a held-out recording only": {"preparation": "ASIDE LEAST"}}
 
@@ -83,10 +89,16 @@ class Threshold:
     @property
     def value(self) -> Any:
         """As it stands."""
-        return getattr(import_module(f"{PACKAGE}.{self.module}"), self.name)
+        return getattr(imported(self.module), self.name)
 
     def __str__(self) -> str:
         return f"{self.module}.{self.name}"
+
+
+def imported(module: str) -> ModuleType:
+    """The module of the diagnosis that has this name, whichever room it stands in."""
+    return import_module(
+        ".".join([PACKAGE, *MODULES[module].relative_to(FOLDER).with_suffix("").parts]))
 
 
 def scaled(value: Any, factor: float) -> Any:
@@ -106,20 +118,21 @@ def scaled(value: Any, factor: float) -> Any:
 @functools.cache
 def named_numbers() -> tuple[Threshold, ...]:
     """All that the modules of the diagnosis name, whether thresholds or not."""
-    trees = {path.stem: ast.parse(path.read_text()) for path in sorted(FOLDER.glob("*.py"))}
+    trees = {module: ast.parse(path.read_text()) for module, path in MODULES.items()}
     users: dict[tuple[str, str], set[str]] = {}
     for module, tree in trees.items():
         for node in ast.walk(tree):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(PACKAGE):
+            dotted = node.module or "" if isinstance(node, ast.ImportFrom) else ""
+            if isinstance(node, ast.ImportFrom) and dotted.startswith(PACKAGE):
                 for alias in node.names:
-                    users.setdefault((node.module or "", alias.name), set()).add(module)
+                    users.setdefault((dotted.split(".")[-1], alias.name), set()).add(module)
     found = []
     for module, tree in trees.items():
         names = [n.id for node in tree.body if isinstance(node, ast.Assign)
                  for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)]
         for name in names:
             own = Threshold(module, name, frozenset(
-                {module} | users.get((f"{PACKAGE}.{module}", name), set())))
+                {module} | users.get((module, name), set())))
             if name.isupper() and name != "INF" and _numeric(own.value):
                 found.append(own)
     return tuple(found)
@@ -148,7 +161,7 @@ def changed(threshold: Threshold, factor: float) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         for user in threshold.users:
             stack.enter_context(patch.object(
-                import_module(f"{PACKAGE}.{user}"), threshold.name, value))
+                imported(user), threshold.name, value))
         yield
 
 

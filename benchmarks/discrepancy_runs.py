@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 import pikanid as pk
-from pikanid import discrepancy, excitation, systems
+from pikanid import discrepancy
 from pikanid.discrepancy import Discrepancy, Edge
-from pikanid.outputs import atomically
-from pikanid.recording import Recording
+from pikanid.model import systems
+from pikanid.recording import Recording, excitation
+from pikanid.storage.outputs import atomically
 from pikanid.uncertainty import cramer_rao
 
 SIGMA = 0.1 * np.pi / 180

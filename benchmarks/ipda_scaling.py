@@ -59,7 +59,7 @@ def one(kind: str, size: int) -> None:
     import numpy as np
 
     import pikanid as pk
-    from pikanid.problem import Problem
+    from pikanid.problem.problem import Problem
     from pikanid.strategies.ipda import IPDA, fit_relaxed
 
     def problem(count: int) -> Problem:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import pikanid as pk
-from pikanid import datasets
+from pikanid.recording import datasets
 
 SIGMA = 0.1 * math.pi / 180
 DURATION, DT, REST = 12.0, 0.01, 2.0

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pikanid.outputs import atomically
+from pikanid.storage.outputs import atomically
 
 SEEDS = (20, 21, 22, 23)
 DAMAGES = 50  # with each seed, in a process of its own
@@ -90,7 +90,8 @@ class Cached:
     """What is kept, and the numbers that it gives when it is loaded again."""
 
     def __init__(self) -> None:
-        from pikanid import excitation, systems
+        from pikanid.model import systems
+        from pikanid.recording import excitation
         from pikanid.simulation import compiled, translated
         from pikanid.simulation.native_tape import native
         from pikanid.simulation.structure import Structure
@@ -102,7 +103,7 @@ class Cached:
 
     def tape(self) -> bytes:
         """Samples of a simulation that runs from a tape."""
-        from pikanid.problem import bind
+        from pikanid.problem.problem import bind
 
         self.native.cache_clear()
         self.translated.machine.cache_clear()
@@ -114,9 +115,9 @@ class Cached:
     def function(self) -> bytes:
         """What functions of three modules give that numba has compiled."""
         from pikanid.approximators.local_basis import tabulate
-        from pikanid.cache_jit import cached_jit
-        from pikanid.held_play import play
-        from pikanid.mismatch.recurrences import follow
+        from pikanid.mismatch.catalogue.recurrences import follow
+        from pikanid.problem.backlash import play
+        from pikanid.storage.jit import cached_jit
 
         t = np.linspace(0.0, 1.0, 50)
         (found_play, found_follow) = (cached_jit()(f.py_func) for f in (play, follow))
@@ -130,7 +131,7 @@ class Cached:
 
     def source(self) -> bytes:
         """Samples of a compiled model."""
-        from pikanid.problem import bind
+        from pikanid.problem.problem import bind
         from pikanid.simulation.simulator import Simulator
 
         self.compiled._load.cache_clear()
@@ -155,7 +156,7 @@ def damages(seed: int, number: int = DAMAGES) -> list[Damaged]:
 
 
 def _damages(number: int, rng: np.random.Generator) -> list[Damaged]:
-    from pikanid import cache
+    from pikanid.storage import cache
 
     cached = Cached()
     uses = {"tape": cached.tape, "function": cached.function, "source": cached.source,

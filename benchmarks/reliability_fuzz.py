@@ -357,7 +357,7 @@ def network(rng: np.random.Generator, folder: Path) -> None:
 
 def diagnosis(rng: np.random.Generator, folder: Path) -> None:
     """Diagnoses and cases of truth files, as they are compared."""
-    from pikanid.concealed.score import judge
+    from pikanid.validation.concealed.score import judge
 
     if rng.random() < 0.5:
         judge(altered(CASE, rng), ANSWER)
@@ -367,7 +367,7 @@ def diagnosis(rng: np.random.Generator, folder: Path) -> None:
 
 def seals(rng: np.random.Generator, folder: Path) -> None:
     """Truth files and seals."""
-    from pikanid.concealed.seal import matches
+    from pikanid.validation.concealed.seal import matches
 
     first = rng.random() < 0.5
     truth, seal = json.dumps(TRUTH).encode(), json.dumps(SEAL).encode()
@@ -433,7 +433,7 @@ def one(name: str, seed: int, number: int, folder: Path) -> str:
 
 def _warm(name: str, folder: Path) -> None:
     """Load the libraries: their seconds are no input's."""
-    from pikanid import units
+    from pikanid.formula import units
 
     units.is_unit("no unit")
     if name == "network":

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pikanid.outputs import STAGED, atomically
+from pikanid.storage.outputs import STAGED, atomically
 
 SEED = 21
 MARK = "PIKANID_KILLED_RUN"
@@ -119,7 +119,7 @@ def concealed(folder: Path) -> list[str]:
                   if any(str(key[name]).encode() in text for text in texts)]
     truth = folder / "truth.json"
     if truth.exists():
-        from pikanid.concealed.seal import matches
+        from pikanid.validation.concealed.seal import matches
 
         if not matches(given, truth):
             wrong.append("the seal does not fit")
@@ -215,7 +215,8 @@ def _of(mark: str) -> list[int]:
 
 
 def _recordings(place: Path) -> None:
-    from pikanid import excitation, systems
+    from pikanid.model import systems
+    from pikanid.recording import excitation
     from pikanid.simulation import simulate
 
     for seed, name in enumerate(("run", "other")):

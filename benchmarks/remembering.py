@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from pikanid.mismatch.candidate import Candidate
-from pikanid.mismatch.closest import Closest
-from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.whitened import Whitened
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.fitting.closest import Closest
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 
 PLAIN = (str, int, float, bool, type(None), sp.Basic)
 

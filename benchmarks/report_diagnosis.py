@@ -27,12 +27,12 @@ import diagnosis_thresholds
 import numpy as np
 from provenance import provenance
 
-from pikanid.concealed.generate import generate
-from pikanid.concealed.score import Score, Share, judge, reliability, tally
-from pikanid.concealed.seal import Settings
 from pikanid.errors import DatasetUnavailable
-from pikanid.outputs import atomically
-from pikanid.plots import new_figure, save_figure
+from pikanid.estimate.plots import new_figure, save_figure
+from pikanid.storage.outputs import atomically
+from pikanid.validation.concealed.generate import generate
+from pikanid.validation.concealed.score import Score, Share, judge, reliability, tally
+from pikanid.validation.concealed.seal import Settings
 
 DEGREE = math.pi / 180
 LONGEST = 5  # diagnoses of a set that are timed again by themselves
@@ -165,7 +165,7 @@ are Wilson's at 95 %.
 
 def _diagnosed(one: Set, work: Path, cases: int, workers: int
                ) -> Iterator[tuple[Score, dict[str, Any]]]:
-    from pikanid.concealed.deck import DEFAULT_MIX
+    from pikanid.validation.concealed.deck import DEFAULT_MIX
 
     folder = work / one.name
     settings = Settings(cases, one.excitation, one.sigma, dict(one.mix or DEFAULT_MIX))

@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from provenance import provenance
 
 from pikanid.discrepancy.api import GRID
-from pikanid.outputs import atomically
-from pikanid.plots import new_figure, save_figure, tidy
+from pikanid.estimate.plots import new_figure, save_figure, tidy
 from pikanid.reporting.sheet import Sheet
+from pikanid.storage.outputs import atomically
 
 SIZES = (20.0, 100.0)
 SEEDS, CLEAN_SEEDS = 10, 20

@@ -13,8 +13,8 @@ import time
 
 from provenance import provenance
 
-from pikanid.equivalence import run_checks
-from pikanid.outputs import atomically
+from pikanid.storage.outputs import atomically
+from pikanid.validation.equivalence import run_checks
 
 SEED = 0
 

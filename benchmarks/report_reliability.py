@@ -22,7 +22,7 @@ import reliability_fuzz
 import reliability_kills
 from provenance import provenance
 
-from pikanid.outputs import atomically
+from pikanid.storage.outputs import atomically
 
 KEPT = Path("build")
 HOW = {

@@ -12,7 +12,7 @@ import sympy as sp
 
 from pikanid.approximators.kan import build_kan
 from pikanid.approximators.kan.train import PointFit, fit_points
-from pikanid.expressions import parse, symbol
+from pikanid.formula.expressions import parse, symbol
 from pikanid.symbolic import extract
 from pikanid.symbolic.reading import Reading
 

@@ -7,8 +7,8 @@ import pytest
 import reference
 
 import pikanid as pk
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 
 GROUP = "NLS, one start, N = 501, sigma = 0.1 deg"
 

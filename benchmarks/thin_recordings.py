@@ -1,6 +1,6 @@
 """Makes the excerpts of real recordings that the package ships, from the originals.
 
-    python benchmarks/thin_recordings.py [FOLDER, by default pikanid/excerpts]
+    python benchmarks/thin_recordings.py [FOLDER, by default pikanid/recording/data]
 
 The same originals give the same bytes.  The pendulum's angle is thinned from 1 kHz to 100 Hz
 without an anti-alias filter, because none is needed: the arm swings below 5 Hz, and all that lies
@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from pikanid import datasets
-from pikanid.outputs import atomically
+from pikanid.recording import datasets
+from pikanid.storage.outputs import atomically
 
 STRIDE = 10  # of the pendulum: 1 kHz recorded, 100 Hz kept
 DIGITS = 6  # of the angle [rad] after the point: 1/160 of the encoder's step
@@ -67,7 +67,7 @@ def excerpts(balls: Sequence[str] = datasets.BALLS) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else "pikanid/excerpts")
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "pikanid/recording/data")
     for file, text in excerpts().items():
         atomically(target / file, text.encode())
         print(f"{target / file}: {len(text.encode())} bytes")

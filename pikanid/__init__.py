@@ -16,20 +16,21 @@ from typing import TYPE_CHECKING
 from pikanid.version import __version__
 
 if TYPE_CHECKING:
-    from pikanid import datasets, excitation, symbolic, systems, uncertainty
+    from pikanid import symbolic, uncertainty
     from pikanid.discrepancy import kan_discrepancy
     from pikanid.estimate import Estimate
-    from pikanid.mismatch import Diagnosis, diagnose
-    from pikanid.mismatch.confusable import confusable
-    from pikanid.mismatch.experiments import d_optimal, next_experiment
-    from pikanid.model import Input, Model, Output, Parameter, State
-    from pikanid.recording import Channel, Recording
+    from pikanid.mismatch.design.confusable import confusable
+    from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
+    from pikanid.mismatch.diagnose import diagnose
+    from pikanid.mismatch.report.diagnosis import Diagnosis
+    from pikanid.model import Input, Model, Output, Parameter, State, systems
+    from pikanid.recording import Channel, Recording, datasets, excitation
     from pikanid.simulation import simulate
     from pikanid.strategies import IPDA, NLS, PDA, PIKAN, PINN
 
 
-# Name -> the module that defines it; None where the name is itself a module of the package.
-_HOMES: dict[str, str | None] = {
+# Name -> the module that defines it.
+_HOMES = {
     "Model": "pikanid.model",
     "State": "pikanid.model",
     "Input": "pikanid.model",
@@ -44,17 +45,21 @@ _HOMES: dict[str, str | None] = {
     "PINN": "pikanid.strategies",
     "PIKAN": "pikanid.strategies",
     "kan_discrepancy": "pikanid.discrepancy",
-    "diagnose": "pikanid.mismatch",
-    "Diagnosis": "pikanid.mismatch",
-    "confusable": "pikanid.mismatch.confusable",
-    "next_experiment": "pikanid.mismatch.experiments",
-    "d_optimal": "pikanid.mismatch.experiments",
+    "diagnose": "pikanid.mismatch.diagnose",
+    "Diagnosis": "pikanid.mismatch.report.diagnosis",
+    "confusable": "pikanid.mismatch.design.confusable",
+    "next_experiment": "pikanid.mismatch.design.next_experiment",
+    "d_optimal": "pikanid.mismatch.design.next_experiment",
     "simulate": "pikanid.simulation",
-    "symbolic": None,
-    "systems": None,
-    "excitation": None,
-    "uncertainty": None,
-    "datasets": None,
+}
+
+# Name -> the module that it stands for.
+_MODULES = {
+    "symbolic": "pikanid.symbolic",
+    "systems": "pikanid.model.systems",
+    "excitation": "pikanid.recording.excitation",
+    "uncertainty": "pikanid.uncertainty",
+    "datasets": "pikanid.recording.datasets",
 }
 
 __all__ = [
@@ -93,10 +98,12 @@ def __getattr__(name: str) -> object:
     Raises:
         AttributeError: If the package has no public name ``name``.
     """
-    if name not in _HOMES:
+    if name in _HOMES:
+        found = getattr(import_module(_HOMES[name]), name)
+    elif name in _MODULES:
+        found = import_module(_MODULES[name])
+    else:
         raise AttributeError(f"module 'pikanid' has no attribute {name!r}")
-    home = _HOMES[name]
-    found = getattr(import_module(home), name) if home else import_module(f"pikanid.{name}")
     globals()[name] = found  # the next access no longer comes through here
     return found
 

@@ -61,7 +61,7 @@ def _did_you_mean(close: Sequence[str]) -> str:
 def no_model(kind: str) -> str:
     return (
         f"A model is needed, not a {kind}: give a Model (Model.load(path), Model.from_dict(...), "
-        "pikanid.systems); the model comes before the recordings."
+        "pikanid.model.systems); the model comes before the recordings."
     )
 
 

@@ -50,7 +50,7 @@ def compare(model: Model, recording: Recording, reference: Reference, *,
     the
     default tolerance is what a fit of 400 samples at `SIGMA` asks for.
     """
-    from pikanid.problem import bind
+    from pikanid.problem.problem import bind
     from pikanid.simulation.simulator import Simulator
     from pikanid.simulation.synthetic import with_outputs
 

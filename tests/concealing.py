@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from scipy.integrate import quad
 
-from pikanid.concealed.experiment import Experiment, grid
-from pikanid.concealed.rig import Rig
+from pikanid.validation.concealed.experiment import Experiment, grid
+from pikanid.validation.concealed.rig import Rig
 
 
 def push(duration: float, u_x: Callable[[np.ndarray], np.ndarray] | float = 0.0,

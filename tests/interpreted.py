@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pikanid import systems
-from pikanid.model import Model
-from pikanid.problem import bind
+from pikanid.model import Model, systems
+from pikanid.problem.problem import bind
 from pikanid.recording import Recording
 from pikanid.simulation import compiled as compiler
 from pikanid.simulation import support, translated
@@ -49,7 +48,7 @@ def _module(structure: Structure, method: Method) -> types.ModuleType:
     model = structure.model
     source = compiler._source(model, method)
     source = source.replace("from numba import njit\n", "")
-    source = source.replace("from pikanid.cache_jit import cached_jit\n", "")
+    source = source.replace("from pikanid.storage.jit import cached_jit\n", "")
     source = source.replace("np.zeros(1, WORK)", "[fields_of(WORK)]")
     made = types.ModuleType("interpreted")
     made.__dict__.update(njit=_plain, cached_jit=_plain, fields_of=_fields)

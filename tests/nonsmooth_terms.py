@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import oracle
 
-from pikanid import excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.recording import Recording
+from pikanid.model import Model, Parameter, systems
+from pikanid.recording import Recording, excitation
 
 G = 9.81
 Values = Mapping[str, float]

@@ -8,10 +8,10 @@ import numpy as np
 
 import pikanid as pk
 from pikanid.approximators.tables import gauss_nodes
-from pikanid.chains import Form, find_chains
-from pikanid.functional import Functional, bind
+from pikanid.objective.functional import Functional, bind
 from pikanid.optimise.gauss_newton import Point
-from pikanid.problem import Problem
+from pikanid.problem.chains import Form, find_chains
+from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.grids import default_grid
 

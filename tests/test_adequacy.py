@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, chi2
 
-from pikanid.adequacy import difference_noise, judge
+from pikanid.objective.adequacy import difference_noise, judge
 
 
 def test_value_and_probability_are_those_of_the_chi_square() -> None:

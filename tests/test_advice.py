@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.advice import EXPLORE, PROVE, STRENGTHEN, advice
-from pikanid.mismatch.findings import Explanation
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.whitened import Records
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.report.advice import EXPLORE, PROVE, STRENGTHEN, advice
+from pikanid.mismatch.report.findings import Explanation
 
 RATE = float(np.sqrt(9.81 / 0.045))
 

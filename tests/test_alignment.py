@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pikanid.alignment import energy_delay, moving
-from pikanid.channel import Channel
 from pikanid.errors import BadRecording
 from pikanid.recording import Recording
+from pikanid.recording.alignment import energy_delay, moving
+from pikanid.recording.channel import Channel
 
 T = np.arange(0, 4, 0.002)
 WINDOW = np.clip(np.sin(np.pi * (T - 0.5) / 3), 0, None) ** 4 * ((T > 0.5) & (T < 3.5))

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from numba.core import config
 
-from pikanid import cache
-from pikanid.cache_jit import cached_jit
+from pikanid.storage import cache
+from pikanid.storage.jit import cached_jit
 
 CONTENT = bytes(range(256)) * 4
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid import excitation, systems
-from pikanid.expressions import symbol
-from pikanid.mismatch.candidate import Candidate, Channel
-from pikanid.mismatch.catalogue import candidates
-from pikanid.mismatch.site import sites
-from pikanid.model import Model
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.candidate import Candidate, Channel
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.model import Model, systems
+from pikanid.recording import excitation
 
 
 def made(model: Model) -> tuple[Candidate, ...]:

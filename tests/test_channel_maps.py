@@ -10,9 +10,9 @@ import oracle
 import pytest
 from comparing import SIGMA, compare
 
-from pikanid import errors, excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.recording import Recording
+from pikanid import errors
+from pikanid.model import Model, Parameter, systems
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import Steps
 
 Values = Mapping[str, float]

@@ -21,8 +21,8 @@ Progress = Callable[[str], None] | None
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, object]]:
     """Two settings and one negative control in place of all; what the command asked for."""
     pytest.importorskip("torch", reason="needs the `kan` extra")
-    from pikanid import equivalence
-    from pikanid.equivalence.controls import quadratic_at_the_end
+    from pikanid.validation import equivalence
+    from pikanid.validation.equivalence.controls import quadratic_at_the_end
 
     calls: list[dict[str, object]] = []
 
@@ -72,7 +72,7 @@ def test_report_and_figure(asked: list[dict[str, object]], tmp_path: Path,
 def test_a_difference_is_exit_code_3(asked: list[dict[str, object]],
                                      monkeypatch: pytest.MonkeyPatch,
                                      capsys: pytest.CaptureFixture[str]) -> None:
-    from pikanid import equivalence
+    from pikanid.validation import equivalence
 
     few = equivalence.run_checks
 
@@ -103,7 +103,7 @@ def test_bad_input_is_one_sentence(arguments: list[str], tmp_path: Path,
 @pytest.mark.parametrize("quick", [True, False])
 def test_progress_counts_every_part(quick: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("torch", reason="needs the `kan` extra")
-    from pikanid.equivalence import checks, controls, deep, delivery
+    from pikanid.validation.equivalence import checks, controls, deep, delivery
 
     monkeypatch.setattr(checks, "compare", lambda setting: ())
     monkeypatch.setattr(checks, "compare_paths", lambda setting, quick: ())

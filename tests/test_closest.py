@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.closest import Closest
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.whitened import GROSS, Records, Whitened, allowance
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import GROSS, Records, Whitened, allowance
+from pikanid.mismatch.fitting.closest import Closest
 
 SIGMA = 0.002
 

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pikanid import systems
-from pikanid.model import Model, Parameter, Spline
+from pikanid.model import Model, Parameter, Spline, systems
 from pikanid.simulation import compiled as compiler
 
 pytestmark = pytest.mark.compiled

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from pikanid import errors
-from pikanid.concealed import noise as noises
-from pikanid.concealed.deck import CLASSES, DEFAULT_MIX, FLOW, deal, parse_mix
-from pikanid.concealed.effect import Scales
-from pikanid.concealed.effects import CATALOGUE, IDS, NEAR, OUTSIDE
-from pikanid.concealed.excitations import RICH_KINDS, Bounds, pair, rich, two_pulse
-from pikanid.concealed.noise import Noise
-from pikanid.concealed.rig import Rig
-from pikanid.concealed.simulate import measured
+from pikanid.validation.concealed import noise as noises
+from pikanid.validation.concealed.deck import CLASSES, DEFAULT_MIX, FLOW, deal, parse_mix
+from pikanid.validation.concealed.effect import Scales
+from pikanid.validation.concealed.effects import CATALOGUE, IDS, NEAR, OUTSIDE
+from pikanid.validation.concealed.excitations import RICH_KINDS, Bounds, pair, rich, two_pulse
+from pikanid.validation.concealed.noise import Noise
+from pikanid.validation.concealed.rig import Rig
+from pikanid.validation.concealed.simulate import measured
 
 # As the catalogue of effects names them.
 CATALOGUE_IDS = {

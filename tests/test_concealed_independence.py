@@ -11,12 +11,11 @@ from pathlib import Path
 
 import pytest
 
-ROOM = Path(__file__).resolve().parents[1] / "pikanid" / "concealed"
+ROOM = Path(__file__).resolve().parents[1] / "pikanid" / "validation" / "concealed"
 # Keeping compiled code, reading and writing files, checking types and ending workers says nothing
 # about any motion.
-PLUMBING = ("pikanid.cache", "pikanid.cache_jit", "pikanid.entries", "pikanid.outputs",
-            "pikanid.stored", "pikanid.workers")
-ALLOWED = ("pikanid.errors", *PLUMBING, "pikanid.concealed")
+PLUMBING = ("pikanid.storage",)
+ALLOWED = ("pikanid.errors", *PLUMBING, "pikanid.validation.concealed")
 
 
 def imported(tree: ast.AST) -> set[str]:
@@ -40,7 +39,7 @@ def allowed(name: str) -> bool:
 
 
 FILES = [*sorted(ROOM.rglob("*.py")),
-         *(ROOM.parents[1].joinpath(*name.split(".")).with_suffix(".py") for name in PLUMBING)]
+         *sorted((ROOM.parents[1] / "storage").glob("*.py"))]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -51,7 +50,8 @@ def test_only_errors_and_plumbing_are_shared(path: Path) -> None:
 
 @pytest.mark.parametrize("statement", [
     "from pikanid.simulation import simulate", "import pikanid.model",
-    "from pikanid import noise", "import importlib; importlib.import_module('pikanid.systems')",
+    "from pikanid import noise",
+    "import importlib; importlib.import_module('pikanid.model.systems')",
     "def f():\n    from pikanid.mismatch import catalogue"])
 def test_the_rule_catches(statement: str) -> None:
     assert not all(allowed(name) for name in imported(ast.parse(statement)))
@@ -60,11 +60,11 @@ def test_the_rule_catches(statement: str) -> None:
 def test_making_a_set_loads_nothing_else() -> None:
     code = (
         "import sys\n"
-        "from pikanid.concealed.generate import orders_of\n"
-        "from pikanid.concealed.case import make\n"
-        "from pikanid.concealed.seal import Settings, secret\n"
+        "from pikanid.validation.concealed.generate import orders_of\n"
+        "from pikanid.validation.concealed.case import make\n"
+        "from pikanid.validation.concealed.seal import Settings, secret\n"
         "make(orders_of(Settings(1, 'two_pulse', 1e-3, {'nothing': 1.0}), secret(0))[0])\n"
         "print(*sorted(name for name in sys.modules if name.startswith('pikanid.')))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     foreign = {name for name in done.stdout.split() if not allowed(name)}
-    assert foreign <= {"pikanid.version"}  # of the front door itself
+    assert foreign <= {"pikanid.version", "pikanid.validation"}  # the packages around it

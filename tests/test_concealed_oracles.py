@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from concealing import crossings, period, push, still, weightless
 
-from pikanid.concealed import equations
-from pikanid.concealed.effects import CATALOGUE, NEAR, OUTSIDE
-from pikanid.concealed.excitations import two_pulse
-from pikanid.concealed.experiment import Experiment
-from pikanid.concealed.rig import Rig
-from pikanid.concealed.simulate import measured, motion
+from pikanid.validation.concealed import equations
+from pikanid.validation.concealed.effects import CATALOGUE, NEAR, OUTSIDE
+from pikanid.validation.concealed.excitations import two_pulse
+from pikanid.validation.concealed.experiment import Experiment
+from pikanid.validation.concealed.rig import Rig
+from pikanid.validation.concealed.simulate import measured, motion
 
 TIGHT = 1e-9
 COVERED: set[str] = set()

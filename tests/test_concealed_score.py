@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binomtest
 
 from pikanid import errors
-from pikanid.concealed.score import Share, judge, reliability, tally, wilson
+from pikanid.validation.concealed.score import Share, judge, reliability, tally, wilson
 
 TWINS = {"input_delay": ["sensor_delay"], "sensor_delay": ["input_delay"]}
 

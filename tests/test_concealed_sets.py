@@ -19,15 +19,15 @@ import pytest
 
 from pikanid import errors
 from pikanid.cli import main
-from pikanid.concealed import case, seal
-from pikanid.concealed import generate as room
-from pikanid.concealed.deck import DEFAULT_MIX
-from pikanid.concealed.effects import IDS
-from pikanid.concealed.files import HEADER
-from pikanid.concealed.generate import generate
-from pikanid.concealed.seal import Settings
-from pikanid.concealed.visibility import Visibility
 from pikanid.recording import Recording
+from pikanid.validation.concealed import case, seal
+from pikanid.validation.concealed import generate as room
+from pikanid.validation.concealed.deck import DEFAULT_MIX
+from pikanid.validation.concealed.effects import IDS
+from pikanid.validation.concealed.files import HEADER
+from pikanid.validation.concealed.generate import generate
+from pikanid.validation.concealed.seal import Settings
+from pikanid.validation.concealed.visibility import Visibility
 
 SMALL = Settings(4, "two_pulse", 0.1 * np.pi / 180, dict(DEFAULT_MIX))
 CLEAN = Settings(3, "two_pulse", 1e-3, {"nothing": 1.0})

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pikanid.concealed import signals
-from pikanid.concealed.signals import Signal
+from pikanid.validation.concealed import signals
+from pikanid.validation.concealed.signals import Signal
 
 T = np.arange(0.0, 3.0, 0.1)
 STEP = 2e-4

@@ -11,11 +11,11 @@ from concealing import push
 from scipy.integrate import solve_ivp
 
 from pikanid import errors
-from pikanid.concealed import equations
-from pikanid.concealed.excitations import two_pulse
-from pikanid.concealed.experiment import Experiment
-from pikanid.concealed.rig import DYNAMIC, Rig
-from pikanid.concealed.simulate import measured, motion
+from pikanid.validation.concealed import equations
+from pikanid.validation.concealed.excitations import two_pulse
+from pikanid.validation.concealed.experiment import Experiment
+from pikanid.validation.concealed.rig import DYNAMIC, Rig
+from pikanid.validation.concealed.simulate import measured, motion
 
 SETTINGS: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
 

@@ -8,11 +8,11 @@ from concealing import push, still
 from scipy.integrate import solve_ivp
 from scipy.special import jv
 
-from pikanid.concealed import tank_equations
-from pikanid.concealed.camera import silhouette, surface_angle
-from pikanid.concealed.case import PAPER_DEPTH, PAPER_LENGTH, PAPER_RADIUS
-from pikanid.concealed.simulate import measured, motion
-from pikanid.concealed.tank import MODES, Tank, radius_for, shape, zero
+from pikanid.validation.concealed import tank_equations
+from pikanid.validation.concealed.camera import silhouette, surface_angle
+from pikanid.validation.concealed.case import PAPER_DEPTH, PAPER_LENGTH, PAPER_RADIUS
+from pikanid.validation.concealed.simulate import measured, motion
+from pikanid.validation.concealed.tank import MODES, Tank, radius_for, shape, zero
 
 PAPER = Tank(PAPER_RADIUS, PAPER_DEPTH)
 WIDE = Tank(radius_for(PAPER_LENGTH, PAPER_DEPTH), PAPER_DEPTH)

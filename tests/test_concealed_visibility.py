@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from pikanid.concealed import visibility as room
-from pikanid.concealed.case import in_tank
-from pikanid.concealed.deck import FLOW
-from pikanid.concealed.effect import Effect, Scales
-from pikanid.concealed.effects import CATALOGUE, variants
-from pikanid.concealed.excitations import pair, two_pulse
-from pikanid.concealed.fisher import refit, unexplained
-from pikanid.concealed.noise import Noise
-from pikanid.concealed.rig import Rig
-from pikanid.concealed.simulate import measured
-from pikanid.concealed.sizing import sized
-from pikanid.concealed.tank import Tank
-from pikanid.concealed.visibility import (
+from pikanid.validation.concealed import visibility as room
+from pikanid.validation.concealed.case import in_tank
+from pikanid.validation.concealed.deck import FLOW
+from pikanid.validation.concealed.effect import Effect, Scales
+from pikanid.validation.concealed.effects import CATALOGUE, variants
+from pikanid.validation.concealed.excitations import pair, two_pulse
+from pikanid.validation.concealed.fisher import refit, unexplained
+from pikanid.validation.concealed.noise import Noise
+from pikanid.validation.concealed.rig import Rig
+from pikanid.validation.concealed.simulate import measured
+from pikanid.validation.concealed.sizing import sized
+from pikanid.validation.concealed.tank import Tank
+from pikanid.validation.concealed.visibility import (
     Candidate,
     Visibility,
     is_rival,

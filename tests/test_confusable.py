@@ -9,10 +9,11 @@ import pytest
 from scipy.optimize import minimize
 
 import pikanid as pk
-from pikanid import errors, excitation, systems
-from pikanid.mismatch.confusable import Confusable, confusable
-from pikanid.mismatch.seen import Watched, seen
-from pikanid.model import Parameter
+from pikanid import errors
+from pikanid.mismatch.design.confusable import Confusable, confusable
+from pikanid.mismatch.design.response import Watched, seen
+from pikanid.model import Parameter, systems
+from pikanid.recording import excitation
 
 SIGMA = 0.1 * np.pi / 180
 ASKED = ("coulomb_friction", "quadratic_drag", "power_drag", "input_saturation", "input_dead_zone",

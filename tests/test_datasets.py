@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pikanid import datasets
-from pikanid import datasets_origins as origins
 from pikanid.errors import BadSetting, DatasetUnavailable
+from pikanid.recording import datasets, origins
 
 
 @pytest.fixture
@@ -117,7 +116,7 @@ def test_excerpts_need_no_network_and_no_folder() -> None:
 
 
 def test_excerpts_are_small_and_carry_licence_and_source() -> None:
-    folder = Path(datasets.__file__).parent / "excerpts"
+    folder = Path(datasets.__file__).parent / "data"
     sizes = {path.name: path.stat().st_size for path in folder.glob("*.csv")}
     assert len(sizes) == 3 and sum(sizes.values()) < 150_000
     readme = (folder / "README.md").read_text()
@@ -135,7 +134,7 @@ def test_excerpts_are_small_and_carry_licence_and_source() -> None:
 def test_excerpts_are_made_from_the_originals(balls: tuple[str, ...]) -> None:
     import thin_recordings
 
-    folder = Path(datasets.__file__).parent / "excerpts"
+    folder = Path(datasets.__file__).parent / "data"
     made = thin_recordings.excerpts(balls)
     assert set(made) == {path.name for path in folder.glob("*.csv")}
     for name, text in made.items():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pikanid.mismatch.decisions import BAND, RELATIVE, below, in_order, smaller, steady
+from pikanid.mismatch.fitting.decisions import BAND, RELATIVE, below, in_order, smaller, steady
 
 ULP = 2.0**-52
 

@@ -10,9 +10,8 @@ import oracle
 import pytest
 from comparing import SIGMA, compare
 
-from pikanid import excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.recording import Recording
+from pikanid.model import Model, Parameter, systems
+from pikanid.recording import Recording, excitation
 from pikanid.simulation.simulator import Steps
 
 TAU = Parameter("tau", 0.0137, "s", (0.0, 0.1))

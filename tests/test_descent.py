@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.hypothesis import extended, fitted, read_otherwise, turned
-from pikanid.mismatch.screen import Screen, law
-from pikanid.mismatch.whitened import Whitened
+from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.diagnose import _opened
+from pikanid.mismatch.fitting.hypothesis import extended, fitted, read_otherwise, turned
+from pikanid.mismatch.search.screen import Screen, law
 
 
 def opened(truth: pk.Model, train: pk.Recording, sigma: float) -> Case:

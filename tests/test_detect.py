@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2, norm
 
-from pikanid.mismatch.detect import (
+from pikanid.mismatch.detect.residual_tests import (
     BATCH,
     CLEAR,
     DRAWS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pikanid as pk
-from pikanid.mismatch.api import _opened
+from pikanid.mismatch.diagnose import _opened
 
 
 def test_a_better_fit_of_the_same_effects_is_tested_anew() -> None:

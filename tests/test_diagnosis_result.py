@@ -7,11 +7,11 @@ from typing import cast
 import pytest
 
 from pikanid.estimate import Estimate
-from pikanid.mismatch.explained import _behind
-from pikanid.mismatch.findings import Explanation, NamedEffect, Where
-from pikanid.mismatch.result import Diagnosis
-from pikanid.mismatch.verdict import Verdict
-from pikanid.systems import sloshing
+from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.mismatch.report.diagnosis import Diagnosis
+from pikanid.mismatch.report.explained import _behind
+from pikanid.mismatch.report.findings import Explanation, NamedEffect, Where
+from pikanid.model.systems import sloshing
 
 
 def explanation(name: str, expression: str, probability: float = 0.5) -> Explanation:

@@ -7,8 +7,11 @@ import pytest
 from remembering import Memory
 
 import pikanid as pk
-from pikanid import excitation
-from pikanid.mismatch import hypothesis, search, verdict, whitened
+from pikanid.mismatch.data import whitened
+from pikanid.mismatch.fitting import hypothesis
+from pikanid.mismatch.judge import verdict
+from pikanid.mismatch.search import search
+from pikanid.recording import excitation
 
 NUMBERS = {str(t): t for t in varied.named_numbers()}
 
@@ -83,7 +86,7 @@ def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
     assert "| `verdict.GUARD` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
     assert "| `verdict.BEHIND` | 3 → 3.75 | 1 of 1 | 1 of 1 | rich 001 |" in text
     assert "rich 001 (`verdict.BEHIND`, `verdict.GUARD`)" in text
-    assert "No verdict of 1 depends on `case." in text and "`case.BETTER`" in text
+    assert "No verdict of 1 depends on `" in text and "`case.BETTER`" in text
 
 
 def test_a_diagnosis_repeated_fits_nothing_anew(monkeypatch):

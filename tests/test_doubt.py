@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.doubt import least_proof, why_not
-from pikanid.mismatch.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.diagnose import _opened
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.judge.doubt import least_proof, why_not
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 

@@ -13,21 +13,21 @@ torch = pytest.importorskip("torch", reason="needs the `kan` extra")
 pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 
 from pikanid.approximators.kan import build_kan  # noqa: E402
-from pikanid.equivalence import (  # noqa: E402
+from pikanid.validation.equivalence import (  # noqa: E402
     Check,
     EquivalenceReport,
     Setting,
     compare,
     run_checks,
 )
-from pikanid.equivalence.checks import apart, compare_paths, settings  # noqa: E402
-from pikanid.equivalence.controls import uniqueness  # noqa: E402
-from pikanid.equivalence.ipda import IpdaObjective  # noqa: E402
-from pikanid.equivalence.network import NetworkLoss  # noqa: E402
-from pikanid.equivalence.optimisers import Path as Iterates  # noqa: E402
-from pikanid.equivalence.optimisers import Path as Path_  # noqa: E402
-from pikanid.equivalence.setting import motion  # noqa: E402
-from pikanid.equivalence.systems import SYSTEMS  # noqa: E402
+from pikanid.validation.equivalence.checks import apart, compare_paths, settings  # noqa: E402
+from pikanid.validation.equivalence.controls import uniqueness  # noqa: E402
+from pikanid.validation.equivalence.ipda import IpdaObjective  # noqa: E402
+from pikanid.validation.equivalence.network import NetworkLoss  # noqa: E402
+from pikanid.validation.equivalence.optimisers import Path as Iterates  # noqa: E402
+from pikanid.validation.equivalence.optimisers import Path as Path_  # noqa: E402
+from pikanid.validation.equivalence.setting import motion  # noqa: E402
+from pikanid.validation.equivalence.systems import SYSTEMS  # noqa: E402
 
 pytestmark = pytest.mark.kan
 

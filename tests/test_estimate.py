@@ -12,8 +12,11 @@ import pytest
 from scipy.stats import t as student
 
 import pikanid as pk
-from pikanid import errors, excitation, systems
-from pikanid.estimate import Estimate, rounded
+from pikanid import errors
+from pikanid.estimate import Estimate
+from pikanid.estimate.estimate import rounded
+from pikanid.model import systems
+from pikanid.recording import excitation
 
 SIGMA = 0.1 * np.pi / 180
 MODEL = systems.sloshing().with_initial(theta="free").per_recording("d_theta")

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pikanid import excitation, resampling
 from pikanid.errors import BadSetting
-from pikanid.recording import Recording
+from pikanid.recording import Recording, excitation, resampling
 
 
 def motion(rec: Recording, channel: str = "u_x") -> tuple[np.ndarray, np.ndarray]:

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pikanid import errors
-from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
-from pikanid.expressions import FUNCTIONS, check_name, parse, symbol, to_real, to_text
+from pikanid.formula.expressions import FUNCTIONS, check_name, parse, symbol, to_real, to_text
+from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
 
 NAMES = {"x", "y", "k"}
 X, Y = symbol("x"), symbol("y")

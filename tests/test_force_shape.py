@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pikanid.mismatch.force_shape import GRID, _explained, _smoothed, _Spline, _without_constant
+from pikanid.mismatch.beyond.force_shape import (
+    GRID,
+    _explained,
+    _smoothed,
+    _Spline,
+    _without_constant,
+)
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ import pikanid as pk
 from pikanid.cli import main
 from pikanid.errors import BadRecording, BadSetting
 from pikanid.estimate import Estimate
-from pikanid.information import undetermined_warnings
-from pikanid.problem import FreeParameter, Problem
+from pikanid.problem.problem import FreeParameter, Problem
 from pikanid.strategies import STRATEGIES, strategy
+from pikanid.uncertainty.information import undetermined_warnings
 
 FULL = pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse())
 

@@ -11,10 +11,10 @@ from relaxing import DEGREE, collocated, guessed, random_point, slosh
 import pikanid as pk
 from pikanid import errors
 from pikanid.approximators import Approximator
-from pikanid.chains import find_chains
-from pikanid.functional import Functional, Part, bind
+from pikanid.objective.functional import Functional, Part, bind
 from pikanid.optimise.gauss_newton import Point
-from pikanid.problem import Problem
+from pikanid.problem.chains import find_chains
+from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 
 LAM = 0.37

@@ -10,7 +10,7 @@ from relaxing import TRUTH, collocated, guessed, random_point, slosh
 from scipy.optimize import lsq_linear
 
 import pikanid as pk
-from pikanid.functional import Functional
+from pikanid.objective.functional import Functional
 from pikanid.optimise.covariance import (
     effective_parameters,
     error_bound,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.chains import find_chains
-from pikanid.problem import Problem
+from pikanid.problem.chains import find_chains
+from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 
 torch = pytest.importorskip("torch")

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.forces import wall_impact
-from pikanid.mismatch.growing import grown, rough
-from pikanid.mismatch.hypothesis import extended
-from pikanid.mismatch.least_squares import minimise
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.whitened import Records, Whitened
+from pikanid.mismatch.catalogue.forces import wall_impact
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.fitting.hypothesis import extended
+from pikanid.mismatch.fitting.least_squares import minimise
+from pikanid.mismatch.fitting.progressive_horizon import grown, rough
 
 SIGMA = 0.002
 TRUE = {"wall": 0.1, "k_wall": 20000.0}

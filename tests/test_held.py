@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pikanid import errors
-from pikanid.concealed import signals
-from pikanid.held import HeldInput, PiecewiseInput, acting
 from pikanid.model import Model
-from pikanid.problem import Problem, bind
+from pikanid.problem.held import HeldInput, PiecewiseInput, acting
+from pikanid.problem.problem import Problem, bind
 from pikanid.recording import Channel, Recording
+from pikanid.validation.concealed import signals
 
 T = np.array([0.2, 0.5, 0.6, 1.1, 1.3])
 U = np.array([1.0, -2.0, -2.0, 3.0, 0.5])

@@ -12,14 +12,16 @@ import numpy as np
 import pytest
 from hostile import CODE, JSON_VALUES, MARK, cut, nothing_evaluated, walk
 
-from pikanid import errors, estimate_file, stored
-from pikanid.adequacy import Adequacy
-from pikanid.concealed import seal
-from pikanid.concealed.score import judge
+from pikanid import errors
 from pikanid.estimate import Estimate
-from pikanid.estimate_data import Fit, Trajectory
+from pikanid.estimate import file as estimate_file
+from pikanid.estimate.data import Fit, Trajectory
 from pikanid.model import Model
-from pikanid.problem import FreeParameter
+from pikanid.objective.adequacy import Adequacy
+from pikanid.problem.problem import FreeParameter
+from pikanid.storage import limits as stored
+from pikanid.validation.concealed import seal
+from pikanid.validation.concealed.score import judge
 
 __all__ = ["nothing_evaluated"]
 

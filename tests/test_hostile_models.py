@@ -11,7 +11,7 @@ import sympy as sp
 from hostile import CODE, MARK, VALUES, cut, nothing_evaluated, walk
 
 from pikanid import errors
-from pikanid.expressions import parse, to_real
+from pikanid.formula.expressions import parse, to_real
 from pikanid.model import Input, Model, Output, Parameter, State
 
 __all__ = ["nothing_evaluated"]
@@ -51,7 +51,7 @@ def used(content: Any) -> None:
 
 
 def test_the_example_holds_every_key() -> None:
-    from pikanid.model_file import KEYS
+    from pikanid.model.file import KEYS
 
     used(FULL)
     assert Model.from_dict(FULL).name == "full"

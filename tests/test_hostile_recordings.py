@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pikanid import errors, stored
-from pikanid.reading import mat, parquet, spreadsheet
+from pikanid import errors
 from pikanid.recording import Recording
+from pikanid.recording.reading import mat, parquet, spreadsheet
+from pikanid.storage import limits as stored
 
 T = np.arange(5) * 0.1
 
@@ -88,7 +89,7 @@ def test_compressed_elements_of_an_older_mat_file(tmp_path: Path,
                                                   monkeypatch: pytest.MonkeyPatch) -> None:
     from scipy.io import savemat
 
-    from pikanid.reading import mat5
+    from pikanid.recording.reading import mat5
 
     savemat(tmp_path / "run.mat", {"t": T, "y": np.zeros(2**18)}, do_compression=True)
     monkeypatch.setattr(mat5, "MOST_UNPACKED", 2**20)

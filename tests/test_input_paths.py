@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 
 import pikanid as pk
 from pikanid import errors
-from pikanid.concealed import signals
-from pikanid.held import HeldInput, acting
-from pikanid.mismatch.catalogue import candidates
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.tangent import directions
-from pikanid.mismatch.whitened import Records, Whitened
-from pikanid.model_parts import Hold, Parameter
-from pikanid.problem import bind
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.detect.tangent import directions
+from pikanid.model.parts import Hold, Parameter
+from pikanid.problem.held import HeldInput, acting
+from pikanid.problem.problem import bind
 from pikanid.simulation.simulator import Simulator
 from pikanid.simulation.translated import Translated
+from pikanid.validation.concealed import signals
 
 HOLDS: tuple[Hold, ...] = ("zero", "first")
 HALF, RATE = 0.3, 4.0

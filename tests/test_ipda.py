@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 import pikanid as pk
 from pikanid import errors
-from pikanid.problem import Problem
+from pikanid.problem.problem import Problem
 from pikanid.strategies.ipda import IPDA, fit_relaxed
 
 NEIGHBOURS = [(0.06, 0.05), (0.048, 0.04), (0.072, 0.06), (0.072, 0.04)]

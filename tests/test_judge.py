@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.hypothesis import extended, fitted
-from pikanid.mismatch.judge import _from_levels, held_out
-from pikanid.mismatch.least_squares import minimise
-from pikanid.mismatch.prior import Prior, room
-from pikanid.mismatch.whitened import Whitened
+from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.diagnose import _opened
+from pikanid.mismatch.fitting.hypothesis import extended, fitted
+from pikanid.mismatch.fitting.least_squares import minimise
+from pikanid.mismatch.judge.prediction import _from_levels, held_out
+from pikanid.mismatch.judge.prior import Prior, room
 
 
 def prior(root: np.ndarray) -> Prior:

@@ -46,8 +46,8 @@ def test_deterministic(estimate) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_gradient_of_the_descent_is_that_of_the_jacobian() -> None:
-    from pikanid.chains import find_chains
-    from pikanid.problem import Problem
+    from pikanid.problem.chains import find_chains
+    from pikanid.problem.problem import Problem
     from pikanid.simulation.vectorfield import VectorField
     from pikanid.strategies.kan_grids import KanGrid
     from pikanid.strategies.kan_paper import cost_and_gradient

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pikanid import kinematics
-from pikanid.channel import Channel
 from pikanid.errors import BadRecording, BadSetting
-from pikanid.recording import Recording
+from pikanid.recording import Recording, kinematics
+from pikanid.recording.channel import Channel
 
 T = np.arange(0, 3, 0.002)
 X = 0.25 * np.sin(2 * np.pi * 1.5 * T) * np.sin(np.pi * T / 3) ** 4  # starts and ends at rest

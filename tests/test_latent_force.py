@@ -10,14 +10,14 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import binom
 
 import pikanid as pk
-from pikanid import excitation, systems
-from pikanid.mismatch import api
-from pikanid.mismatch.candidate import Candidate, Sign
-from pikanid.mismatch.latent_force import ForceOverTime, _means, _Motion, force_over_time
-from pikanid.mismatch.locate import locate
-from pikanid.mismatch.penalised import critical_value
-from pikanid.mismatch.verdict import Answer
-from pikanid.recording import Recording
+from pikanid.mismatch import diagnose as api
+from pikanid.mismatch.beyond.latent_force import ForceOverTime, _means, _Motion, force_over_time
+from pikanid.mismatch.beyond.penalised import critical_value
+from pikanid.mismatch.catalogue.candidate import Candidate, Sign
+from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.report.locate import locate
+from pikanid.model import systems
+from pikanid.recording import Recording, excitation
 
 SIGMA = 0.1 * np.pi / 180
 NOMINAL = systems.sloshing()

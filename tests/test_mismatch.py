@@ -7,24 +7,29 @@ import json
 import numpy as np
 import pytest
 
-from pikanid import errors, excitation, systems
-from pikanid.mismatch import diagnose
-from pikanid.mismatch.beginning import own_beginning
-from pikanid.mismatch.candidate import Candidate
-from pikanid.mismatch.catalogue import candidates
-from pikanid.mismatch.detect import detect, frequency_bands, past_inputs, unit_columns
-from pikanid.mismatch.forces import disturbance
-from pikanid.mismatch.hypothesis import extended
-from pikanid.mismatch.least_squares import minimise
-from pikanid.mismatch.noise_level import Level, refined
-from pikanid.mismatch.outliers import without_outliers
-from pikanid.mismatch.preparation import averaged, oversampling
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.tangent import directions
-from pikanid.mismatch.whitened import Records, Whitened
-from pikanid.model import Model
-from pikanid.problem import Problem
-from pikanid.recording import Recording
+from pikanid import errors
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.forces import disturbance
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level, refined
+from pikanid.mismatch.data.outliers import without_outliers
+from pikanid.mismatch.data.preparation import averaged, oversampling
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.detect.residual_tests import (
+    detect,
+    frequency_bands,
+    past_inputs,
+    unit_columns,
+)
+from pikanid.mismatch.detect.tangent import directions
+from pikanid.mismatch.diagnose import diagnose
+from pikanid.mismatch.fitting.hypothesis import extended
+from pikanid.mismatch.fitting.least_squares import minimise
+from pikanid.mismatch.judge.beginning import own_beginning
+from pikanid.model import Model, systems
+from pikanid.problem.problem import Problem
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import simulate
 
 SIGMA = 0.002

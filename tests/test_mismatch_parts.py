@@ -10,19 +10,20 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pikanid import Recording, systems
-from pikanid.channel import Channel
-from pikanid.mismatch.detect import frequency_bands
-from pikanid.mismatch.growing import lost
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.patch import _Basis
-from pikanid.mismatch.penalised import Penalised, _prior
-from pikanid.mismatch.preparation import averaged, oversampling
-from pikanid.mismatch.repeats import Spectra, modes_beside
-from pikanid.mismatch.separation import mean_precision, unexplained
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.sizing import _next
-from pikanid.mismatch.tangent import _middle
+from pikanid import Recording
+from pikanid.mismatch.beyond.patch import _Basis
+from pikanid.mismatch.beyond.penalised import Penalised, _prior
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.preparation import averaged, oversampling
+from pikanid.mismatch.design.separation import mean_precision, unexplained
+from pikanid.mismatch.design.sizing import _next
+from pikanid.mismatch.detect.residual_tests import frequency_bands
+from pikanid.mismatch.detect.tangent import _middle
+from pikanid.mismatch.fitting.progressive_horizon import lost
+from pikanid.mismatch.fitting.repeats import Spectra, modes_beside
+from pikanid.model import systems
+from pikanid.recording.channel import Channel
 from pikanid.simulation.vectorfield import VectorField
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid import excitation, systems
-from pikanid.mismatch import api
-from pikanid.mismatch.force_shape import ForceShape, force_shape
-from pikanid.model import Model, Parameter
+from pikanid.mismatch import diagnose as api
+from pikanid.mismatch.beyond.force_shape import ForceShape, force_shape
+from pikanid.model import Model, Parameter, systems
+from pikanid.recording import excitation
 
 SIGMA = 0.1 * np.pi / 180
 FRICTION = systems.sloshing().with_term(

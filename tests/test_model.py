@@ -10,9 +10,9 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pikanid import errors, systems
-from pikanid.expressions import symbol
-from pikanid.model import Input, Model, Output, Parameter, Spline, State
+from pikanid import errors
+from pikanid.formula.expressions import symbol
+from pikanid.model import Input, Model, Output, Parameter, Spline, State, systems
 from pikanid.simulation import VectorField
 
 X, U, K = symbol("x"), symbol("u"), symbol("k")

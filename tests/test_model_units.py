@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 import pikanid as pk
 from pikanid import Model, Parameter, Recording, State
 from pikanid.errors import BadModel, BadUnit
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
+from pikanid.formula.units import convert
 from pikanid.model import Input, Output
 from pikanid.simulation import simulate
 
@@ -34,7 +35,7 @@ def pendulum(angle: str = "rad", rate: str = "rad/s", length: str = "m", push: s
              late: str = "s", out: str = "rad") -> Model:
     """A driven pendulum of 45 mm, whatever units its author prefers."""
     def put(value: float, source: str, unit: str) -> float:
-        return float(pk.units.convert(value, source, unit))
+        return float(convert(value, source, unit))
 
     return Model.from_dict({
         "name": "pendulum",
@@ -60,14 +61,14 @@ def numbers(model: Model, **units: str) -> list[float]:
     table = dict(model.values)
     for part in (*model.states, *model.inputs):
         value, unit = given[part.name]
-        table[part.name] = float(pk.units.convert(value, unit, part.unit))
+        table[part.name] = float(convert(value, unit, part.unit))
     swap = {symbol(n): v for n, v in table.items()}
     places = [*((model.equations[s.name], f"({s.unit})/s", si) for s, si in
                 zip(model.states, ("rad/s", "rad/s^2"), strict=True)),
               *((s.initial, s.unit, given[s.name][1]) for s in model.states),
               (model.output("y").expression, model.output("y").unit, "rad"),
               (model.input("u").delay, "s", "s")]
-    return [float(pk.units.convert(float(e.xreplace(swap)), own, si)) for e, own, si in places]
+    return [float(convert(float(e.xreplace(swap)), own, si)) for e, own, si in places]
 
 
 @settings(max_examples=40, deadline=None)
@@ -81,7 +82,7 @@ def test_the_same_physics_in_any_units(angle: str, rate: str, length: str, push:
     assert Model.from_dict(model.to_dict()) == model
     # values stay in the unit of their author
     assert model.parameter("l").unit == length
-    assert model.values["l"] == pytest.approx(float(pk.units.convert(0.045, "m", length)))
+    assert model.values["l"] == pytest.approx(float(convert(0.045, "m", length)))
 
 
 def test_a_simulation_in_degrees_and_millimetres() -> None:
@@ -238,8 +239,8 @@ def test_set_takes_both(tmp_path: Path) -> None:
 def test_every_effect_of_the_catalogue_can_be_added_in_units_that_are_not_si(
         angle: str, rate: str, out: str) -> None:
     """What an effect adds has the unit of its place, whatever the model's units are."""
-    from pikanid.mismatch.catalogue import candidates
-    from pikanid.mismatch.site import sites
+    from pikanid.mismatch.catalogue.catalogue import candidates
+    from pikanid.mismatch.catalogue.site import sites
 
     length = {"deg": "rad", "mrad": "rad"}.get(angle, "m")
     model = Model.from_dict({

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pikanid.model import Model
-from pikanid.problem import Problem
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 from pikanid.recording import Channel, Recording
-from pikanid.shooting import Shooting
 from pikanid.strategies.multiple_shooting import (
     _cut,
     _node,

@@ -12,9 +12,8 @@ from llvmlite import binding
 from numba.core import config
 from test_translated import recorded, values
 
-from pikanid import systems
-from pikanid.model import Model, Parameter
-from pikanid.problem import bind
+from pikanid.model import Model, Parameter, systems
+from pikanid.problem.problem import bind
 from pikanid.simulation.native_tape import native
 from pikanid.simulation.simulator import Response, Simulator, Steps
 from pikanid.simulation.structure import Structure

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.api import _opened
-from pikanid.mismatch.candidate import Candidate
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.hypothesis import Hypothesis, fitted
-from pikanid.mismatch.neighbours import with_simpler, with_twins, with_wider, without_one
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.diagnose import _opened
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.search.neighbours import with_simpler, with_twins, with_wider, without_one
 
 
 @pytest.fixture(scope="module")

@@ -10,13 +10,14 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares, minimize
 
 import pikanid as pk
-from pikanid import errors, excitation, systems
+from pikanid import errors
 from pikanid.cli import main
-from pikanid.mismatch.experiments import d_optimal, next_experiment
-from pikanid.mismatch.profiles import Bounds, motion, profiles, scaled
-from pikanid.mismatch.seen import Watched, joined, natural_frequency, seen
-from pikanid.mismatch.separation import distance, mean_precision, refitted, unexplained
-from pikanid.model import Model, Parameter
+from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
+from pikanid.mismatch.design.profiles import Bounds, motion, profiles, scaled
+from pikanid.mismatch.design.response import Watched, joined, natural_frequency, seen
+from pikanid.mismatch.design.separation import distance, mean_precision, refitted, unexplained
+from pikanid.model import Model, Parameter, systems
+from pikanid.recording import excitation
 
 SIGMA = 0.1 * np.pi / 180
 POSITIVE = (0.0, np.inf)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid import errors, excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.recording import Recording
+from pikanid import errors
+from pikanid.model import Model, Parameter, systems
+from pikanid.recording import Recording, excitation
 
 SIGMA = 0.1 * np.pi / 180
 START = systems.sloshing().with_values(l_theta=0.06, d_theta=0.05)

@@ -19,10 +19,10 @@ pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 
 from pikanid.approximators.kan import build_kan  # noqa: E402
 from pikanid.approximators.kan import plot as plot_kan  # noqa: E402
-from pikanid.equivalence import EquivalenceReport, Setting, compare  # noqa: E402
 from pikanid.strategies.pikan import PIKAN  # noqa: E402
 from pikanid.strategies.pinn import PINN  # noqa: E402
 from pikanid.symbolic.library import LIBRARY  # noqa: E402
+from pikanid.validation.equivalence import EquivalenceReport, Setting, compare  # noqa: E402
 
 pytestmark = pytest.mark.kan
 

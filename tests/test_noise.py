@@ -9,11 +9,12 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from pikanid import noise, noise_ar
-from pikanid.channel import Channel
 from pikanid.errors import BadRecording
-from pikanid.noise_quiet import _is_quiet, even_parts, find_quiet
+from pikanid.noise import autoregressive as noise_ar
+from pikanid.noise import level as noise
+from pikanid.noise.quiet import _is_quiet, even_parts, find_quiet
 from pikanid.recording import Recording
+from pikanid.recording.channel import Channel
 
 DT = 0.01
 SIGMA = 0.002

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from pikanid.noise_ar import AR, autocorrelation, burg, fit, innovations
+from pikanid.noise.autoregressive import AR, autocorrelation, burg, fit, innovations
 
 PROCESSES = [[0.5], [-0.7], [1.2, -0.5], [0.4, 0.2, 0.1], [0.1, 0.0, 0.0, 0.5]]
 

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import pikanid as pk
-from pikanid import noise
-from pikanid.adequacy import difference_noise, judge
-from pikanid.channel import Channel
-from pikanid.mismatch.noise_level import Level, first_level, refined
-from pikanid.mismatch.preparation import prepared, set_aside
-from pikanid.mismatch.whitened import Records
-from pikanid.noise_floor import repeated, rounding_noise, rounding_step
+from pikanid.mismatch.data.noise_level import Level, first_level, refined
+from pikanid.mismatch.data.preparation import prepared, set_aside
+from pikanid.mismatch.data.whitened import Records
+from pikanid.noise import level as noise
+from pikanid.noise.floor import repeated, rounding_noise, rounding_step
+from pikanid.objective.adequacy import difference_noise, judge
+from pikanid.recording.channel import Channel
 
 TIMES = np.arange(600) * 0.01
 STEP = 2 * np.pi / 1000  # of the encoder [rad]

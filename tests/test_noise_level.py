@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pikanid.channel import Channel
-from pikanid.mismatch.noise_level import Level, _still, _whittle, first_level, refined
+from pikanid.mismatch.data.noise_level import Level, _still, _whittle, first_level, refined
 from pikanid.recording import Recording
+from pikanid.recording.channel import Channel
 
 T = np.arange(1000) * 0.01
 MOVING = np.where(T < 2.0, 0.0, np.sin(9 * (T - 2.0)))

@@ -9,10 +9,10 @@ import pytest
 from comparing import SIGMA, compare
 from nonsmooth_terms import TERMS, G, Values, by_hand, drive, slosh, velocity
 
-from pikanid import errors, excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.problem import bind
-from pikanid.recording import Recording
+from pikanid import errors
+from pikanid.model import Model, Parameter, systems
+from pikanid.problem.problem import bind
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import Simulator, Steps
 from pikanid.simulation.synthetic import with_outputs
 

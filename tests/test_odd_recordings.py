@@ -10,16 +10,15 @@ from odd_recordings import odd
 
 import pikanid as pk
 from pikanid import errors
-from pikanid.mismatch import diagnose
-from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.detect import project
-from pikanid.mismatch.preparation import EXACT, FREEDOM, MOST, beginnings, loud_enough
-from pikanid.mismatch.remainder import condensed, lines, residual_tests
-from pikanid.mismatch.result import Diagnosis
-from pikanid.mismatch.screen import best_level
-from pikanid.mismatch.tangent import CELLS, Tangent, directions
-from pikanid.mismatch.whitened import Whitened
+from pikanid.mismatch.data.preparation import EXACT, FREEDOM, MOST, beginnings, loud_enough
+from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.detect.remainder import condensed, lines, residual_tests
+from pikanid.mismatch.detect.residual_tests import project
+from pikanid.mismatch.detect.tangent import CELLS, Tangent, directions
+from pikanid.mismatch.diagnose import _opened, diagnose
+from pikanid.mismatch.report.diagnosis import Diagnosis
+from pikanid.mismatch.search.screen import best_level
 from pikanid.recording import Recording
 from pikanid.reporting import strict_json
 from pikanid.reporting.diagnosis_page import page
@@ -138,7 +137,7 @@ def test_few_signs_are_followed_at_once_along_a_long_recording(
         return follow(self, listed)
 
     monkeypatch.setattr(Tangent, "_columns", watched)
-    monkeypatch.setattr("pikanid.mismatch.tangent.CELLS", CELLS // 20)
+    monkeypatch.setattr("pikanid.mismatch.detect.tangent.CELLS", CELLS // 20)
     few = directions(whitened, theta, case.candidates).D
     assert np.array_equal(few, whole) and len(sizes) > 3
     assert max(sizes) <= CELLS // 20
@@ -159,7 +158,7 @@ def test_the_signs_of_a_long_recording_are_shortened_one_after_the_other(
     bands, inputs = lines(h.whitened, case.rate, 3, short)
     assert made == [*(b.shape[1] for b in whole), inputs.shape[1]]
     assert all(len(b) == -(-h.whitened.rows // 5) + 3 for b in (*bands, inputs))
-    monkeypatch.setattr("pikanid.mismatch.remainder.MOST_ROWS", h.whitened.rows // 5)
+    monkeypatch.setattr("pikanid.mismatch.detect.remainder.MOST_ROWS", h.whitened.rows // 5)
     found = residual_tests(h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, case.candidates,
                            case.rate)
     assert found.p_value < 1e-6

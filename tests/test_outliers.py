@@ -7,12 +7,12 @@ import pytest
 from scipy.signal import lfilter
 
 from pikanid import Model, Recording
-from pikanid.mismatch.forces import coulomb_friction
-from pikanid.mismatch.hypothesis import fitted
-from pikanid.mismatch.noise_level import Level, bridged, refined
-from pikanid.mismatch.outliers import lone, without_lone, without_outliers
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.whitened import Records
+from pikanid.mismatch.catalogue.forces import coulomb_friction
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level, bridged, refined
+from pikanid.mismatch.data.outliers import lone, without_lone, without_outliers
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.fitting.hypothesis import fitted
 
 SIGMA = 0.002
 

@@ -17,8 +17,8 @@ import pikanid
 from pikanid import errors
 from pikanid.cli import main
 from pikanid.estimate import Estimate
-from pikanid.outputs import atomically, together
 from pikanid.recording import Recording
+from pikanid.storage.outputs import atomically, together
 
 PACKAGE = Path(pikanid.__file__).parent
 
@@ -99,7 +99,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     t = np.linspace(0.0, 2.0, 81)
     path = tmp_path_factory.mktemp("outputs") / "run.csv"
     drive = Recording.from_arrays(t, {"u_x": np.sin(9 * t)}, {"u_x": "m/s^2"})
-    from pikanid import systems
+    from pikanid.model import systems
     from pikanid.simulation import simulate
 
     simulate(systems.sloshing(), drive, sigma=1e-3).write(path)
@@ -125,7 +125,7 @@ def test_outputs_of_identify_come_together(
 def test_a_saved_estimate_has_ordinary_permissions(
         recording: Path, tmp_path: Path, mask: int) -> None:
     found = pikanid.NLS().fit(
-        pikanid.systems.sloshing(), Recording.read(recording))
+        pikanid.model.systems.sloshing(), Recording.read(recording))
     replace(found, seconds=0.0).save(tmp_path / "a.json.gz")
     assert mode(tmp_path / "a.json.gz") == 0o640
     assert Estimate.load(tmp_path / "a.json.gz").free == found.free
@@ -153,8 +153,8 @@ def test_one_module_writes_files() -> None:
     found = {
         f"{path.relative_to(PACKAGE)}: {writes(node)}"
         for path in PACKAGE.rglob("*.py")
-        if path.relative_to(PACKAGE).as_posix() not in ("outputs.py", "cache.py")
+        if path.relative_to(PACKAGE).as_posix() not in ("storage/outputs.py", "storage/cache.py")
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Call) and writes(node)
     }
-    assert found == set(), "write files by pikanid.outputs"
+    assert found == set(), "write files by pikanid.storage.outputs"

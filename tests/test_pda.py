@@ -8,7 +8,7 @@ from relaxing import TRUTH, guessed, slosh
 
 import pikanid as pk
 from pikanid import errors
-from pikanid.problem import Problem
+from pikanid.problem.problem import Problem
 from pikanid.strategies.pda import PDA, fit_decoupled
 
 

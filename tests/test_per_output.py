@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.expressions import symbol
-from pikanid.mismatch.catalogue import candidates
-from pikanid.mismatch.findings import OutputError, Proof
-from pikanid.mismatch.hypothesis import fitted
-from pikanid.mismatch.judge import HeldOut, held_out
-from pikanid.mismatch.locate import affected, loud_windows
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.whitened import Records
-from pikanid.model_parts import Output
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.judge.prediction import HeldOut, held_out
+from pikanid.mismatch.report.findings import OutputError, Proof
+from pikanid.mismatch.report.locate import affected, loud_windows
+from pikanid.model.parts import Output
 from pikanid.reporting import strict_json
 
 SIGMA = {"theta": 0.002, "swing": 0.3}  # rad, mm

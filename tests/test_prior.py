@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.api import _opened
-from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.prior import elsewhere, of_fit
+from pikanid.mismatch.diagnose import _opened
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.prior import elsewhere, of_fit
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pikanid import errors, excitation, systems
-from pikanid.held import HeldInput
-from pikanid.model import Model, Parameter, Spline
-from pikanid.problem import Problem, bind
-from pikanid.recording import Channel, Recording
+from pikanid import errors
+from pikanid.model import Model, Parameter, Spline, systems
+from pikanid.problem.held import HeldInput
+from pikanid.problem.problem import Problem, bind
+from pikanid.recording import Channel, Recording, excitation
 
 T = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
 PUSH = np.array([0.0, 1.0, 1.0, -2.0, 3.0])

@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 import pikanid as pk
 from pikanid.model import Model
-from pikanid.profile_likelihood import profile
 from pikanid.recording import Recording
+from pikanid.uncertainty.profile_likelihood import profile
 
 T = np.linspace(0.0, 2.0, 9)
 SIGMA = 0.1

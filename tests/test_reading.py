@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pikanid.errors import BadRecording, BadSetting, BadUnit, PikanidError
-from pikanid.reading import mat5
 from pikanid.recording import Recording
+from pikanid.recording.reading import mat5
 
 T = np.arange(5) * 0.1
 Y = np.array([1.0, 2.0, 0.5, -1.0, 3.0])

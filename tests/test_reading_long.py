@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from pikanid.errors import PikanidError
-from pikanid.reading import csv
+from pikanid.recording.reading import csv
 
 ODD = [
     "", " ", "nan", "NaN", "inf", "-inf", "Infinity", "1e400", "-1e-400", "1_000", "0x1A", "1,5",

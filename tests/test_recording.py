@@ -13,10 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pikanid import excitation, resampling
-from pikanid.channel import Channel
 from pikanid.errors import BadRecording, BadSetting, BadUnit
-from pikanid.recording import Recording
+from pikanid.recording import Recording, excitation, resampling
+from pikanid.recording.channel import Channel
 
 
 def swing(n: int = 101, dt: float = 0.01) -> Recording:

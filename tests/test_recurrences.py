@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from pikanid.mismatch.recurrences import bouc_wen, follow, lagged
+from pikanid.mismatch.catalogue.recurrences import bouc_wen, follow, lagged
 
 
 @pytest.mark.parametrize("parts", [1, 4])

@@ -11,8 +11,8 @@ import pytest
 import reliability_fuzz as fuzzing
 
 from pikanid import Model, Recording
-from pikanid.concealed.score import judge
 from pikanid.estimate import Estimate
+from pikanid.validation.concealed.score import judge
 
 QUICK = [name for name in fuzzing.targets() if name not in ("network", "command line")]
 

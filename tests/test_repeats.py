@@ -8,8 +8,8 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 import pikanid as pk
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.repeats import Spectra, modes_beside, same_experiment
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.fitting.repeats import Spectra, modes_beside, same_experiment
 
 T = np.arange(60) / 15
 START = np.vander(T, 2)  # what a start that is estimated takes up

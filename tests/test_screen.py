@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.api import _opened
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.hypothesis import extended
-from pikanid.mismatch.screen import Screen, best_level, entry, law
-from pikanid.mismatch.whitened import Whitened
+from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.diagnose import _opened
+from pikanid.mismatch.fitting.hypothesis import extended
+from pikanid.mismatch.search.screen import Screen, best_level, entry, law
 
 
 def opened(train: pk.Recording, later: pk.Recording) -> Case:

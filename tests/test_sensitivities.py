@@ -12,12 +12,11 @@ from comparing import compare
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pikanid import excitation, systems
-from pikanid.expressions import symbol
-from pikanid.half_derivative import design
-from pikanid.model import Model, Parameter, State
-from pikanid.problem import bind
-from pikanid.recording import Channel, Recording
+from pikanid.formula.expressions import symbol
+from pikanid.model import Model, Parameter, State, systems
+from pikanid.model.half_derivative import design
+from pikanid.problem.problem import bind
+from pikanid.recording import Channel, Recording, excitation
 from pikanid.simulation import Simulator, Steps
 
 pytestmark = pytest.mark.compiled

@@ -15,7 +15,7 @@ import oracle
 import pytest
 
 from pikanid.model import Model
-from pikanid.problem import bind
+from pikanid.problem.problem import bind
 from pikanid.recording import Channel, Recording
 from pikanid.simulation.simulator import Simulator, Steps
 from pikanid.simulation.synthetic import with_outputs

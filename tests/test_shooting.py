@@ -8,9 +8,9 @@ import pytest
 from scipy.stats import chi2
 
 from pikanid.model import Model
-from pikanid.problem import Problem
+from pikanid.objective.shooting import HURRY, Shooting
+from pikanid.problem.problem import Problem
 from pikanid.recording import Channel, Recording
-from pikanid.shooting import HURRY, Shooting
 
 T = np.linspace(0.0, 3.0, 31)
 TAU = np.linspace(0.5, 2.5, 17)

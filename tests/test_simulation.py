@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pikanid as pk
-from pikanid import errors, excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.problem import bind
-from pikanid.recording import Channel, Recording
+from pikanid import errors
+from pikanid.model import Model, Parameter, systems
+from pikanid.problem.problem import bind
+from pikanid.recording import Channel, Recording, excitation
 from pikanid.simulation import Simulator, Steps, VectorField
 from pikanid.simulation.simulator import Response, _foretold
 

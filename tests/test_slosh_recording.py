@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pikanid import datasets
+from pikanid.recording import datasets
 
 TILTED = "Tilt_LE_2D_0m_6.5s_30deg"
 LEVEL = "LE_2D_0m_5s_900deg"

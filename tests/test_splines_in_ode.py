@@ -9,9 +9,8 @@ import pytest
 from comparing import compare
 from scipy.interpolate import BSpline
 
-from pikanid import excitation, systems
-from pikanid.model import Model, Output, Parameter, Spline, State
-from pikanid.recording import Recording
+from pikanid.model import Model, Output, Parameter, Spline, State, systems
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import VectorField
 from pikanid.simulation.simulator import Steps
 

@@ -7,9 +7,9 @@ import pytest
 
 import pikanid as pk
 from pikanid.model import Model
-from pikanid.problem import Problem
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
-from pikanid.shooting import Shooting
 from pikanid.strategies.starts import EXTRA, starting_points
 
 BOUNDS = {"narrow": (0.9, 1.2), "wide": (1e-3, 1e3), "tiny": (0.05, 1e9), "signed": (-40.0, 2.0),

@@ -9,7 +9,8 @@ import pytest
 from scipy.stats import binom, chi2
 
 import pikanid as pk
-from pikanid import excitation, systems
+from pikanid.model import systems
+from pikanid.recording import excitation
 
 TRUE = {"l_theta": 0.045, "d_theta": 0.15}
 SCENARIOS = [(stride, noise) for stride in (1, 10) for noise in (0.1, 1.0)]

@@ -8,9 +8,9 @@ import oracle
 import pytest
 from scipy.integrate import solve_ivp
 
-from pikanid import errors, excitation, systems
-from pikanid.model import Model
-from pikanid.recording import Recording
+from pikanid import errors
+from pikanid.model import Model, systems
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import Steps
 
 pytestmark = pytest.mark.compiled

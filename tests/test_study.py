@@ -10,7 +10,9 @@ import pytest
 from rich.console import Console
 
 import pikanid as pk
-from pikanid import datasets, errors, systems
+from pikanid import errors
+from pikanid.model import systems
+from pikanid.recording import datasets
 from pikanid.reporting import study_report, study_sheets
 from pikanid.study import pendulum, run, slosh
 

@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from pikanid import errors
 from pikanid.approximators.bspline import BSpline
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
 from pikanid.symbolic import name_edge
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import fit_form

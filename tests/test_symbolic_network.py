@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from pikanid import errors, systems
+from pikanid import errors
 from pikanid.approximators.kan import build_kan, to_state
 from pikanid.approximators.kan.edges import arguments, plain
 from pikanid.approximators.kan.train import fit_points
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
+from pikanid.model import systems
 from pikanid.symbolic import Reading, contributions, extract, prune
 from pikanid.symbolic.composed import Composition
 from pikanid.symbolic.library import LIBRARY

@@ -5,12 +5,14 @@ import pytest
 from scipy.interpolate import BSpline
 
 import pikanid as pk
-from pikanid import excitation, simulate, systems
-from pikanid.mismatch.api import Case, _opened
-from pikanid.mismatch.candidate import SYMBOLIC
-from pikanid.mismatch.force_shape import force_shape
-from pikanid.mismatch.patch import patch
-from pikanid.mismatch.symbols import symbolic_candidates
+from pikanid import simulate
+from pikanid.mismatch.beyond.force_shape import force_shape
+from pikanid.mismatch.beyond.formulas import symbolic_candidates
+from pikanid.mismatch.beyond.patch import patch
+from pikanid.mismatch.catalogue.candidate import SYMBOLIC
+from pikanid.mismatch.diagnose import Case, _opened
+from pikanid.model import systems
+from pikanid.recording import excitation
 
 SIGMA = 0.1 * np.pi / 180
 EVEN = systems.sloshing().with_term(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import pikanid as pk
-from pikanid.mismatch.catalogue import candidates
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.tangent import Directions, directions
-from pikanid.mismatch.whitened import Records, Whitened
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.detect.tangent import Directions, directions
 
 MODEL = pk.systems.sloshing()
 THETA = np.array([0.045, 0.15])

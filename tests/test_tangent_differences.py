@@ -10,17 +10,17 @@ import sympy as sp
 from scipy.interpolate import CubicSpline
 
 import pikanid as pk
-from pikanid.expressions import TIME, symbol
-from pikanid.mismatch.candidate import Candidate, Sign
-from pikanid.mismatch.catalogue import candidates
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.seen import Watched
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.tangent import directions
-from pikanid.mismatch.whitened import Records, Whitened
-from pikanid.model_parts import Output
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.formula.expressions import TIME, symbol
+from pikanid.mismatch.catalogue.candidate import Candidate, Sign
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.design.response import Watched
+from pikanid.mismatch.detect.tangent import directions
+from pikanid.model.parts import Output
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 
 STEP = 0.01
 USUAL = 0.02  # of a sign's length, that it may be off

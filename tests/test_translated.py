@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pikanid import excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.problem import bind
-from pikanid.recording import Recording
+from pikanid.model import Model, Parameter, systems
+from pikanid.problem.problem import bind
+from pikanid.recording import Recording, excitation
 from pikanid.simulation.simulator import Simulator, Steps
 from pikanid.simulation.structure import Structure
 from pikanid.simulation.tape import tape

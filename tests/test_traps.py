@@ -14,11 +14,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 import pikanid as pk
-from pikanid import errors, excitation, simulation, systems
-from pikanid.model import Model, Parameter
-from pikanid.problem import Problem, bind
-from pikanid.recording import Recording
-from pikanid.shooting import Shooting
+from pikanid import errors, simulation
+from pikanid.model import Model, Parameter, systems
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem, bind
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import Simulator, Steps
 
 SIGMA = 0.1 * np.pi / 180

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 import pikanid as pk
-from pikanid import errors, excitation, systems
-from pikanid.model import Model, Parameter
-from pikanid.problem import FreeParameter
-from pikanid.recording import Recording
+from pikanid import errors
+from pikanid.model import Model, Parameter, systems
+from pikanid.problem.problem import FreeParameter
+from pikanid.recording import Recording, excitation
 from pikanid.uncertainty import (
     covariance,
     cramer_rao,

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 import pikanid as pk
-from pikanid import systems
 from pikanid.cli import EXIT_UNFORESEEN, main
-from pikanid.mismatch.in_turn import side_by_side
+from pikanid.mismatch.fitting.parallel import side_by_side
+from pikanid.model import systems
 
 
 def broken(*_: Any) -> Any:
@@ -47,7 +47,7 @@ def test_the_place_is_named(monkeypatch: pytest.MonkeyPatch,
                             capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(systems, "find", in_a_thread)
     main(["models", "sloshing"])
-    assert "mismatch/in_turn.py, line" in capsys.readouterr().err
+    assert "mismatch/fitting/parallel.py, line" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("words", [

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pikanid import units
 from pikanid.errors import BadUnit, PikanidError
+from pikanid.formula import units
 
 NAMES = ["m", "s", "rad", "deg", "kg", "V", "mV", "N", "Hz", "mm", "ohm", "A", "K", "um", "h"]
 powers = st.dictionaries(st.sampled_from(NAMES), st.sampled_from([-3, -2, -1, 1, 2, 3]), max_size=4)
@@ -117,7 +117,7 @@ def test_different_things_do_not_convert(source: str, target: str) -> None:
 
 def test_plain_units_need_no_pint() -> None:
     code = (
-        "import sys; from pikanid import units; units.parse('m/s^2');"
+        "import sys; from pikanid.formula import units; units.parse('m/s^2');"
         "units.convert(1.0, 'rad', 'rad'); assert 'pint' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

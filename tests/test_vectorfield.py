@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nonsmooth_terms import TERMS, slosh
 
-from pikanid import systems
-from pikanid.model import Model, Parameter
+from pikanid.model import Model, Parameter, systems
 from pikanid.simulation import VectorField
 
 RNG = np.random.default_rng(11)

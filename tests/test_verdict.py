@@ -9,16 +9,16 @@ from typing import cast
 import numpy as np
 import pytest
 
-from pikanid.mismatch.candidate import SYMBOLIC, Candidate
-from pikanid.mismatch.detect import Detection
-from pikanid.mismatch.doubt import POWER, least_proof
-from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.judge import HeldOut
-from pikanid.mismatch.least_squares import Minimum
-from pikanid.mismatch.verdict import Answer, criterion, settle, with_formulas
-from pikanid.mismatch.whitened import Whitened
-from pikanid.model_parts import Parameter
-from pikanid.systems import sloshing
+from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
+from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.detect.residual_tests import Detection
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.least_squares import Minimum
+from pikanid.mismatch.judge.doubt import POWER, least_proof
+from pikanid.mismatch.judge.prediction import HeldOut
+from pikanid.mismatch.judge.verdict import Answer, criterion, settle, with_formulas
+from pikanid.model.parts import Parameter
+from pikanid.model.systems import sloshing
 
 SITE = SimpleNamespace(suffix="", swing=1.0)
 ROWS = 1000

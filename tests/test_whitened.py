@@ -9,13 +9,13 @@ import pytest
 from scipy.optimize import least_squares
 
 import pikanid as pk
-from pikanid.mismatch.catalogue import candidates
-from pikanid.mismatch.hypothesis import Hypothesis, fitted
-from pikanid.mismatch.judge import HeldOut, held_out
-from pikanid.mismatch.noise_level import Level
-from pikanid.mismatch.screen import Screen
-from pikanid.mismatch.site import sites
-from pikanid.mismatch.whitened import Records, Whitened
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.judge.prediction import HeldOut, held_out
+from pikanid.mismatch.search.screen import Screen
 from pikanid.model import Model
 from pikanid.recording import Recording
 

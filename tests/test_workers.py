@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from pikanid.workers import begin, unordered
+from pikanid.storage.workers import begin, unordered
 
 PARENTS = {
-    "joblib": "from pikanid.workers import unordered\n"
+    "joblib": "from pikanid.storage.workers import unordered\n"
               "list(unordered(waits, [(folder,)] * 2, 2))",
     "a pool": "import multiprocessing\n"
               "with multiprocessing.get_context('spawn').Pool(2, begin, (os.getpid(),)) as pool:\n"
@@ -49,7 +49,8 @@ def until(said: object) -> None:
 
 @pytest.mark.parametrize("kind", PARENTS)
 def test_workers_end_with_a_parent_that_is_killed(kind: str, tmp_path: Path) -> None:
-    code = (f"import os, sys\nfolder = {str(tmp_path)!r}\nfrom pikanid.workers import begin\n"
+    code = (f"import os, sys\nfolder = {str(tmp_path)!r}\n"
+            "from pikanid.storage.workers import begin\n"
             f"from test_workers import waits\n{PARENTS[kind]}")
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     parent = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": path})

@@ -45,10 +45,10 @@ def conceal(
     quiet: Quiet = False,
 ) -> int:
     """Write recordings that hide an effect each, and a sealed file that says which."""
-    from pikanid.concealed.deck import DEFAULT_MIX, parse_mix
-    from pikanid.concealed.generate import check, generate
-    from pikanid.concealed.seal import Settings
     from pikanid.reporting.console import console, working
+    from pikanid.validation.concealed.deck import DEFAULT_MIX, parse_mix
+    from pikanid.validation.concealed.generate import check, generate
+    from pikanid.validation.concealed.seal import Settings
 
     shares = parse_mix(mix) if mix is not None else dict(DEFAULT_MIX)
     settings = Settings(cases, excitation, quantity(sigma, "rad", "--sigma"), shares)

@@ -45,11 +45,11 @@ def confusable(
 ) -> int:
     """Say which effects an experiment could detect, from which size, and which it confuses."""
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [model, excitation])
-    from pikanid import systems
-    from pikanid.mismatch.confusable import confusable as run
-    from pikanid.outputs import atomically
+    from pikanid.mismatch.design.confusable import confusable as run
+    from pikanid.model import systems
     from pikanid.reporting.console import console, working
     from pikanid.reporting.strict_json import text
+    from pikanid.storage.outputs import atomically
 
     chosen = adjusted(systems.find(model), set_)
     drive = excited(chosen, excitation, duration, rate, [])

@@ -51,14 +51,15 @@ def design(
     """Choose the next experiment among feasible ones, and write it ready to run."""
     check_outputs({"--out": (out, [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".pq"]),
                    "--plot": (plot, [".png", ".svg", ".pdf"])}, [*models, *recorded, *candidate])
-    from pikanid import errors, systems
-    from pikanid.mismatch.experiments import d_optimal, next_experiment
-    from pikanid.mismatch.profiles import Bounds
-    from pikanid.outputs import together
-    from pikanid.plots import image_for
+    from pikanid import errors
+    from pikanid.estimate.plots import image_for
+    from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
+    from pikanid.mismatch.design.profiles import Bounds
+    from pikanid.model import systems
     from pikanid.recording import Recording
+    from pikanid.recording.writing import content
     from pikanid.reporting.console import console
-    from pikanid.writing import content
+    from pikanid.storage.outputs import together
 
     if not rate > 0:
         raise errors.BadSetting(errors.bad_rate(rate))

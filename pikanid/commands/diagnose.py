@@ -22,7 +22,7 @@ from pikanid.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from pikanid.mismatch import Diagnosis
+    from pikanid.mismatch.report.diagnosis import Diagnosis
     from pikanid.recording import Recording
 
 EXAMPLES = """Examples:
@@ -64,8 +64,8 @@ def diagnose(
     """Find out which physics a model leaves out, and prove it on another recording."""
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),
                    "--report": (report, [".html"])}, [*train, *held_out, model])
-    from pikanid import systems
-    from pikanid.mismatch import diagnose as run
+    from pikanid.mismatch.diagnose import diagnose as run
+    from pikanid.model import systems
     from pikanid.reporting.console import working
 
     chosen = adjusted(systems.find(model), set_)
@@ -93,8 +93,8 @@ def diagnose(
 def _write(dx: Diagnosis, title: str, json_: str | None, report: str | None) -> None:
     from pathlib import Path
 
-    from pikanid.outputs import together
     from pikanid.reporting import strict_json
+    from pikanid.storage.outputs import together
 
     files: dict[str, bytes] = {}
     text = "" if json_ is None else strict_json.text(dx.to_dict())

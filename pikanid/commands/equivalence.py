@@ -13,7 +13,7 @@ from pikanid.commands.options import Quiet, check_outputs
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from pikanid.equivalence import EquivalenceReport
+    from pikanid.validation.equivalence import EquivalenceReport
 
 EXIT_DIFFERENT = 3
 EXAMPLES = """Examples:
@@ -41,8 +41,8 @@ def equivalence(
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [])
     folder = None if report is None else _folder(report)
     from pikanid.approximators.kan import build_kan
-    from pikanid.equivalence import run_checks
     from pikanid.reporting.console import console, working
+    from pikanid.validation.equivalence import run_checks
 
     build_kan([1, 1])  # says what is missing where torch or pykan is not installed
     with working("equivalence", count_parts(quick), quiet) as step:
@@ -63,7 +63,7 @@ def count_parts(quick: bool) -> int:
     >>> count_parts(quick=True) < count_parts(quick=False)
     True
     """
-    from pikanid.equivalence.checks import optimised, settings
+    from pikanid.validation.equivalence.checks import optimised, settings
 
     # Uniqueness, the KAN handed over, deep KANs, negative controls, degree 2 at the end.
     return len(list(settings(quick=quick))) + len(list(optimised())) + 5
@@ -100,8 +100,8 @@ def _write(report: EquivalenceReport, folder: Path | None, json_: str | None) ->
     """The page with its figure, and JSON; the path of the page."""
     from importlib.metadata import version
 
-    from pikanid.outputs import together
     from pikanid.reporting.strict_json import text
+    from pikanid.storage.outputs import together
 
     content = text({**report.to_dict(), "version": version("pikanid")})
     files = {} if folder is None else report.files(folder)

@@ -48,8 +48,8 @@ def extract(
         metavar="FILE", show_default=False, help="the network drawn: .png, .svg, .pdf")] = None,
 ) -> int:
     """Read a KAN: a formula with standard errors, and how far to trust it."""
-    from pikanid.outputs import together
     from pikanid.reporting.console import console
+    from pikanid.storage.outputs import together
     from pikanid.symbolic import extract as read
 
     check_outputs({"--plot": (plot, (".png", ".svg", ".pdf")),
@@ -64,7 +64,7 @@ def extract(
     if json_ is not None and json_ != "-":
         files[json_] = text.encode()
     if plot is not None:
-        from pikanid.plots import image_for
+        from pikanid.estimate.plots import image_for
 
         files[plot] = image_for(reading.plot(), plot)
     together(files)
@@ -78,7 +78,7 @@ def extract(
 def _load(path: str) -> Any:
     """A KAN or an estimate, by what the file holds."""
     from pikanid.estimate import Estimate
-    from pikanid.stored import file_bytes
+    from pikanid.storage.limits import file_bytes
 
     start = file_bytes(path, lambda why: errors.BadSetting(errors.cannot_open(path, why)),
                        first=4096)
@@ -108,7 +108,7 @@ def _points(path: str, names: list[str], output: str | None) -> tuple[np.ndarray
 
 
 def _content(reading: Reading) -> dict[str, Any]:
-    from pikanid.expressions import to_text
+    from pikanid.formula.expressions import to_text
 
     return {
         "schema_version": 1, "formula": to_text(reading.expression),

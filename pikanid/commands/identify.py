@@ -91,7 +91,7 @@ def identify(
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),
                    "--plot": (plot, [".png", ".svg", ".pdf"]),
                    "--save": (save, [".json", ".json.gz"])}, [*recordings, model])
-    from pikanid import systems
+    from pikanid.model import systems
 
     chosen = adjusted(systems.find(model), set_, fix, free)
     if not chosen.free_names:
@@ -112,8 +112,8 @@ def prepared(path: str, model: Model, columns: dict[str, str], units: dict[str, 
               rate: float | None, sheet: str | None, start: float | None, stop: float | None,
               decimate: int, sigma: Sequence[str]) -> Recording:
     """The recording in a file as the options want it: channels, units, window, noise."""
+    from pikanid.formula.units import check
     from pikanid.recording import Recording
-    from pikanid.units import check
 
     known = [*model.input_names, *model.output_names, "t", "time"]
     for name in [*columns, *units]:
@@ -200,8 +200,8 @@ def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimat
            failed: dict[str, str], several: bool, seconds: float, json_: str | None,
            plot: str | None, save: str | None) -> None:
     import pikanid
-    from pikanid.outputs import together
     from pikanid.reporting import strict_json
+    from pikanid.storage.outputs import together
 
     files: dict[str, bytes] = {}
     labels = [r.name for r in given]
@@ -212,13 +212,13 @@ def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimat
         if json_ != "-":
             files[json_] = strict_json.text(content).encode()
     if plot is not None:
-        from pikanid.plots import image_for, plot_strategies
+        from pikanid.estimate.plots import image_for, plot_strategies
 
         figure = (plot_strategies({e.strategy: e.fits for e in estimates}, model.name)
                   if len(estimates) > 1 else estimates[0].plot())
         files[plot] = image_for(figure, plot)
     if save is not None:
-        from pikanid import estimate_file
+        from pikanid.estimate import file as estimate_file
 
         files[save] = estimate_file.content(estimates[0], save)
     together(files)

@@ -25,7 +25,7 @@ def models(
         "--toml", help="print nothing but the model file, to start your own from")] = False,
 ) -> int:
     """List the ready-made models, or print one: equations, parameters, model file."""
-    from pikanid import systems
+    from pikanid.model import systems
     from pikanid.reporting.console import console
     from pikanid.reporting.model_text import toml as as_toml
     from pikanid.reporting.tables import row, show_model, table

@@ -61,12 +61,12 @@ def assignments(option: str, texts: Sequence[str], example: str) -> dict[str, st
 
 
 def quantity(text: str, unit: str, where: str, difference: bool = False) -> float:
-    """A number in `unit`, as `pikanid.units_quantity.quantity` reads it.
+    """A number in `unit`, as `pikanid.formula.quantity.quantity` reads it.
 
     >>> quantity("45 mm", "m", "l_theta")
     0.045
     """
-    from pikanid import units_quantity
+    from pikanid.formula import quantity as units_quantity
 
     return units_quantity.quantity(text, unit, where, difference)
 
@@ -79,7 +79,7 @@ def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),
         BadModel: If the model has no such parameter or state, or a value leaves its bounds.
         BadSetting: If a text cannot be read, or a parameter is to be both free and fixed.
 
-    >>> from pikanid.systems import sloshing
+    >>> from pikanid.model.systems import sloshing
     >>> adjusted(sloshing(), ["l_theta=50mm"], fix=["d_theta=0.1"], free=["theta"]).free_names
     ('l_theta', 'theta_0')
     """

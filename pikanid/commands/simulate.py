@@ -57,7 +57,7 @@ def simulate(
     """Simulate a model and write what would be recorded."""
     check_outputs({"--out": (out, [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".pq"])},
                   [excitation, model])
-    from pikanid import systems
+    from pikanid.model import systems
     from pikanid.simulation import simulate as run
 
     chosen = adjusted(systems.find(model), set_)
@@ -80,8 +80,7 @@ def excited(model: Model, name: str, duration: float, rate: float,
     """The inputs to simulate under: the built-in excitation `name`, or the recording it names."""
     from pathlib import Path
 
-    from pikanid import excitation
-    from pikanid.recording import Recording
+    from pikanid.recording import Recording, excitation
 
     if name not in BUILT_IN:
         import difflib

@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.adequacy import judge
 from pikanid.discrepancy.bands import Posterior, holm, likelihood, wald
 from pikanid.discrepancy.edge import Edge
 from pikanid.discrepancy.edges import OFFSET, plan_edges
@@ -19,10 +18,12 @@ from pikanid.discrepancy.level import Level
 from pikanid.discrepancy.levels import search
 from pikanid.discrepancy.mixture import View, mixed_edge, mixed_plans, views
 from pikanid.discrepancy.result import Discrepancy
-from pikanid.estimate import Estimate, total_cost
+from pikanid.estimate import Estimate
+from pikanid.estimate.estimate import total_cost
 from pikanid.model import Input, Model, Parameter, State
-from pikanid.problem import Problem
-from pikanid.problem_arguments import a_model
+from pikanid.objective.adequacy import judge
+from pikanid.problem.arguments import a_model
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.strategies.finish import evaluate
 from pikanid.strategies.nls import NLS

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pikanid.discrepancy.edge import Edge
-from pikanid.plots import new_figure
+from pikanid.estimate.plots import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,7 +14,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.discrepancy.smoothness import Smoothness
-from pikanid.shooting import Shooting
+from pikanid.objective.shooting import Shooting
 
 ITERATIONS = 40
 SETTLED = 0.03  # stop once a step moves nothing by more than this many posterior deviations

@@ -13,18 +13,18 @@ from collections.abc import Sequence
 import numpy as np
 import sympy as sp
 
-from pikanid.adequacy import difference_noise
 from pikanid.discrepancy.edges import EdgePlan, extend
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import visit
 from pikanid.discrepancy.level import Level, smoothness_of
 from pikanid.discrepancy.smoothness import STIFF
 from pikanid.estimate import Estimate
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
 from pikanid.model import Model, Output
-from pikanid.problem import Problem
+from pikanid.objective.adequacy import difference_noise
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 from pikanid.recording import Channel, Recording
-from pikanid.shooting import Shooting
 from pikanid.strategies.ipda import IPDA, fit_relaxed
 
 TURNS = 6

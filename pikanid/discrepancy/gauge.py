@@ -16,8 +16,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from pikanid.discrepancy.edges import EdgePlan, argument_model
-from pikanid.estimate_data import Trajectory
-from pikanid.problem import Problem
+from pikanid.estimate.data import Trajectory
+from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 
 FOLLOWED = 0.9  # share of a nominal term's mean square that makes it a gauge, if edges reach it

@@ -11,9 +11,9 @@ from pikanid.discrepancy.edges import OFFSET, EdgePlan
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import Visited, visit
 from pikanid.discrepancy.smoothness import LARGEST, EdgePrior, Smoothness
-from pikanid.estimate_data import Trajectory
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.estimate.data import Trajectory
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 
 UNKNOWN = 1e-3  # prior precision of a parameter, in units of its guess: none to speak of
 

@@ -19,8 +19,8 @@ from pikanid.discrepancy.level import NOWHERE, Level, smoothness_of
 from pikanid.discrepancy.offers import finer_gain, step_offers, strongest, variation_offers
 from pikanid.discrepancy.smoothness import Smoothness
 from pikanid.estimate import Estimate
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 
 STRONG = 5.0  # log Bayes factor (odds of 150 : 1) that a step or a varying smoothness must reach
 SURE = 4.0  # standard deviations that a step must differ from zero by, to stay

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from pikanid.discrepancy.edges import EdgePlan, argument_model
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 
 # from arguments (L, edges) at the begin and end of every interval to mean forces (L, forces)

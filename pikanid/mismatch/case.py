@@ -8,22 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid.estimate import Estimate
-from pikanid.mismatch.candidate import Candidate
-from pikanid.mismatch.decisions import smaller
-from pikanid.mismatch.detect import Detection
-from pikanid.mismatch.estimating import as_estimate
-from pikanid.mismatch.hypothesis import Hypothesis
-from pikanid.mismatch.in_turn import side_by_side
-from pikanid.mismatch.judge import HeldOut, held_out
-from pikanid.mismatch.least_squares import minimise
-from pikanid.mismatch.outliers import without_lone
-from pikanid.mismatch.preparation import with_refined_noise
-from pikanid.mismatch.remainder import residual_tests
-from pikanid.mismatch.repeats import Repeats
-from pikanid.mismatch.search import Search
-from pikanid.mismatch.site import Site, sites
-from pikanid.mismatch.verdict import ADEQUATE, WORTH
-from pikanid.mismatch.whitened import Records, Whitened
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.site import Site, sites
+from pikanid.mismatch.data.outliers import without_lone
+from pikanid.mismatch.data.preparation import with_refined_noise
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.detect.remainder import residual_tests
+from pikanid.mismatch.detect.residual_tests import Detection
+from pikanid.mismatch.fitting.as_estimate import as_estimate
+from pikanid.mismatch.fitting.decisions import smaller
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.least_squares import minimise
+from pikanid.mismatch.fitting.parallel import side_by_side
+from pikanid.mismatch.fitting.repeats import Repeats
+from pikanid.mismatch.judge.prediction import HeldOut, held_out
+from pikanid.mismatch.judge.verdict import ADEQUATE, WORTH
+from pikanid.mismatch.search.search import Search
 from pikanid.model import Model
 
 SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pikanid.approximators import Array
-from pikanid.functional import Part, Rows, Sites
+from pikanid.objective.functional import Part, Rows, Sites
 
 Ints = NDArray[np.int64]
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pikanid.approximators import Array
-from pikanid.functional import Functional, Rows
+from pikanid.objective.functional import Functional, Rows
 from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.gauss_newton import Point, box_minimum
 from pikanid.optimise.local_rows import Family, Layout

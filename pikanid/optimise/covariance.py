@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
-from pikanid.functional import Rows, Sites
+from pikanid.objective.functional import Rows, Sites
 from pikanid.optimise.banded import slopes
 from pikanid.optimise.cholesky import eigen
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Step

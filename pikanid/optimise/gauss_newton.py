@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
-from pikanid.functional import Functional, Rows
+from pikanid.objective.functional import Functional, Rows
 from pikanid.optimise.banded import BandedAssembler, BandedNormal
 from pikanid.optimise.cholesky import solve_positive
 

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from pikanid.approximators import Array
 from pikanid.approximators.mlp import MLP
-from pikanid.functional import Functional, Sites
+from pikanid.objective.functional import Functional, Sites
 from pikanid.optimise.gauss_newton import Point
 from pikanid.simulation.torch_field import TorchField
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pikanid.cache_jit import cached_jit
+from pikanid.storage.jit import cached_jit
 
 _compiled = cached_jit(error_model="numpy", nogil=True)
 

@@ -7,11 +7,11 @@ import io
 from html import escape
 from typing import TYPE_CHECKING
 
-from pikanid.estimate import rounded
+from pikanid.estimate.estimate import rounded
 
 if TYPE_CHECKING:
-    from pikanid.mismatch.findings import Explanation
-    from pikanid.mismatch.result import Diagnosis
+    from pikanid.mismatch.report.diagnosis import Diagnosis
+    from pikanid.mismatch.report.findings import Explanation
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 60rem; margin: 2rem auto;

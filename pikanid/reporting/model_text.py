@@ -14,7 +14,7 @@ def toml(model: Model) -> str:
     """The model file's text; reading it gives the model back.
 
     >>> import tomllib
-    >>> from pikanid.systems import pendulum
+    >>> from pikanid.model.systems import pendulum
     >>> Model.from_dict(tomllib.loads(toml(pendulum()))) == pendulum()
     True
     """

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pikanid import excitation
-from pikanid.plots import BAND, MEASURED, new_figure, stroke, tidy
+from pikanid.estimate.plots import BAND, MEASURED, new_figure, stroke, tidy
+from pikanid.recording import excitation
 from pikanid.simulation import simulate
 from pikanid.study import slosh
 from pikanid.study.pendulum import Swing

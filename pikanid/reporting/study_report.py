@@ -8,10 +8,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pikanid.outputs import together
-from pikanid.plots import image
+from pikanid.estimate.plots import image
 from pikanid.reporting import study_sheets as sheets
 from pikanid.reporting.study_figures import figures
+from pikanid.storage.outputs import together
 from pikanid.study import pendulum, slosh
 from pikanid.study.run import SEED, Study
 

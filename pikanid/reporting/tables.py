@@ -46,7 +46,7 @@ def verdict(estimate: Estimate) -> str:
 
 def parameters(estimates: Sequence[Estimate]) -> Table:
     """Every parameter with its standard error; with its 95 % interval too if there is one fit."""
-    from pikanid.estimate import rounded
+    from pikanid.estimate.estimate import rounded
 
     several = len(estimates) > 1
     made = (table("strategy", "parameter", "estimate ± std. error", "unit", "verdict", "time")
@@ -102,7 +102,7 @@ def show_estimates(out: Console, estimates: Sequence[Estimate], failed: Mapping[
 
 def show_model(out: Console, model: Model, toml: str) -> None:
     """Equations, parameters and the model file."""
-    from pikanid.expressions import to_text
+    from pikanid.formula.expressions import to_text
 
     _say(out, model.name, "bold")
     out.print()

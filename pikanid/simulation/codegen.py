@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from pikanid.expressions import TIME, symbol
+from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
 from pikanid.simulation.printing import printed
@@ -24,7 +24,7 @@ import math
 import numpy as np
 from numba import njit
 
-from pikanid.cache_jit import cached_jit
+from pikanid.storage.jit import cached_jit
 from pikanid.simulation.support import (
     Seen, log_abs, positive_power, power_slope, sgn, solve_small, spline_basis, work_dtype)
 

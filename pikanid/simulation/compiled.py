@@ -1,8 +1,8 @@
 """Compiled models: generated source, compiled once and found again by every process.
 
-The source and what numba makes of it are entries of `pikanid.cache`, the source under a name made
-from the model's formulas and from the generator's own text.  Parameter values and which parameters
-are estimated do not enter: one compiled model serves them all.
+The source and what numba makes of it are entries of `pikanid.storage.cache`, the source under a
+name made from the model's formulas and from the generator's own text.  Parameter values and which
+parameters are estimated do not enter: one compiled model serves them all.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
-from pikanid.cache import kept, named, sources
-from pikanid.expressions import to_text
+from pikanid.formula.expressions import to_text
 from pikanid.model import Model
 from pikanid.simulation.structure import Structure
+from pikanid.storage.cache import kept, named, sources
 
 Method = Literal["explicit", "implicit"]
 _HERE = Path(__file__).parent

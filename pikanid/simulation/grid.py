@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pikanid.held import HeldInput, PiecewiseInput
-from pikanid.problem import Experiment
+from pikanid.problem.held import HeldInput, PiecewiseInput
+from pikanid.problem.problem import Experiment
 from pikanid.simulation.layout import Seen
 
 

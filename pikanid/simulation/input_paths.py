@@ -1,8 +1,8 @@
 """Play and limited rates of inputs, for kernels that know neither: more inputs instead.
 
-Behind a play of ±b and a limit R of its rate an input is v = c + s·b + q·R (`pikanid.held.acting`).
-Between two knots c, s and q are straight lines, and s and q are the derivatives by b and R: the
-sensitivities come out exact.
+Behind a play of ±b and a limit R of its rate an input is v = c + s·b + q·R
+(`pikanid.problem.held.acting`).  Between two knots c, s and q are straight lines, and s and q are
+the derivatives by b and R: the sensitivities come out exact.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import functools
 import numpy as np
 import sympy as sp
 
-from pikanid.expressions import symbol
-from pikanid.held import HeldInput, PiecewiseInput, acting
+from pikanid.formula.expressions import symbol
 from pikanid.model import Model
+from pikanid.problem.held import HeldInput, PiecewiseInput, acting
 
 
 @functools.lru_cache(maxsize=64)
@@ -23,7 +23,7 @@ def with_parts(model: Model) -> Model:
     """The model with every input that has play or a limited rate written as c + s·b + q·R; the
     parts s and q are its last inputs.
 
-    >>> from pikanid import systems
+    >>> from pikanid.model import systems
     >>> with_parts(systems.sloshing()).input_names
     ('u_x', 'u_z')
     """

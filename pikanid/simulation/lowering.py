@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-from pikanid.expression_functions import abs_power, clip, log_abs, signed_power
+from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
 from pikanid.model import Model, Spline
 
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from pikanid.cache import kept, named, processor, sources
 from pikanid.simulation import tape as ops
 from pikanid.simulation.native_step import look, step
 from pikanid.simulation.native_text import Writer, blocks, splat
 from pikanid.simulation.tape import GROUPS, Tape
+from pikanid.storage.cache import kept, named, processor, sources
 
 FUNCTIONS = ("values_prelude", "tangents_prelude", "put", "put_tangents", "step", "step_tangents",
              "values_f", "tangents_f", "look_h", "values_h_rate", "look_g", "values_g",

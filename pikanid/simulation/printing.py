@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
-from pikanid.expressions import TIME
+from pikanid.formula.expressions import TIME
 
 
 class _Printer(PythonCodePrinter):

@@ -12,9 +12,9 @@ from typing import Any, Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.evaluated import delay_jacobian, delays, paths
 from pikanid.model import Input, Model, Output
-from pikanid.problem import Experiment
+from pikanid.problem.evaluated import delay_jacobian, delays, paths
+from pikanid.problem.problem import Experiment
 from pikanid.simulation.compiled import Method, compiled
 from pikanid.simulation.grid import Grid, build_grid
 from pikanid.simulation.input_paths import split, with_parts
@@ -59,8 +59,9 @@ class Simulator:
     """Simulates one model for one experiment; immutable, safe to use from several threads.
 
     >>> import numpy as np
-    >>> from pikanid import excitation, systems
-    >>> from pikanid.problem import bind
+    >>> from pikanid.recording import excitation
+    >>> from pikanid.model import systems
+    >>> from pikanid.problem.problem import bind
     >>> model = systems.sloshing()
     >>> simulator = Simulator(model, bind(model, excitation.two_pulse(), need_outputs=False))
     >>> simulator.run(np.array([0.045, 0.15, 0.3, 9.81]), states=True).states.shape[1]

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pikanid.cache_jit import cached_jit
 from pikanid.simulation.layout import STEEP, Seen, work_dtype
+from pikanid.storage.jit import cached_jit
 
 # generated models find everything they need in this module
 __all__ = ["STEEP", "Seen", "work_dtype"]

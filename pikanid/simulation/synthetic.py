@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pikanid import errors, units_quantity
+from pikanid import errors
+from pikanid.formula import quantity as units_quantity
 from pikanid.model import Model
-from pikanid.problem import bind
-from pikanid.problem_arguments import a_model, one_recording
+from pikanid.problem.arguments import a_model, one_recording
+from pikanid.problem.problem import bind
 from pikanid.recording import Channel, Recording
 from pikanid.simulation.simulator import MethodChoice, Simulator
 
@@ -41,7 +42,8 @@ def simulate(model: Model, excitation: Recording, *,
     pikanid.errors.BadRecording : an input is missing
     pikanid.errors.SimulationFailed : the trajectory leaves the finite numbers
 
-    >>> from pikanid import excitation, systems
+    >>> from pikanid.recording import excitation
+    >>> from pikanid.model import systems
     >>> rec = simulate(systems.sloshing(), excitation.two_pulse())
     >>> round(float(abs(rec["theta"].values).max()), 4)
     0.1979

@@ -23,8 +23,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
-from pikanid.expression_functions import log_abs
-from pikanid.expressions import TIME, symbol
+from pikanid.formula.expressions import TIME, symbol
+from pikanid.formula.functions import log_abs
 from pikanid.model import Model
 from pikanid.simulation.lowering import LoweredModel, lower_model, positive_power, switch_symbol
 from pikanid.simulation.structure import Structure

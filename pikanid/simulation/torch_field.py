@@ -16,7 +16,7 @@ import sympy as sp
 import torch
 from torch import Tensor
 
-from pikanid.expressions import TIME, symbol
+from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model, Spline
 from pikanid.simulation.lowering import lower_model, spline_value, switch_symbol
 from pikanid.simulation.structure import Structure
@@ -31,7 +31,7 @@ class TorchField:
     Arguments: t (M,), x (M, n), u (M, m), p: all parameters in model order, as a tensor (P,) or as
     a list of numbers and scalar tensors, of which the numbers cost no gradient.
 
-    >>> from pikanid.systems import sloshing
+    >>> from pikanid.model.systems import sloshing
     >>> field = TorchField(sloshing())
     >>> p = torch.tensor([0.045, 0.15, 0.3, 9.81], dtype=torch.float64)
     >>> x = torch.tensor([[0.0, 1.0]], dtype=torch.float64)

@@ -25,7 +25,7 @@ _NAMES = [name.upper() for name in FUNCTIONS]
 _HEADER = f'''"""Integrators of tapes; generated from the kernels."""
 import numpy as np
 
-from pikanid.cache_jit import cached_jit
+from pikanid.storage.jit import cached_jit
 from pikanid.simulation.native_call import call_look, call_native, call_step
 from pikanid.simulation.support import solve_small
 
@@ -49,8 +49,9 @@ class Translated(Simulator):
     corners of the right-hand side, which pays where they are sharp.
 
     >>> import numpy as np
-    >>> from pikanid import excitation, systems
-    >>> from pikanid.problem import bind
+    >>> from pikanid.recording import excitation
+    >>> from pikanid.model import systems
+    >>> from pikanid.problem.problem import bind
     >>> model = systems.sloshing()
     >>> simulator = Translated(model, bind(model, excitation.two_pulse(), need_outputs=False))
     >>> simulator.run(np.array([0.045, 0.15, 0.3, 9.81]), states=True).states.shape[1]

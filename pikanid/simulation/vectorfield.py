@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from pikanid.expressions import TIME, symbol
+from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
 from pikanid.simulation.layout import STEEP
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
@@ -29,7 +29,7 @@ class VectorField:
 
     Arguments of all methods: t (M,), x (M, n), u (M, m), p (P,) = all parameters in model order.
 
-    >>> from pikanid.systems import sloshing
+    >>> from pikanid.model.systems import sloshing
     >>> field = VectorField(sloshing())
     >>> p = np.array([0.045, 0.15, 0.3, 9.81])
     >>> field.rhs(np.zeros(1), np.array([[0.0, 1.0]]), np.zeros((1, 2)), p)

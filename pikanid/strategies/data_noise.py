@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pikanid.approximators import Array
-from pikanid.functional import Functional
+from pikanid.objective.functional import Functional
 from pikanid.optimise.covariance import theta_covariance
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Outcome
 from pikanid.optimise.smoothing import Smoothed

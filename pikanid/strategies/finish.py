@@ -8,11 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from pikanid.estimate import Estimate, total_cost
-from pikanid.estimate_data import Fit, Trajectory
-from pikanid.information import covariance, identifiability_warnings, undetermined_warnings
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.estimate import Estimate
+from pikanid.estimate.data import Fit, Trajectory
+from pikanid.estimate.estimate import total_cost
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.problem import Problem
+from pikanid.uncertainty.information import (
+    covariance,
+    identifiability_warnings,
+    undetermined_warnings,
+)
 from pikanid.version import __version__
 
 

@@ -11,7 +11,7 @@ from scipy.linalg.lapack import dgbsv
 
 from pikanid.approximators import Array
 from pikanid.approximators.bspline import BSpline
-from pikanid.functional import Functional
+from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import Point
 
 # Beyond this many intervals a simulation by a general solver takes too long to be worth it.

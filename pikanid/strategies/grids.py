@@ -28,9 +28,9 @@ from pikanid.approximators.bspline import (
     split_breakpoints,
 )
 from pikanid.approximators.tables import gauss_nodes
-from pikanid.chains import Chains, Form
-from pikanid.expressions import symbol
-from pikanid.problem import Experiment, Problem
+from pikanid.formula.expressions import symbol
+from pikanid.problem.chains import Chains, Form
+from pikanid.problem.problem import Experiment, Problem
 from pikanid.simulation.vectorfield import VectorField
 
 Knots = Literal["collocation", "aligned", "uniform", "adaptive", "curvature"]

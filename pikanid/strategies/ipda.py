@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from pikanid import errors
-from pikanid.chains import Form, find_chains
 from pikanid.estimate import Estimate
 from pikanid.model import Model
 from pikanid.optimise.schedules import Continuation, Fixed, Schedule
-from pikanid.problem import Problem
+from pikanid.problem.chains import Form, find_chains
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.grids import (

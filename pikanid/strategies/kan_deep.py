@@ -24,14 +24,14 @@ from pikanid.approximators.kan.curve import HIGHEST, KanCurve
 from pikanid.approximators.kan.plan import Base, KanPlan
 from pikanid.approximators.kan.tensors import read, write
 from pikanid.approximators.tables import gauss_nodes
-from pikanid.functional import Functional, Part, bind
-from pikanid.functional_rows import AnyApproximator
+from pikanid.objective.functional import Functional, Part, bind
+from pikanid.objective.rows import AnyApproximator
 from pikanid.optimise.bordered import BorderedSystem
 from pikanid.optimise.damped import Stop, levenberg_marquardt
 from pikanid.optimise.gauss_newton import Point
 from pikanid.optimise.network_covariance import network_covariance
 from pikanid.optimise.schedules import Continuation, Stage, moved
-from pikanid.problem import Problem
+from pikanid.problem.problem import Problem
 from pikanid.strategies.data_noise import row_noise
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.relaxation import GRID_SETTLED, RELATIVE, RelaxedFit, Setup

@@ -16,8 +16,8 @@ from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.approximators.kan import ShallowKAN, build_kan
 from pikanid.approximators.tables import gauss_nodes
-from pikanid.chains import Chains
-from pikanid.problem import Experiment, Problem
+from pikanid.problem.chains import Chains
+from pikanid.problem.problem import Experiment, Problem
 
 MOST_CELLS = 20_000  # of a grid whose cells follow the switches
 MOST_TO_RESOLVE = 5_000  # cells of a first grid that tells every two switches apart

@@ -16,7 +16,7 @@ from scipy.linalg import LinAlgError
 from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.approximators.kan import ShallowKAN
-from pikanid.functional import Functional
+from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import BandedSystem, Outcome, Point, damped_step
 from pikanid.optimise.schedules import Stage
 from pikanid.strategies.kan_grids import KanGrid

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import spsolve
 
 from pikanid import errors
 from pikanid.approximators.kan import ShallowKAN
-from pikanid.functional import Functional
+from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import BandedSystem, Outcome, Point
 from pikanid.optimise.schedules import Continuation, Fixed, Stage, moved
 from pikanid.strategies.data_noise import noise_level, standard_errors

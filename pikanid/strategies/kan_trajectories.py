@@ -11,7 +11,7 @@ from pikanid.approximators import Array
 from pikanid.approximators.kan import ShallowKAN
 from pikanid.approximators.kan.curve import KanCurve
 from pikanid.approximators.kan.device import move
-from pikanid.chains import Chains
+from pikanid.problem.chains import Chains
 from pikanid.strategies.relaxation import RelaxedFit
 
 

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from pikanid.optimise.gauss_newton import (
-    MAX_ITERATIONS,
-    BandedSystem,
-    Linearisation,
-    gauss_newton,
-)
+from pikanid.optimise.gauss_newton import MAX_ITERATIONS, BandedSystem, Linearisation, gauss_newton
 
 STIFF, STIFFEST = 1e10, 1e16  # λ at which a trajectory may be the solution of its equations
 

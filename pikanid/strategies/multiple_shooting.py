@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid import errors
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
 from pikanid.model import Model, Output, Parameter
+from pikanid.objective.shooting import Shooting
 from pikanid.optimise.levenberg_marquardt import minimise
-from pikanid.problem import Experiment, Problem, Samples
-from pikanid.shooting import Shooting
+from pikanid.problem.problem import Experiment, Problem, Samples
 from pikanid.simulation.simulator import Simulator, Steps
 
 CLOSING = (1.0, 10.0, 100.0)  # weights of the gaps, relative to a typical sample's

@@ -17,10 +17,10 @@ import numpy as np
 from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.model import Model
+from pikanid.objective.shooting import Accuracy, Shooting
 from pikanid.optimise.levenberg_marquardt import Optimum, minimise
-from pikanid.problem import Problem
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
-from pikanid.shooting import Accuracy, Shooting
 from pikanid.strategies.finish import finish
 from pikanid.strategies.multiple_shooting import multiple_shooting
 from pikanid.strategies.starts import starting_points

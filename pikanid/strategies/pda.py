@@ -17,26 +17,20 @@ from numpy.linalg import LinAlgError
 
 from pikanid import errors
 from pikanid.approximators import Array, LinearApproximator
-from pikanid.chains import Form, find_chains
 from pikanid.estimate import Estimate
-from pikanid.expressions import symbol
-from pikanid.functional import Functional
+from pikanid.formula.expressions import symbol
 from pikanid.model import Model
+from pikanid.objective.functional import Functional
 from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.covariance import invert
 from pikanid.optimise.gauss_newton import BandedSystem, Point, box_minimum
 from pikanid.optimise.smoothing import Smoothed, smooth
-from pikanid.problem import Problem
+from pikanid.problem.chains import Form, find_chains
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.data_noise import row_noise
-from pikanid.strategies.grids import (
-    Knots,
-    Quadrature,
-    check_options,
-    chosen_grid,
-    paper_intervals,
-)
+from pikanid.strategies.grids import Knots, Quadrature, check_options, chosen_grid, paper_intervals
 from pikanid.strategies.relaxation import RelaxedFit, Setup, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
 

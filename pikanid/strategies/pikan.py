@@ -17,11 +17,11 @@ import numpy as np
 from pikanid import errors
 from pikanid.approximators.kan.device import check_device
 from pikanid.approximators.kan.plan import Base
-from pikanid.chains import Form, find_chains
 from pikanid.estimate import Estimate
 from pikanid.model import Model
 from pikanid.optimise.schedules import Stage
-from pikanid.problem import Problem
+from pikanid.problem.chains import Form, find_chains
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.kan_deep import Shape, deep_fit

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, replace
 
 from pikanid.estimate import Estimate
 from pikanid.model import Model
-from pikanid.problem import Problem
+from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.strategies.pinn_fit import fit_network
 from pikanid.strategies.pinn_settings import PinnSettings, check

@@ -10,9 +10,9 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.approximators import Array
+from pikanid.objective.shooting import Shooting
 from pikanid.optimise.levenberg_marquardt import minimise
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.problem.problem import Problem
 from pikanid.uncertainty import covariance
 
 FAR = 5.0  # standard errors

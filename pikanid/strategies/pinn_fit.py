@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pikanid import errors
-from pikanid.adequacy import difference_noise
 from pikanid.approximators import Array
-from pikanid.chains import find_chains
-from pikanid.functional import Functional
+from pikanid.objective.adequacy import difference_noise
+from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import Point
-from pikanid.problem import Problem
+from pikanid.problem.chains import find_chains
+from pikanid.problem.problem import Problem
 from pikanid.simulation.lowering import lower_model
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.pinn_check import against_simulation
@@ -81,11 +81,7 @@ def fit_network(problem: Problem, settings: PinnSettings) -> tuple[PinnFit, Any]
     _need_torch(settings.device)
     from pikanid.optimise.gradient import one_thread
     from pikanid.optimise.gradient_functional import TorchFunctional
-    from pikanid.strategies.pinn_networks import (
-        NetworkTrajectories,
-        functional_of,
-        make_networks,
-    )
+    from pikanid.strategies.pinn_networks import NetworkTrajectories, functional_of, make_networks
 
     paper = settings.protocol == "paper"
     vector_field, chains = VectorField(problem.model), find_chains(problem.model, settings.form)

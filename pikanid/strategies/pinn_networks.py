@@ -11,10 +11,10 @@ from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.approximators.mlp import MLP
 from pikanid.approximators.tables import gauss_nodes
-from pikanid.chains import Chains
-from pikanid.functional import Functional, bind
-from pikanid.problem import Experiment, Problem
-from pikanid.shooting import Shooting
+from pikanid.objective.functional import Functional, bind
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.chains import Chains
+from pikanid.problem.problem import Experiment, Problem
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.grids import fastest_rate
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.chains import Form
+from pikanid.problem.chains import Form
 
 Progress = Callable[[dict[str, float]], None]
 PAPER_RATE = 3e-3  # Adam's; Table II names none

@@ -14,14 +14,8 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.approximators import Array
-from pikanid.chains import Chains
-from pikanid.functional import Functional, bind
-from pikanid.optimise.covariance import (
-    effective_parameters,
-    error_bound,
-    respond,
-    theta_covariance,
-)
+from pikanid.objective.functional import Functional, bind
+from pikanid.optimise.covariance import effective_parameters, error_bound, respond, theta_covariance
 from pikanid.optimise.gauss_newton import (
     MAX_ITERATIONS,
     BandedSystem,
@@ -32,7 +26,8 @@ from pikanid.optimise.gauss_newton import (
 )
 from pikanid.optimise.schedules import Schedule, Stage, moved
 from pikanid.optimise.smoothing import Smoothed, smooth
-from pikanid.problem import Problem
+from pikanid.problem.chains import Chains
+from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.data_noise import noise_level, row_noise, standard_errors
 from pikanid.strategies.first_points import from_simulation, transfer

@@ -16,15 +16,16 @@ from typing import Any, Protocol
 import numpy as np
 
 from pikanid import errors
-from pikanid.adequacy import judge
 from pikanid.approximators import Array
 from pikanid.approximators.bspline import BSpline
-from pikanid.chains import Chains
-from pikanid.estimate import Estimate, total_cost
-from pikanid.estimate_data import Fit, Trajectory
-from pikanid.functional import Functional
-from pikanid.problem import Problem
-from pikanid.shooting import Shooting
+from pikanid.estimate import Estimate
+from pikanid.estimate.data import Fit, Trajectory
+from pikanid.estimate.estimate import total_cost
+from pikanid.objective.adequacy import judge
+from pikanid.objective.functional import Functional
+from pikanid.objective.shooting import Shooting
+from pikanid.problem.chains import Chains
+from pikanid.problem.problem import Problem
 from pikanid.strategies.finish import finish
 from pikanid.strategies.relaxation import RelaxedFit
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from pikanid.problem import FreeParameter, Problem
+from pikanid.problem.problem import FreeParameter, Problem
 
 EXTRA = 8
 

@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from pikanid import datasets, errors, systems
+from pikanid import errors
 from pikanid.estimate import Estimate
-from pikanid.mismatch import Diagnosis, diagnose
-from pikanid.model import Model
-from pikanid.recording import Recording
+from pikanid.mismatch.diagnose import diagnose
+from pikanid.mismatch.report.diagnosis import Diagnosis
+from pikanid.model import Model, systems
+from pikanid.recording import Recording, datasets
 from pikanid.simulation import simulate
 from pikanid.strategies import strategy
 

@@ -12,10 +12,10 @@ from itertools import product
 from multiprocessing.pool import AsyncResult
 
 from pikanid import errors
-from pikanid.mismatch import Diagnosis
+from pikanid.mismatch.report.diagnosis import Diagnosis
+from pikanid.storage.workers import begin
 from pikanid.strategies import STRATEGIES
 from pikanid.study import pendulum, slosh
-from pikanid.workers import begin
 
 SEED = 0
 # Only what is quick is repeated: the study is to stay a matter of minutes.

@@ -13,10 +13,10 @@ from math import pi
 
 import numpy as np
 
-from pikanid import errors, excitation, systems
+from pikanid import errors
 from pikanid.estimate import Estimate
-from pikanid.model import Model
-from pikanid.recording import Recording
+from pikanid.model import Model, systems
+from pikanid.recording import Recording, excitation
 from pikanid.simulation import simulate
 from pikanid.strategies import strategy
 from pikanid.uncertainty import cramer_rao

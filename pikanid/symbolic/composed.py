@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 import sympy as sp
 
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
 from pikanid.symbolic.library import NOTHING, Form, X
 from pikanid.symbolic.numeric import Array
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from pikanid.outputs import together
-from pikanid.plots import image_for, new_figure
+from pikanid.estimate.plots import image_for, new_figure
+from pikanid.storage.outputs import together
 from pikanid.symbolic.composed import Groups, Place
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.significance import Contribution

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
-from pikanid import model_units, units
 from pikanid.estimate import Estimate
-from pikanid.expressions import symbol
+from pikanid.formula import units
+from pikanid.formula.expressions import symbol
 from pikanid.model import Model, Parameter
+from pikanid.model import units as model_units
 from pikanid.symbolic.composed import Place
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import FormFit

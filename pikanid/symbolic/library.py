@@ -17,7 +17,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid import errors
-from pikanid.expressions import FUNCTIONS, parse, symbol
+from pikanid.formula.expressions import FUNCTIONS, parse, symbol
 from pikanid.symbolic.numeric import Array, Compiled, compiled, slopes
 
 Kind = Literal["location", "below", "above", "width", "rate", "signed rate", "frequency",

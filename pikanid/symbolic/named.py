@@ -9,9 +9,9 @@ from html import escape
 import numpy as np
 import sympy as sp
 
-from pikanid import units
-from pikanid.estimate import rounded
-from pikanid.expressions import symbol
+from pikanid.estimate.estimate import rounded
+from pikanid.formula import units
+from pikanid.formula.expressions import symbol
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import FormFit
 from pikanid.symbolic.library import NOTHING, Form, X

@@ -19,7 +19,7 @@ from pikanid.approximators.kan.edges import (
 )
 from pikanid.approximators.kan.tensors import read
 from pikanid.approximators.kan.train import PointFit, fit_points
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
 from pikanid.symbolic.composed import Place
 from pikanid.symbolic.curve import EXACT, Curve
 from pikanid.symbolic.library import LIBRARY, NOTHING, Form
@@ -134,7 +134,7 @@ def name_edges(fit: PointFit, x: Array, with_noise: bool, library: Sequence[Form
 
 def _formula(name: str) -> sp.Expr:
     """An input's name, or the formula that it is."""
-    from pikanid.expressions import FUNCTIONS, parse
+    from pikanid.formula.expressions import FUNCTIONS, parse
 
     if name.isidentifier():
         return symbol(name)

@@ -13,7 +13,7 @@ from pikanid.approximators.kan.deep import DeepKAN
 from pikanid.approximators.kan.edges import edges_of
 from pikanid.approximators.kan.push import SymbolicEdge
 from pikanid.approximators.kan.push import push as fix
-from pikanid.expressions import symbol
+from pikanid.formula.expressions import symbol
 from pikanid.symbolic.library import NOTHING, X
 from pikanid.symbolic.numeric import Array, compiled
 from pikanid.symbolic.reading import Reading

@@ -12,8 +12,9 @@ import numpy as np
 import sympy as sp
 
 from pikanid import errors
-from pikanid.estimate import Estimate, rounded
-from pikanid.expressions import symbol
+from pikanid.estimate import Estimate
+from pikanid.estimate.estimate import rounded
+from pikanid.formula.expressions import symbol
 from pikanid.model import Parameter
 from pikanid.symbolic.composed import Composition, Groups, Place
 from pikanid.symbolic.named import NamedEdge

@@ -11,7 +11,7 @@ import sympy as sp
 from pikanid import errors
 from pikanid.discrepancy.edges import MARGIN, EdgePlan
 from pikanid.estimate import Estimate
-from pikanid.expressions import symbol, to_text
+from pikanid.formula.expressions import symbol, to_text
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.laws import chosen, reading_of_laws, sum_of_laws
 from pikanid.symbolic.library import Form

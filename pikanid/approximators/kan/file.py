@@ -17,9 +17,9 @@ from pikanid.approximators.kan.kinks import Kink
 from pikanid.approximators.kan.plan import Arity, Array, KanPlan
 from pikanid.approximators.kan.shallow import ShallowKAN
 from pikanid.approximators.kan.state import ARRAYS, KanState, LayerState, to_state
-from pikanid.entries import Entry
-from pikanid.outputs import atomically
-from pikanid.stored import MOST_JSON, archived, file_bytes, json_content, parsed
+from pikanid.storage.entries import Entry
+from pikanid.storage.limits import MOST_JSON, archived, file_bytes, json_content, parsed
+from pikanid.storage.outputs import atomically
 
 _FORMAT = "pikanid-kan"
 _VERSION = 1

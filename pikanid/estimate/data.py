@@ -1,0 +1,69 @@
+"""What an `Estimate` holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pikanid.model import Model
+from pikanid.objective.adequacy import Adequacy
+from pikanid.problem.problem import FreeParameter
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Measured against fitted, for an output of a recording; arrays (N,) in the model's unit."""
+
+    recording: str
+    output: str
+    unit: str
+    t: np.ndarray
+    measured: np.ndarray
+    fitted: np.ndarray
+    sigma: np.ndarray | None = None
+
+    @property
+    def residual(self) -> np.ndarray:
+        """measured - fitted (N,)."""
+        return self.measured - self.fitted
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the residual."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The states of one recording on a time grid: t (L,), x (L, n)."""
+
+    t: np.ndarray
+    x: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class EstimateData:
+    """The fields of `pikanid.Estimate`, where they are described."""
+
+    model: Model
+    strategy: str
+    free: tuple[FreeParameter, ...]
+    theta: np.ndarray
+    covariance: np.ndarray
+    fits: tuple[Fit, ...]
+    trajectories: tuple[Trajectory, ...]
+    cost: float
+    adequacy: Adequacy
+    converged: bool
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    history: tuple[Mapping[str, float], ...] = ()
+    warnings: tuple[str, ...] = ()
+    seconds: float = float("nan")
+    seed: int | None = None
+    version: str = ""
+    approximator: Any = None
+
+    # --- parameters ------------------------------------------------------------------------------

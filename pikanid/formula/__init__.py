@@ -1,0 +1,1 @@
+"""Formulas: the whitelist parser and printer, non-smooth functions, units."""

@@ -1,0 +1,76 @@
+"""Laws that no catalogue holds: read out of the missing force's edges, refitted by simulation.
+
+An edge of the missing force is compared with the library of forms.  The most probable ones become
+candidates `symbolic:<expression>`, with a constant beside them or not, whose constants are
+estimated anew inside the equation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from pikanid.formula import units
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
+from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.model.parts import Input, Parameter, State
+from pikanid.symbolic.fitting import FormFit
+from pikanid.symbolic.laws import Laws, sum_of_laws
+from pikanid.symbolic.library import NOTHING
+from pikanid.symbolic.naming import name_curve
+from pikanid.symbolic.search import shortlist
+
+FORMS = 3  # of an edge
+MOST, ALMOST = 0.6, 0.9  # of what all edges explain, or the best one alone: less is not read
+LINEAR = "linear"  # what free parameters do already, as a rule
+CATALOGUED = {"q": {"cubic": "cubic_stiffness"},
+              "v": {"sign": "coulomb_friction", "signed square": "quadratic_drag",
+                    "signed power": "power_drag"}}
+
+
+def symbolic_candidates(shape: ForceShape, site: Site) -> list[Candidate]:
+    """Formulas for what an edge shows, as effects, of the edges that explain most alone."""
+    best = max((e.alone for e in shape.edges), default=0.0)
+    edges = [e for e in shape.edges if e.alone > max(MOST, ALMOST * best)]
+    return [_candidate(site, edge, fit, constant) for edge in edges for fit in _forms(edge)
+            for constant in (False, True) if constant or not _catalogued(edge, fit, site)]
+
+
+def _forms(edge: Edge) -> list[FormFit]:
+    fits = shortlist(name_curve(edge.curve))
+    return [f for f in fits if f.form is not NOTHING and f.form.family != LINEAR][:FORMS]
+
+
+def _catalogued(edge: Edge, fit: FormFit, site: Site) -> str:
+    """The key of the entry that a form alone would be; empty where there is none."""
+    kind = {site.q: "q", site.v: "v"}.get(edge.argument, "")
+    found = CATALOGUED.get(kind, {}).get(fit.form.name)
+    return found + site.suffix if found else ""
+
+
+def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool) -> Candidate:
+    law = sum_of_laws(site.model, [edge.argument], {(0, 0, 0): fit},
+                      [(edge.curve.low, edge.curve.high)])
+    parameters = tuple(_with_units(law, site, edge, fit))
+    expression = law.expression
+    if constant:
+        force = Parameter(site.name("force_0"), 0.0, f"{site.unit}/s^2")
+        parameters = (*parameters, force)
+        expression = expression + symbol(force.name)
+    text = str(expression)
+    alone = _catalogued(edge, fit, site)
+    return Candidate((SYMBOLIC + text,), f"a law {text}", text, "dynamics", site, parameters,
+                     lambda m: m.with_term(site.v, expression), lambda view: (),
+                     covers=(alone, "static_bias" + site.suffix) if alone else ())
+
+
+def _with_units(law: Laws, site: Site, edge: Edge, fit: FormFit) -> Iterator[Parameter]:
+    channels: list[State | Input] = [*site.model.states, *site.model.inputs]
+    own = next(c.unit for c in channels if c.name == edge.argument)
+    powers = [(f"({site.unit})/s^2", 1, -(p or 0)) for p in fit.form.powers]
+    found = [units.product((unit, one), (own, power)) for unit, one, power in powers]
+    found += ["" if k.power is None else units.product((own, k.power)) for k in fit.form.knobs]
+    for parameter, unit in zip(law.parameters, found, strict=True):
+        yield replace(parameter, unit=unit)

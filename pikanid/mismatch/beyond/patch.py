@@ -1,0 +1,157 @@
+"""The KAN patch: one edge inside the equation where no law can be named, with its range.
+
+The edge is a cubic spline of one argument, refitted by simulation together with the parameters.
+It says nothing beyond the range that the motion visited, and is offered only where it improves
+the prediction of recordings that it never saw and that stay inside that range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.judge.prediction import HeldOut
+from pikanid.model import Model
+from pikanid.model.parts import Parameter, Spline
+
+INTERVALS, DEGREE = 5, 3
+INSIDE = 0.95  # of the held-out motion that must lie in the range
+BETTER = 0.9  # of the nominal held-out misfit that must not be exceeded
+GRID = 201
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """An edge δ(argument) that improves the prediction without a name.
+
+    Attributes:
+        model: The nominal model at its new estimates with the edge in it.
+        argument, unit: What it is a function of, and the unit of its values.
+        grid, values, std: (G,) over the range, without mean and slope, which constants and
+            parameters share; outside the range the edge means nothing.
+        inside: Share of the held-out motion in that range.
+        rmse_before, rmse_after: Of the first output, held out.
+    """
+
+    model: Model
+    argument: str
+    unit: str
+    grid: np.ndarray
+    values: np.ndarray
+    std: np.ndarray
+    inside: float
+    rmse_before: float
+    rmse_after: float
+
+    def sentence(self, unit: str) -> str:
+        """What it does, where; `unit` is that of the first output."""
+        return (f"a KAN edge of {self.argument} over {self.grid[0]:.3g} ... {self.grid[-1]:.3g} "
+                f"takes the held-out RMSE from {self.rmse_before:.3g} to {self.rmse_after:.3g} "
+                f"{unit}; it holds in that range only and has no name".replace("  ", " "))
+
+
+def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, records: Records,
+          later: Records, predict: Callable[[Hypothesis], HeldOut | None]) -> Patch | None:
+    """The patch of the state whose edge explains most alone; None where it is no help.
+
+    Args:
+        base: Fit of the nominal model.
+        nominal: That model.
+        shape: What is missing, to first order.
+        site: Coordinate.
+        records, later: To fit, and held out.
+        predict: What a hypothesis makes of the held-out recordings.
+    """
+    edges = [e for e in shape.edges if e.argument in (site.q, site.v)]
+    if not edges:
+        return None
+    edge = max(edges, key=lambda e: e.alone)
+    basis = _Basis(edge)
+    found = fitted(nominal, [basis.candidate(site)], records, [base.point], 1)
+    before = predict(base)
+    if found is None or before is None or found.minimum.chi2 >= base.minimum.chi2:
+        return None
+    after = predict(found)
+    if after is None or after.misfit > BETTER * before.misfit:
+        return None
+    inside = _inside(found, later, edge)
+    if inside < INSIDE:
+        return None
+    grid = np.linspace(basis.low, basis.high, GRID)
+    free = [f.name for f in found.whitened.problem.free]
+    at = [free.index(n) for n in basis.names]
+    line = np.column_stack([np.ones(GRID), grid])
+    seen = basis.matrix(grid)
+    seen = seen - line @ np.linalg.lstsq(line, seen, rcond=None)[0]
+    spread = np.einsum("gi,ij,gj->g", seen, found.covariance[np.ix_(at, at)], seen)
+    return Patch(basis.extended(nominal, site, found), edge.argument, shape.unit, grid,
+                 seen @ found.minimum.theta[at], np.sqrt(np.maximum(spread, 0.0)), inside,
+                 *(next(iter(p.rmse.values())) for p in (before, after)))
+
+
+class _Basis:
+    """Cubic splines of an edge's argument as truncated powers, of the argument scaled to ±1.
+
+    Without the straight line, which belongs to the free parameters.
+    """
+
+    def __init__(self, edge: Edge):
+        self.argument = edge.argument
+        self.low, self.high = edge.curve.low, edge.curve.high
+        self.inner = np.linspace(-1.0, 1.0, INTERVALS + 1)[1:-1]
+        self.names = [f"delta_{k}" for k in range(3 + len(self.inner))]
+
+    def _scaled(self, x: np.ndarray) -> np.ndarray:
+        return (2 * x - self.low - self.high) / (self.high - self.low)
+
+    def matrix(self, x: np.ndarray) -> np.ndarray:
+        """(N, n) at arguments (N,)."""
+        z = self._scaled(x)
+        return np.column_stack([np.ones(len(z)), z**2, z**3, *(
+            np.maximum(z - k, 0.0) ** 3 for k in self.inner)])
+
+    def candidate(self, site: Site) -> Candidate:
+        """The edge as an effect whose coefficients are estimated."""
+        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        z = f"(({self.argument} - ({middle!r}))/{half!r})"
+        powers = ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
+                                              for k in map(float, self.inner))]
+        text = " + ".join(f"{n}*{p}" for n, p in zip(self.names, powers, strict=True))
+        unit = f"{site.unit}/s^2"
+        return Candidate(("patch",), "a KAN edge", text, "dynamics", site,
+                         tuple(Parameter(n, 0.0, unit) for n in self.names),
+                         lambda m: m.with_term(site.v, text), lambda view: (), known=False)
+
+    def extended(self, nominal: Model, site: Site, found: Hypothesis) -> Model:
+        """The nominal model, at the estimates, with the edge as a B-spline."""
+        inner = (self.inner + 1) / 2 * (self.high - self.low) + self.low
+        knots = np.concatenate([[self.low] * (DEGREE + 1), inner, [self.high] * (DEGREE + 1)])
+        x = np.linspace(self.low, self.high, GRID)
+        values = self.matrix(x) @ np.array([found.values[n] for n in self.names])
+        coefficients = np.linalg.lstsq(
+            BSpline.design_matrix(x, knots, DEGREE).toarray(), values, rcond=None)[0]
+        spline = Spline("delta", DEGREE, tuple(map(float, knots)))
+        model = nominal.with_values({n: v for n, v in found.values.items()
+                                     if n in nominal.parameter_names})
+        return model.with_edge(site.v, self.argument, spline).fix(
+            **dict(zip(spline.coefficient_names, map(float, coefficients), strict=True)))
+
+
+def _inside(found: Hypothesis, later: Records, edge: Edge) -> float:
+    """Share of the held-out motion, as predicted, in the range of the edge."""
+    whitened = Whitened(found.model.with_values(
+        {n: v for n, v in found.values.items() if n in found.model.parameter_names}), later)
+    theta = whitened.problem.guess
+    if not whitened.choose_steps(theta, misfit=found.minimum.chi2 / max(whitened.rows, 1)):
+        return 0.0
+    column = found.model.state_names.index(edge.argument)
+    visited = np.concatenate([r.states[:, column] for r in whitened.responses(theta, states=True)])
+    return float(np.mean((visited >= edge.curve.low) & (visited <= edge.curve.high)))

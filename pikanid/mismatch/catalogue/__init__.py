@@ -1,0 +1,1 @@
+"""The catalogue: which physics a model can leave out, and what only looks like it."""

@@ -1,0 +1,124 @@
+"""What an entry of the catalogue becomes for one model: a term to add, and how it would show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Model
+from pikanid.model.parts import Parameter
+
+Channel = Literal["dynamics", "input", "sensor"]
+Array = np.ndarray
+SYMBOLIC = "symbolic:"  # before the formula, in the id of a law that no catalogue holds
+
+
+@dataclass(frozen=True)
+class View:
+    """The nominal motion in one recording, at the stops of its simulation: t (L,), and by name
+    states, inputs and recorded channels (L,), the rates of the states, and the rows that are seen.
+
+    `by_parameter` holds p ∂f_v/∂p (L,) by the names (v, p) of a rate and of a parameter that its
+    equation holds: several equations may hold one.
+    """
+
+    t: Array
+    x: Mapping[str, Array]
+    rates: Mapping[str, Array]
+    u: Mapping[str, Array]
+    extra: Mapping[str, Array]
+    y: Mapping[str, Array]
+    y_rate: Mapping[str, Array]
+    by_parameter: Mapping[tuple[str, str], Array]
+
+
+@dataclass(frozen=True)
+class Sign:
+    """How a small effect would show: as a force on q'', a change of inputs, or of what is seen.
+
+    `start` holds parameter values from where a fit begins; the first parameter is the size: it
+    starts at `null + amplitude * size`, with the amplitude that suits the residual best, and the
+    parameter's own value as null unless given.
+    `one_sided`: the amplitude must be positive.
+    """
+
+    start: Mapping[str, float]
+    force: Array | None = None
+    push: Mapping[str, Array] = field(default_factory=dict)
+    seen: Array | None = None
+    initial: Mapping[str, float] = field(default_factory=dict)
+    one_sided: bool = False
+    scales: bool = True
+    null: float | None = None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect in one model.
+
+    Attributes:
+        ids: Names in reports: one, or all of a group of exact twins.
+        name: For people.
+        expression: As it is added.
+        channel: Where it acts.
+        site: In the model.
+        parameters: Added; the first is the effect's size, with its value at no effect.
+        extend: Adds it to a model that holds the parameters already.
+        signs: How it would show.
+        variant: Distinguishes candidates of one id.
+        twin: Group of candidates that small motions cannot tell apart.
+        per_recording: Whether another recording has its own instance (or none, if `absent`).
+        absent: Whether another recording is not expected to show it.
+        known: Whether the catalogue holds it; a guard only keeps wrong names away.
+        fits: Whether it can be added and refitted, not only looked for.
+        covers: Keys of candidates that it contains as special cases.
+        hills: Factors of its first parameter by which χ² may have other minima, as where a motion
+            comes to rest between two samples.
+        levels: Values of its parameters, from the best of which a fit begins where the model is far
+            off: no first step leads to them.
+        other: Adds it in another reading, which makes a difference beside other effects only.
+        beside: Ids of effects, one of which has to be there: without them it is a twin of another
+            entry.
+    """
+
+    ids: tuple[str, ...]
+    name: str
+    expression: str
+    channel: Channel
+    site: Site
+    parameters: tuple[Parameter, ...]
+    extend: Callable[[Model], Model]
+    signs: Callable[[View], Sequence[Sign]]
+    variant: str = ""
+    twin: str = ""
+    per_recording: bool = False
+    absent: bool = False
+    known: bool = True
+    fits: bool = True
+    covers: tuple[str, ...] = ()
+    hills: tuple[float, ...] = ()
+    levels: tuple[Mapping[str, float], ...] = ()
+    beside: tuple[str, ...] = ()
+    other: Callable[[Model], Model] | None = None
+
+    def suits(self, others: Sequence[Candidate] = ()) -> bool:
+        """Whether it is an explanation of its own beside these."""
+        return not self.beside or any(i in self.beside for e in others for i in e.ids)
+
+    @property
+    def key(self) -> str:
+        """Identifies it among the candidates of a model."""
+        return self.ids[0] + (f"[{self.variant}]" if self.variant else "") + self.site.suffix
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Under which it is reported: a law that no catalogue holds is its formula."""
+        return self.ids if self.known else (SYMBOLIC + self.expression,)
+
+    def applied(self, model: Model) -> Model:
+        """The model with this effect."""
+        return self.extend(model.with_parameters(*self.parameters))

@@ -1,0 +1,49 @@
+"""The catalogue as data: which physics can be missing, and what must not be mistaken for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from pikanid.mismatch.catalogue import channels, forces, late_inputs
+from pikanid.mismatch.catalogue import decoys as guards
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.cross_axis import cross_axis
+from pikanid.mismatch.catalogue.second_mode import second_mode
+from pikanid.mismatch.catalogue.site import Site
+
+ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
+    forces.coulomb_friction, forces.quadratic_drag, forces.power_drag, forces.amplitude_damping,
+    forces.cubic_stiffness, forces.static_bias, forces.parameter_drift, second_mode,
+    forces.wall_impact, cross_axis, forces.disturbance, forces.boundary_layer,
+    forces.hysteresis, channels.delay, late_inputs.input_delay, channels.lags, channels.input_gain,
+    channels.sensor_gain, channels.input_limits, channels.input_backlash, channels.sensor_offset,
+    channels.sensor_drift, channels.sensor_saturation, channels.sensor_nonlinearity,
+    forces.initial_state, channels.input_hold)
+GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
+    guards.even_stiffness, guards.quintic_stiffness, guards.one_way_friction,
+    guards.stribeck_friction, guards.dissipating_wall, guards.velocity_coupled_drive,
+    guards.soft_saturation, guards.clock_error, guards.wobble, guards.rate_limit)
+
+
+def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
+    """Everything that can be missing in a model, entries first; equal keys once.  What is an
+    explanation of its own `beside` others only is there as well.
+
+    >>> from pikanid.recording import excitation
+    >>> from pikanid.model import systems
+    >>> from pikanid.mismatch.catalogue.site import sites
+    >>> model, rec = systems.sloshing(), excitation.two_pulse()
+    >>> found = candidates(sites(model, (rec,)))
+    >>> sum(c.known and c.suits() for c in found), found[0].key
+    (28, 'coulomb_friction')
+    """
+    made: dict[str, Candidate] = {}
+    # two coordinates may be seen in one output, which has one sensor
+    first = {s.output.name: s.q for s in reversed(sites)}
+    for table in (ENTRIES, GUARDS):
+        for site in sites:
+            for entry in table:
+                for candidate in entry(site):
+                    if candidate.channel != "sensor" or first[site.output.name] == site.q:
+                        made.setdefault(candidate.key, candidate)
+    return tuple(made.values())

@@ -1,0 +1,210 @@
+"""Laws that are in no catalogue but look like entries of it.
+
+They are never named alone.  Where one of them explains a recording about as well as an entry does,
+it is given beside the entry; where it does far better, the entry is not named: |θ'|^1.5 must not be
+called quadratic drag, nor a soft limit a hard one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.forces import INF, STICKING, sense, term, wall_impact
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Model
+from pikanid.model.parts import Parameter
+from pikanid.problem.held import HeldInput, acting
+
+PARTS = 8  # of a step, at which a ramp within it is looked at
+Shape = Callable[[View], np.ndarray]
+
+
+def _product(u: str, v: str) -> Shape:
+    return lambda w: w.u[u] * w.x[v]
+
+
+def _half_sign(v: str, sign: int) -> Shape:
+    # at rest friction holds whatever pushes, as dry friction does: half of it would push by itself
+    def shape(w: View) -> np.ndarray:
+        rests = (w.x[v] == 0) & (w.rates[v] == 0)
+        return np.where(rests, 0.0, -(sense(w, v) + sign) / 2)
+
+    return shape
+
+
+def _lever(v: str, p: str) -> Shape:
+    return lambda w: w.by_parameter[v, p]
+
+
+def _through(u: str, text: str) -> Callable[[Model], Model]:
+    return lambda m: m.map_input(u, function=text)
+
+
+def even_stiffness(site: Site) -> list[Candidate]:
+    """-k q²: not the same on both sides."""
+    if not site.rate:
+        return []
+    k = Parameter(site.name("k_even"), 0.0, f"1/(s^2*{site.unit})")
+    return [term(site, "even_stiffness", "a stiffness that differs between the sides",
+                 f"-{k.name}*{site.q}**2", k, lambda w: -w.x[site.q] ** 2, one_sided=False,
+                 known=False)]
+
+
+def quintic_stiffness(site: Site) -> list[Candidate]:
+    """-k q⁵."""
+    if not site.rate:
+        return []
+    k = Parameter(site.name("k5"), 0.0, f"1/(s^2*({site.unit})^4)")
+    return [term(site, "quintic_stiffness", "quintic stiffness", f"-{k.name}*{site.q}**5", k,
+                 lambda w: -w.x[site.q] ** 5, one_sided=False, known=False)]
+
+
+def one_way_friction(site: Site) -> list[Candidate]:
+    """Dry friction in one direction only."""
+    found = []
+    for sign in (1, -1):
+        c = Parameter(site.name("c_one"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+        found.append(term(
+            site, "one_way_friction", "friction in one direction",
+            f"-{c.name}*(sign({site.v}) + {sign})/2", c,
+            _half_sign(site.v, sign), one_sided=True,
+            variant="forth" if sign > 0 else "back", known=False, hills=STICKING))
+    return found
+
+
+def stribeck_friction(site: Site) -> list[Candidate]:
+    """Dry friction that is greater at low speed."""
+    c = Parameter(site.name("c_s"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+    rise = Parameter(site.name("rise"), 0.5, "", (0.0, 20.0))
+    slow = Parameter(site.name("v_s"), 0.2, f"{site.unit}/s", (0.01, INF))
+    text = f"-{c.name}*(1 + {rise.name}*exp(-({site.v}/{slow.name})**2))*sign({site.v})"
+
+    def signs(view: View) -> list[Sign]:
+        v = view.x[site.v]
+        return [Sign({c.name: 1.0, rise.name: 1.0, slow.name: s},
+                     force=-sense(view, site.v) * (1 + np.exp(-(v / s) ** 2)),
+                     one_sided=True)
+                for s in (0.05, 0.15, 0.5)]
+
+    return [Candidate(("stribeck_friction",), "friction that rises at low speed", text, "dynamics",
+                      site, (c, rise, slow), lambda m: m.with_term(site.v, text), signs,
+                      known=False, covers=("coulomb_friction",))]
+
+
+def dissipating_wall(site: Site) -> list[Candidate]:
+    """A stop that takes energy out: k δ (1 + α δ'), δ how deep the wall gives way; in the limit of
+    a stiff one a stop of some restitution.
+
+    K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42, 1975.
+    """
+    found = []
+    # with more, it would hold fast what leaves it at full speed
+    most = 1.0 / max(site.swing * site.rate, 1e-3)
+    for wall in wall_impact(site):
+        a = Parameter(site.name("a_wall"), 0.3 * most, f"s/({site.unit})", (0.0, most))
+        text = f"({wall.expression})*(1 {'-' if wall.variant else '+'} {a.name}*{site.v})"
+        found.append(Candidate(
+            ("dissipating_wall",), "impact on a wall that takes energy out", text, "dynamics",
+            site, (*wall.parameters, a), _with_term(site.v, text), lambda view: [], wall.variant,
+            known=False, hills=wall.hills, levels=wall.levels, covers=(wall.key,)))
+    return found
+
+
+def _with_term(v: str, text: str) -> Callable[[Model], Model]:
+    return lambda m: m.with_term(v, text)
+
+
+def velocity_coupled_drive(site: Site) -> list[Candidate]:
+    """κ u v: the drive acts according to the speed."""
+    found = []
+    for u in site.inputs:
+        k = Parameter(site.name("k_uv"), 0.0, "s")
+        found.append(term(site, "velocity_coupled_drive", "a drive that depends on speed",
+                          f"{k.name}*{u}*{site.v}", k,
+                          _product(u, site.v), one_sided=False, known=False))
+    return found
+
+
+def soft_saturation(site: Site) -> list[Candidate]:
+    """An input limited softly: u/(1 + (u/L)²)^½ to first order u - u³/2L²."""
+    found = []
+    for u in site.inputs:
+        unit = f"1/({site.model.input(u).unit or '1'})"
+        k = Parameter(site.name("k_soft"), 0.0, unit, (0.0, INF))
+        text = f"tanh({k.name}*{u} + 1e-9*{u})/({k.name} + 1e-9)"
+
+        def signs(view: View, u: str = u, k: Parameter = k) -> list[Sign]:
+            top = float(np.abs(view.u[u]).max())
+            return [Sign({k.name: s / top}, push={u: np.tanh(s * view.u[u] / top) * top / s
+                                                 - view.u[u]},
+                         one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)] if top else []
+
+        found.append(Candidate(("soft_saturation",), "an input limited softly", text, "input", site,
+                               (k,), _through(u, text), signs, known=False))
+    return found
+
+
+def clock_error(site: Site) -> list[Candidate]:
+    """The sensor's clock runs fast or slow."""
+    e = Parameter(site.name("clock"), 0.0, "", (-0.5, 0.5))
+    o = site.output.name
+    return [Candidate(("clock_error",), "a clock that runs wrongly", f"{o}((1 + {e.name})*t)",
+                      "sensor", site, (e,), lambda m: m,
+                      lambda w: [Sign({e.name: 1.0}, seen=w.t * w.y_rate[o])], known=False,
+                      fits=False)]
+
+
+def wobble(site: Site) -> list[Candidate]:
+    """A parameter that swings, and a force that does, at frequencies of their own."""
+    if not site.rate:
+        return []
+    found: list[Candidate] = []
+    rates = site.rate * np.array([0.1, 0.15, 0.22, 0.32, 0.45, 0.63, 0.8])
+
+    def swinging(shape: Shape, rates: np.ndarray
+                 ) -> Callable[[View], list[Sign]]:
+        return lambda w: [Sign({}, force=shape(w) * wave(r * w.t)) for r in rates
+                          for wave in (np.sin, np.cos)]
+
+    for p in site.free_in_force[:1]:
+        found.append(Candidate(("wobble",), f"a {p} that swings", f"{p}*(1 + e*sin(w*t))",
+                               "dynamics", site, (), lambda m: m,
+                               swinging(_lever(site.v, p), rates), known=False,
+                               fits=False))
+    return found
+
+
+def rate_limit(site: Site) -> list[Candidate]:
+    """An input that cannot change at once: jumps become ramps."""
+    found = []
+    for u in site.inputs:
+        most = Parameter(site.name("rate"), 1e9, f"({site.model.input(u).unit or '1'})/s",
+                         (1e-9, INF))
+
+        def signs(view: View, u: str = u, most: Parameter = most) -> list[Sign]:
+            steps = np.diff(view.t)
+            top = float(np.max(np.abs(np.diff(view.u[u])) / steps, initial=0.0))
+            recorded = HeldInput(u, view.t, view.u[u], "zero")
+            # ramps may be shorter than a step: what counts is their mean over it
+            inside = view.t[:-1, None] + steps[:, None] * (np.arange(PARTS) + 0.5) / PARTS
+            found = []
+            for size in top * np.array([2.0, 0.5, 0.15, 0.05, 0.015]) if top else ():
+                carrier, _, ramp = acting(recorded, rate=size)
+                at = inside.ravel()
+                mean = (carrier.at(at) + size * ramp.at(at)).reshape(inside.shape).mean(axis=1)
+                found.append(Sign({most.name: float(size)}, one_sided=True, scales=False,
+                                  push={u: np.append(mean, view.u[u][-1]) - view.u[u]}))
+            return found
+
+        found.append(Candidate(
+            ("rate_limited_input",), "an input of limited rate",
+            f"{u} changing by at most {most.name}", "input", site, (most,),
+            _limited(u, most.name), signs, known=False))
+    return found
+
+
+def _limited(u: str, name: str) -> Callable[[Model], Model]:
+    return lambda m: m.map_input(u, rate_limit=name)

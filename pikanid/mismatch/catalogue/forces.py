@@ -1,0 +1,287 @@
+"""Catalogue: forces on a coordinate that a model can leave out."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import sympy as sp
+
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Model
+from pikanid.model.parts import Parameter, State
+
+INF = float("inf")
+SIDE = "negative side"
+STICKING = (0.6, 0.8, 1.25, 1.6)  # of the size of dry friction: a motion comes to rest elsewhere
+
+
+def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
+         shape: Callable[[View], np.ndarray], *, one_sided: bool, twin: str = "",
+         variant: str = "", known: bool = True, hills: tuple[float, ...] = ()) -> Candidate:
+    """A force with one parameter: `shape` (L,) is what it adds to q'' at size 1."""
+    def signs(view: View) -> list[Sign]:
+        return [Sign({size.name: 1.0}, force=shape(view), one_sided=one_sided)]
+
+    return Candidate((identifier,), name, expression, "dynamics", site, (size,),
+                     lambda m: m.with_term(site.v, expression), signs, variant, twin, known=known,
+                     hills=hills)
+
+
+def sense(view: View, v: str) -> np.ndarray:
+    """The sign (L,) of a rate, averaged over a step where it changes inside."""
+    near = 0.5 * np.abs(view.rates[v]) * np.gradient(view.t)
+    speed = view.x[v]
+    return np.asarray(np.clip(speed / np.maximum(near, 1e-300), -1.0, 1.0))
+
+
+def coulomb_friction(site: Site) -> list[Candidate]:
+    """Dry friction: the same force at every speed, against the motion."""
+    c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+    return [term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
+                 lambda w: -sense(w, site.v), one_sided=True, hills=STICKING)]
+
+
+def quadratic_drag(site: Site) -> list[Candidate]:
+    """Drag that grows with the square of the speed."""
+    q = Parameter(site.name("q2"), 0.0, f"1/({site.unit})", (0.0, INF))
+    return [term(site, "quadratic_drag", "quadratic drag",
+                 f"-{q.name}*abs({site.v})*{site.v}", q,
+                 lambda w: -np.abs(w.x[site.v]) * w.x[site.v], one_sided=True)]
+
+
+def power_drag(site: Site) -> list[Candidate]:
+    """Drag with an exponent of its own, other than 0, 1 and 2."""
+    c = Parameter(site.name("c_n"), 0.0, f"({site.unit})/s^2", (0.0, INF))
+    n = Parameter(site.name("n"), 1.5, "", (0.2, 4.0))
+    text = f"-{c.name}*signed_power({site.v}, {n.name})"
+
+    def signs(view: View) -> list[Sign]:
+        v = view.x[site.v]
+        return [Sign({c.name: 1.0, n.name: e}, force=-sense(view, site.v) * np.abs(v) ** e,
+                     one_sided=True)
+                for e in (0.2, 0.35, 0.5, 0.7, 1.3, 1.5, 1.75, 2.3, 2.7, 3.2)]
+
+    return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
+                      (c, n), lambda m: m.with_term(site.v, text), signs,
+                      covers=("coulomb_friction", "quadratic_drag"))]
+
+
+def amplitude_damping(site: Site) -> list[Candidate]:
+    """Viscous damping that grows with the square of the amplitude, where there is a rest to swing
+    about.
+    """
+    if not site.rate:
+        return []
+    c = Parameter(site.name("c2"), 0.0, f"1/(s*({site.unit})^2)", (0.0, INF))
+    return [term(site, "amplitude_damping", "damping that grows with amplitude",
+                 f"-{c.name}*{site.q}**2*{site.v}", c,
+                 lambda w: -w.x[site.q] ** 2 * w.x[site.v], one_sided=True)]
+
+
+def cubic_stiffness(site: Site) -> list[Candidate]:
+    """A restoring force that bends: hardening or softening."""
+    if not site.rate:
+        return []
+    k = Parameter(site.name("k3"), 0.0, f"1/(s^2*({site.unit})^2)")
+    return [term(site, "cubic_stiffness", "cubic stiffness", f"-{k.name}*{site.q}**3", k,
+                 lambda w: -w.x[site.q] ** 3, one_sided=False)]
+
+
+def static_bias(site: Site) -> list[Candidate]:
+    """A constant force, or a tilt; a system that starts at rest starts where it holds balance."""
+    b = Parameter(site.name("bias"), 0.0, f"{site.unit}/s^2")
+    k = site.stiffness
+    # without a restoring force there is no balance to start in
+    balanced = site.rest and site.rate > 0
+
+    def extend(model: Model) -> Model:
+        model = model.with_term(site.v, b.name)
+        if not balanced:
+            return model
+        still = {symbol(n): sp.Integer(0) for n in (*model.state_names, *model.input_names)
+                 if n != site.q}
+        force = model.equations[site.v].xreplace(still)
+        near = symbol(b.name) / k
+        at = {symbol(site.q): near}
+        newton = near - force.xreplace(at) / force.diff(symbol(site.q)).xreplace(at)
+        start = model.state(site.q).initial + newton
+        return model.with_initial(**{site.q: start})
+
+    def signs(view: View) -> list[Sign]:
+        initial = {site.q: 1.0 / site.rate**2} if balanced else {}
+        return [Sign({b.name: 1.0}, force=np.ones(len(view.t)), initial=initial)]
+
+    return [Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site,
+                      (b,), extend, signs, twin="offset")]
+
+
+def parameter_drift(site: Site) -> list[Candidate]:
+    """A parameter that changes steadily with time."""
+    def one(p: str) -> Candidate:
+        r = Parameter(site.name(f"r_{p}"), 0.0, "1/s")
+        text = f"{p}*(1 + {r.name}*t)"
+        return Candidate(
+            ("parameter_drift",), f"drift of {p}", f"{p} -> {text}", "dynamics", site, (r,),
+            lambda m: m.replace(equations={**m.equations, site.v: m.equations[site.v].xreplace(
+                {symbol(p): m.formula(text, "drift")})}),
+            lambda w: [Sign({r.name: 1.0}, force=w.by_parameter[site.v, p] * w.t)], variant=p)
+
+    return [one(p) for p in site.free_in_force]
+
+
+def wall_impact(site: Site) -> list[Candidate]:
+    """A stiff stop on one side that gives way elastically."""
+    # a contact shorter than from one sample to the next looks the same, however short
+    stiffest = max((np.pi / site.interval) ** 2, 1e4)
+    walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.swing, np.array([0.03, 0.1, 0.3])
+
+    def one(side: int) -> Candidate:
+        w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
+        k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
+        text = (f"-{k.name}*max({site.q} - {w.name}, 0)" if side > 0
+                else f"{k.name}*max(-{site.q} - {w.name}, 0)")
+
+        def signs(view: View) -> list[Sign]:
+            x = side * view.x[site.q]
+            top = float(x.max(initial=0.0))
+            return [Sign({k.name: s, w.name: share * top},
+                         force=-side * np.maximum(x - share * top, 0.0), one_sided=True,
+                         scales=False)
+                    for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5) for s in (1e4,)] if top else []
+
+        return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
+                         lambda m: m.with_term(site.v, text), signs,
+                         variant="" if side > 0 else SIDE,
+                         hills=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
+                         levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
+                                      for at in walls for share in stiffnesses))
+
+    return [one(1), one(-1)]
+
+
+def hysteresis(site: Site) -> list[Candidate]:
+    """A force with memory: Bouc-Wen."""
+    b = Parameter(site.name("b_z"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+    # a loop narrower than that is dry friction, and as hard to simulate as a wall
+    least = max(0.01 * site.swing, 1e-4)
+    d = Parameter(site.name("z_yield"), max(0.01, least), site.unit, (least, INF))
+    z = site.name("z")
+
+    def extend(model: Model) -> Model:
+        loop = f"({site.v} - (abs({site.v})*{z} + {site.v}*abs({z}))/2)/{d.name}"
+        return model.with_state(State(z), loop).with_term(site.v, f"-{b.name}*{z}")
+
+    def signs(view: View) -> list[Sign]:
+        from pikanid.mismatch.catalogue.recurrences import bouc_wen
+
+        v = view.x[site.v]
+        if np.all(v >= 0) or np.all(v <= 0):
+            return []  # without a return there is no loop
+        top = float(np.abs(view.x[site.q]).max(initial=1e-9))
+        found = []
+        for share in (0.02, 0.06, 0.15, 0.4):
+            path = bouc_wen(view.x[site.q] / (share * top))
+            found.append(Sign({b.name: 1.0, d.name: share * top}, force=-path, one_sided=True))
+        return found
+
+    return [Candidate(("hysteresis",), "hysteresis (Bouc-Wen)", f"-{b.name}*{z}", "dynamics", site,
+                      (b, d), extend, signs, variant="bouc_wen")]
+
+
+def boundary_layer(site: Site) -> list[Candidate]:
+    """The wall's oscillating boundary layer: damping by the half-derivative of the rate."""
+    if not site.rate:
+        return []
+    b = Parameter(site.name("b_layer"), 0.0, "1/s^0.5", (0.0, INF))
+    # beyond three times the natural rate little moves; faster states would need shorter steps
+    band = (site.rate / 20, site.rate * 3)
+
+    def extend(model: Model) -> Model:
+        model, half = model.with_half_derivative(site.v, site.name("layer"), band, 6)
+        return model.with_term(site.v, -symbol(b.name) * half)
+
+    def signs(view: View) -> list[Sign]:
+        return [Sign({b.name: 1.0}, force=-_half_derivative(view.t, view.x[site.v]),
+                     one_sided=True)]
+
+    return [Candidate(("boundary_layer",), "boundary layer at the wall",
+                      f"-{b.name}*D^(1/2) {site.v}", "dynamics", site, (b,), extend, signs)]
+
+
+def _half_derivative(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """D^½ z by Grünwald and Letnikov on an even grid."""
+    from scipy.signal import fftconvolve
+
+    h = (t[-1] - t[0]) / (len(t) - 1)
+    even = np.interp(t[0] + h * np.arange(len(t)), t, z - z[0])
+    k = np.arange(1, len(t))
+    weights = np.concatenate([[1.0], np.cumprod((k - 1.5) / k)])
+    return np.asarray(fftconvolve(even, weights)[:len(t)] / np.sqrt(h))
+
+
+def disturbance(site: Site) -> list[Candidate]:
+    """A force that acts once, for a short time."""
+    a = Parameter(site.name("peak"), 0.0, f"{site.unit}/s^2")
+    first, last = site.span
+    # what nothing follows that it set in motion cannot be told from a few bad samples
+    last -= min(0.5 * np.pi / site.rate, 0.5 * (last - first)) if site.rate else 0.0
+    at = Parameter(site.name("t_peak"), (first + last) / 2, "s", (first, last))
+    w = Parameter(site.name("width"), 0.3, "s", (0.01, 10.0))
+    text = f"{a.name}/2*(1 + cos(2*pi*clip((t - {at.name})/{w.name}, -0.5, 0.5)))"
+
+    def signs(view: View) -> list[Sign]:
+        span = view.t[-1] - view.t[0]
+        found = []
+        step = float(np.median(np.diff(view.t)))
+        for width in (0.01 * span, 0.025 * span):
+            if width < 4 * step:
+                # what is no longer than a few samples could be anything
+                continue
+            centres = np.arange(view.t[0] + width, view.t[-1] - width, width)
+            if site.rate:
+                # forces half a period apart ring alike: those in quadrature must be there too
+                centres = np.sort(np.concatenate([centres, centres + 0.5 * np.pi / site.rate]))
+            centres = centres[centres < last]
+            humps = _humps(view.t.tobytes(), centres.tobytes(), 2 * width)
+            found += [Sign({a.name: 1.0, at.name: float(centre), w.name: 2 * width}, force=hump)
+                      for centre, hump in zip(centres, humps, strict=True)]
+        return found
+
+    return [Candidate(("disturbance",), "a force local in time", text, "dynamics", site, (a, at, w),
+                      lambda m: m.with_term(site.v, text), signs, per_recording=True, absent=True)]
+
+
+# every hypothesis is tested along the same times
+@functools.lru_cache(maxsize=4)
+def _humps(times: bytes, centres: bytes, width: float) -> np.ndarray:
+    """(centres, L) of raised cosines of unit height."""
+    phase = (np.frombuffer(times) - np.frombuffer(centres)[:, None]) / width
+    return 0.5 * (1 + np.cos(2 * np.pi * np.clip(phase, -0.5, 0.5)))
+
+
+def initial_state(site: Site) -> list[Candidate]:
+    """A start other than assumed."""
+    starts = [site.model.state(n).initial for n in (site.q, site.v)]
+    free = {p.name for p in site.model.parameters if p.free}
+    if any(s.name in free for e in starts for s in e.free_symbols):
+        return []
+    q = Parameter(site.name(f"d_{site.q}"), 0.0, site.unit, scope="recording")
+    v = Parameter(site.name(f"d_{site.v}"), 0.0, f"{site.unit}/s", scope="recording")
+
+    def extend(model: Model) -> Model:
+        return model.with_initial(**{
+            site.q: model.state(site.q).initial + symbol(q.name),
+            site.v: model.state(site.v).initial + symbol(v.name)})
+
+    def signs(view: View) -> Sequence[Sign]:
+        still = np.zeros(len(view.t))
+        return [Sign({q.name: 1.0}, force=still, initial={site.q: 1.0}),
+                Sign({v.name: 1.0}, force=still, initial={site.v: 1.0})]
+
+    return [Candidate(("initial_state",), "another initial state",
+                      f"{site.q}(0) + {q.name}, {site.v}(0) + {v.name}", "dynamics", site, (q, v),
+                      extend, signs, per_recording=True)]

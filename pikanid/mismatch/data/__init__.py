@@ -1,0 +1,1 @@
+"""Recordings made ready to be judged: outliers out, noise in, residuals white."""

@@ -1,0 +1,264 @@
+"""The noise that a diagnosis is judged against, and how well it is known.
+
+Noise is seen where nothing else is: in a quiet stretch at all frequencies, and in the residual of a
+fit far above the natural frequency, where missing physics hardly reaches.  Both together give an
+AR(1) model by Whittle's likelihood (P. Whittle, Ark. Mat. 2, 1953).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pikanid.noise import level as noise
+from pikanid.noise.floor import rounding_noise
+from pikanid.noise.quiet import SHORTEST
+from pikanid.recording import Recording
+from pikanid.recording.channel import Channel
+
+LONGEST = 50  # samples of a gap that a line across it is followed over
+MOVES, JITTER = 0.01, 4.0  # of an input's range, and times its noise: a move
+QUIET = 100  # samples of a quiet stretch that say something about low frequencies
+ABOVE = 6.0  # natural frequencies from which on a residual is noise
+BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
+BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
+GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
+UNKNOWN = 0.6  # relative standard error of a power, at most: then it is known by its order only
+REFUTED = 2.0  # standard errors of a power by which less than that is left by a fit
+UNLIKELY = 4.6  # of log-likelihood that what all frequencies say may cost: one time in a hundred
+Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
+CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
+
+
+@dataclass(frozen=True)
+class Level:
+    """Noise of one output: ε_t = ρ ε_{t-1} + e_t.
+
+    Attributes:
+        sigma: Standard deviation of ε.
+        rho: Correlation of neighbours.
+        spread: Relative standard error of its power at low frequencies, on average.
+        interval: Between samples [s].
+        source: In words.
+        stretch: Start and stop [s] of a quiet stretch long enough to tell low frequencies.
+    """
+
+    sigma: float
+    rho: float
+    spread: float
+    interval: float
+    source: str
+    stretch: tuple[float, float] | None = None
+
+    def sentence(self, output: str) -> str:
+        """What was found."""
+        colour = f"correlation {self.rho:.2f} between neighbours" if self.rho else "white"
+        source = "as given" if self.source == "given" else f"from {self.source}"
+        return f"Noise of '{output}': sigma = {self.sigma:.3g}, {colour}, {source}."
+
+    def whiten(self, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Rows (N,) or (N, k) at times t as white noise of unit variance.
+
+        Exact over gaps: the correlation over m intervals is ρ^m.
+        """
+        if self.rho == 0:
+            return rows / self.sigma
+        steps = np.maximum(np.rint(np.diff(t) / self.interval), 1.0)
+        keep = self.rho ** steps
+        left = np.sqrt(1 - keep**2)
+        if rows.ndim == 2:
+            keep, left = keep[:, None], left[:, None]
+        rest = (rows[1:] - keep * rows[:-1]) / left
+        return np.concatenate([rows[:1], rest]) / self.sigma
+
+
+def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None,
+                inputs: Sequence[str] = ()) -> Level:
+    """What the recording alone says, before any fit; a stretch is quiet while no input moves.
+
+    Raises:
+        BadRecording: If nothing varies.
+    """
+    channel = recording[output]
+    if channel.sigma is not None:
+        sigma = float(np.median(channel.sigma))
+        return Level(sigma, 0.0, 0.0, channel.interval, "given")
+    model = noise.estimate(channel, quiet)
+    if quiet is None and model.source == "quiet stretch":
+        drives = [recording[u] for u in inputs if u in recording]
+        still = _still(channel, drives, model.start, model.stop)
+        if still[1] - still[0] < model.stop - model.start:
+            model = noise.estimate(channel, still)
+    rho = float(np.clip(model.autocovariance(2)[1] / model.sigma**2, 0.0, 0.98))
+    long = model.source == "quiet stretch" and model.n >= QUIET
+    return Level(model.sigma, rho if model.n >= QUIET and not model.white else 0.0,
+                 2 * model.sigma_std / model.sigma, channel.interval,
+                 f"the {model.source} ({model.start:g} s to {model.stop:g} s)",
+                 (model.start, model.stop) if long else None)
+
+
+def _still(channel: Channel, drives: Sequence[Channel], start: float, stop: float
+           ) -> tuple[float, float]:
+    """The longest part of a stretch [s] in which no input leaves the value that it has for most of
+    it: what is driven at random can look like coloured noise.  The stretch where that is too short.
+    """
+    t = channel.time[(channel.time >= start) & (channel.time <= stop)]
+    moves = np.zeros(len(t), bool)
+    for drive in drives:
+        u = drive.values[np.isfinite(drive.values)]
+        if len(u) < len(drive.values) or len(u) < 5 or np.ptp(u) == 0:
+            continue
+        here = np.interp(t, drive.time, u)
+        # fourth differences show the noise of what is well sampled, and nothing else
+        noisy = float(np.median(np.abs(np.diff(u, 4)))) / 0.6745 / np.sqrt(70.0)
+        moves |= np.abs(here - np.median(here)) > max(MOVES * np.ptp(u), JITTER * noisy)
+    ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
+    longest = int(np.argmax(np.diff(ends)))
+    first, last = int(ends[longest]), int(ends[longest + 1]) - 2
+    return (float(t[first]), float(t[last])) if last - first + 1 >= SHORTEST else (start, stop)
+
+
+def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
+            quiet: tuple[float, float] | None, explained: bool = False) -> Level:
+    """The level again, now that a fit has taken the motion away.
+
+    Args:
+        level: So far.
+        channel: Of the output.
+        t, residual: (N,) of the fit at the samples that are there.
+        rate: Natural frequency [rad/s]: the residual counts from `ABOVE` times that on.
+        quiet: Stretch in which nothing moves, if one is known.
+        explained: Whether the fit leaves nothing that a test sees.
+    """
+    from scipy.signal.windows import tukey
+
+    h = level.interval
+    grid = np.round((t - t[0]) / h).astype(int)
+    if np.max(np.abs((t - t[0]) / h - grid)) > 0.2 or len(t) < 200:
+        return level
+    even = np.interp(np.arange(grid[-1] + 1), grid, residual)
+    share = len(t) / len(even)
+    window = tukey(len(even), 0.2)
+    power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)
+    omega = np.linspace(0, np.pi, len(power))
+    power /= np.maximum(bridged(grid), 0.1)
+    # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
+    low, top = (share * np.pi for share in BEGINS)
+    high = (omega > np.clip(ABOVE * rate * h, low, top)) & (omega < 0.97 * np.pi)
+    spectra = [(omega[high], power[high], 0.9 * share)]
+    source = "the residual's highest frequencies"
+    found = quiet or level.stretch
+    if found is not None:
+        inside = (channel.time >= found[0]) & (channel.time <= found[1]) & np.isfinite(
+            channel.values)
+        values = channel.values[inside]
+        if len(values) >= QUIET:
+            p = np.abs(np.fft.rfft(values - values.mean())) ** 2 / len(values)
+            spectra.append((np.linspace(0, np.pi, len(p))[1:], p[1:], 1.0))
+            source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
+    given = level.sigma if level.source == "given" else None
+    sigma, rho, spread = _whittle(spectra, given)
+    # What a fit leaves at all frequencies is noise and misfit: it may be more than noise, not less.
+    # A stretch in which a motion dies out is no quiet one, and the shape of high frequencies can
+    # mislead.  What explains all that a test sees leaves noise alone: it is read at all
+    # frequencies, unless where noise was sure that makes it unlikely.
+    every = (omega > 0) & (omega < 0.97 * np.pi)
+    whole = _whittle([(omega[every], power[every], 0.9 * share)], given)
+    louder = np.log(_power(*whole[:2], low) / _power(sigma, rho, low))
+    dearer = _against(spectra, *whole[:2]) - _against(spectra, sigma, rho)
+    if louder < -REFUTED * spread or (explained and (louder < 0 or dearer < UNLIKELY)):
+        sigma, rho, spread = whole
+        source = "the residual at all frequencies"
+    if given is not None:
+        return replace(level, rho=rho, spread=spread if rho else 0.0)
+    # a fit leaves nothing of a rounded signal at rest: where it moves there is more
+    return Level(max(sigma, rounding_noise(channel.values)), rho, spread, h, source, level.stretch)
+
+
+def bridged(grid: np.ndarray) -> np.ndarray:
+    """What straight lines across gaps leave of white noise's power (n//2 + 1,), by frequency.
+
+    Args:
+        grid: (N,) increasing numbers of the samples that are there, from 0 to n - 1.
+
+    >>> [float(x) for x in bridged(np.arange(5))]
+    [1.0, 1.0, 1.0]
+    """
+    from scipy.sparse import csr_array
+
+    n = int(grid[-1]) + 1
+    every = np.arange(n)
+    left = np.clip(np.searchsorted(grid, every, "right") - 1, 0, len(grid) - 2)
+    width = grid[left + 1] - grid[left]
+    share = (every - grid[left]) / width
+    # of a long line nothing is left at the frequencies that count
+    there = width <= LONGEST
+    A = csr_array((np.concatenate([(1 - share) * there, share * there]),
+                   (np.tile(every, 2), np.concatenate([left, left + 1]))), shape=(n, len(grid)))
+    A.eliminate_zeros()
+    covariance = (A @ A.T).tocoo()
+    lags = np.bincount((covariance.row - covariance.col) % n, covariance.data, n)
+    return np.asarray(np.fft.rfft(lags).real / n)
+
+
+def _whittle(spectra: list[Spectrum], given: float | None) -> tuple[float, float, float]:
+    """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`."""
+    total = sum(w * len(o) for o, _, w in spectra)
+    scales = []
+    for rho in GRID:
+        power = sum(w * np.sum(_calm(p / _shape(rho, o))) for o, p, w in spectra)
+        scales.append(power / total if given is None else given**2 * (1 - rho**2))
+    sigmas = np.sqrt(np.array(scales) / (1 - GRID**2))
+    costs = np.array([_against(spectra, *level) for level in zip(sigmas, GRID, strict=True)])
+    best = likeliest(costs, total)
+    spread = 1.0 / np.sqrt(total)
+    if best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
+        # the curvature at the best ρ says too little: far smaller ones may be nearly as likely
+        low = spectra[0][0][0]
+        powers = np.log([_power(*level, low) for level in zip(sigmas, GRID, strict=True)])
+        likely = np.exp(costs.min() - costs) / len(GRID)
+        likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
+        spread = float(np.hypot(spread, _two_thirds(np.abs(powers - powers[best]), likely)))
+    return float(sigmas[best]), float(GRID[best]), min(spread, UNKNOWN)
+
+
+def _two_thirds(distances: np.ndarray, weights: np.ndarray) -> float:
+    """Below which 68 % of the weight lies."""
+    order = np.argsort(distances)
+    share = np.cumsum(weights[order]) / np.sum(weights)
+    return float(np.interp(0.683, share, distances[order]))
+
+
+def _against(spectra: list[Spectrum], sigma: float, rho: float) -> float:
+    """-ln of the likelihood of AR(1) noise."""
+    cost, scale = 0.0, sigma**2 * (1 - rho**2)
+    for omega, power, weight in spectra:
+        expected = scale * _shape(rho, omega)
+        cost += weight * float(np.sum(_calm(power / expected) + np.log(expected)))
+    return cost
+
+
+def _power(sigma: float, rho: float, top: float) -> float:
+    """Mean power of ε between frequency zero and `top` [rad]."""
+    return float(sigma**2 * (1 - rho**2) * np.mean(_shape(rho, np.linspace(0.0, top, 50))))
+
+
+def _shape(rho: float, omega: np.ndarray) -> np.ndarray:
+    """1/|1 - ρ exp(-iω)|²: the spectrum of AR(1) noise."""
+    return np.asarray(1.0 / (1 - 2 * rho * np.cos(omega) + rho**2))
+
+
+def likeliest(costs: np.ndarray, total: float) -> int:
+    """Which ρ of `GRID` has the least cost, -ln of the likelihood of `total` ordinates; zero unless
+    another one is clearly better.
+    """
+    best = int(np.argmin(costs))
+    return 0 if costs[0] - costs[best] < BELIEVED * np.log(total) else best
+
+
+def _calm(ratio: np.ndarray) -> np.ndarray:
+    """Ordinates limited to `CALM` times their median's mean: a line in the band is no noise."""
+    return np.minimum(ratio, CALM * float(np.median(ratio)) / np.log(2))
+

@@ -1,0 +1,106 @@
+"""Samples that are no part of a motion: gross errors, alone among their neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.data.whitened import Records
+from pikanid.noise import level as noise
+from pikanid.recording import Recording
+
+SPIKE = 5.0  # σ by which a sample must leave its neighbours before there is a fit
+LONE = 9.0  # median gaps by which it must once a fit is taken away: of white noise 1 in 4000 does
+HUMP = 3  # neighbours that are alone together
+MOST = 0.1  # of the samples: where more are alone, nothing is
+CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
+# straight on from three neighbours on the left
+LINE = np.array([-2.0, 1.0, 4.0]) / 3.0
+
+
+def without_outliers(recording: Recording, output: str) -> tuple[Recording, int]:
+    """The recording without samples that leave the cubic through their neighbours, and how many.
+
+    The worst goes first: beside a spike its neighbours look bad as well.
+    """
+    channel = recording[output]
+    seen = np.flatnonzero(np.isfinite(channel.values))
+    y = channel.values[seen].copy()
+    if len(y) < 20:
+        return recording, 0
+    try:
+        sigma, _ = noise.high_band_sigma(channel)
+    except errors.BadRecording:
+        return recording, 0
+    gap = np.zeros(len(y))
+    gap[2:-2] = y[2:-2] - np.convolve(y, CUBIC, "valid")
+    bad: list[int] = []
+    while len(bad) <= MOST * len(y):
+        k = int(np.argmax(np.abs(gap)))
+        if abs(gap[k]) < SPIKE * sigma * np.sqrt(1 + np.sum(CUBIC**2)):
+            break
+        bad.append(k)
+        y[k] -= gap[k]
+        for near in range(max(k - 2, 2), min(k + 3, len(y) - 2)):
+            gap[near] = y[near] - CUBIC @ y[near - 2:near + 3]
+    if not bad or len(bad) > MOST * len(y):
+        return recording, 0
+    values = channel.values.copy()
+    values[seen[bad]] = np.nan
+    return recording.with_channels(replace(channel, values=values)), len(bad)
+
+
+def lone(residual: np.ndarray) -> np.ndarray:
+    """Which samples (N,) of a residual are far from what its neighbours say, whichever one asks:
+    those around it, or those on one side only, beyond which a misfit may bend.
+    """
+    if len(residual) < 20:
+        return np.zeros(len(residual), bool)
+    near = np.lib.stride_tricks.sliding_window_view(
+        np.pad(residual, 3, mode="reflect", reflect_type="odd"), 7)
+    said = np.stack([np.median(np.delete(near, 3, axis=1), axis=1), near[:, :3] @ LINE,
+                     near[:, :3:-1] @ LINE])
+    gap = np.min(np.abs(residual - said), axis=0)
+    found = gap > LONE * np.median(gap)
+    return np.asarray(found if 0 < found.sum() <= MOST * len(found) else np.zeros_like(found))
+
+
+def with_humps(residual: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Which samples are kept (increasing), with those put back that leave the others together.
+
+    `HUMP` neighbours on one side are no errors one by one: a sensor may have been at its end.
+
+    >>> with_humps(np.array([0.0, 9, 8, 9, 0, 9, 8, 0]), np.array([0, 4, 7]))
+    array([0, 1, 2, 3, 4, 7])
+    """
+    gone = np.setdiff1d(np.arange(len(residual)), kept)
+    side = np.sign(residual[gone] - np.interp(gone, kept, residual[kept]))
+    runs = np.split(gone, np.flatnonzero((np.diff(gone) > 1) | (np.diff(side) != 0)) + 1)
+    return np.union1d(kept, np.concatenate([run for run in runs if len(run) >= HUMP] or [kept]))
+
+
+def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np.ndarray]]
+                 ) -> tuple[Records, int]:
+    """Records without the samples that are alone in residuals, and how many.
+
+    Args:
+        records: Any.
+        seen: Number of the recording, output, times (N,) and residual (N,) there.
+    """
+    recordings, count = list(records.recordings), 0
+    for r, name, t, residual in seen:
+        kept = np.arange(len(t))
+        # two that are neighbours hide each other: the second shows when the first has gone
+        while (bad := lone(residual[kept])).any() and len(kept) > (1 - MOST) * len(t):
+            kept = kept[~bad]
+        kept = with_humps(residual, kept)
+        if len(kept) < len(t):
+            channel = recordings[r][name]
+            gone = np.isin(channel.time, np.delete(t, kept))
+            recordings[r] = recordings[r].with_channels(replace(
+                channel, values=np.where(gone, np.nan, channel.values)))
+            count += len(t) - len(kept)
+    return Records(tuple(recordings), records.levels), count

@@ -1,0 +1,235 @@
+"""Recordings made ready to be judged: outliers out, noise levels in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.estimate import Estimate
+from pikanid.mismatch.data.noise_level import Level, first_level, refined
+from pikanid.mismatch.data.outliers import without_lone, without_outliers
+from pikanid.mismatch.data.whitened import Records
+from pikanid.model import Model
+from pikanid.noise.floor import repeated
+from pikanid.recording import Recording
+from pikanid.recording.channel import Channel
+
+LONG = 4000  # samples below which none are put together
+FINE = 30  # samples a period that are kept
+ASIDE = 0.3  # of a recording that is set aside where there is no held-out one
+MOST = 25_000  # samples, put together where they may be, that a minute's diagnosis has time for
+EXACT = 1e-6  # of an output's swing: no simulation is compared with less noise
+FREEDOM = 20  # samples beyond the free parameters: a noise level read off them is 16 % uncertain
+LEAST = 300  # samples of an output that must be there for that
+
+
+def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float, float] | None,
+             notes: list[str], together: int = 1, levels: Mapping[str, Level] | None = None
+             ) -> Records:
+    """Recordings in the model's units without outliers, each output with a first noise level, or
+    with the one that is known.
+
+    Where `together` is more than one, that many samples of an output become one.
+    """
+    done, every = [], []
+    for recording in recordings:
+        found: dict[str, Level] = {}
+        for output in model.outputs:
+            channel = recording.as_output(output.name, output.unit or None)
+            recording, count = without_outliers(recording.with_channels(channel), output.name)
+            if count:
+                notes.append(f"Recording '{recording.name}': {count} outliers of "
+                             f"'{output.name}' are left out.")
+            again = repeated(recording[output.name].values)
+            if together > 1:
+                recording = recording.with_channels(averaged(recording[output.name], together))
+                windows = np.lib.stride_tricks.sliding_window_view(again, together)[::together]
+                again = np.asarray(windows.all(axis=1))
+            own = recording[output.name]
+            if again.any():
+                notes.append(errors.rounded_repeats(recording.name, output.name, int(again.sum())))
+                recording = recording.with_channels(
+                    replace(own, values=np.where(again, np.nan, own.values)))
+            if levels is not None:
+                found[output.name] = levels[output.name]
+                continue
+            # of a signal at rest the noise is seen where it still holds all its samples
+            whole = recording.with_channels(own)
+            level = first_level(whole, output.name, quiet, model.input_names)
+            found[output.name] = loud_enough(level, own)
+            if found[output.name] is not level:
+                notes.append(f"Recording '{recording.name}': noise of '{output.name}' below "
+                             f"{EXACT:.0e} of its swing counts as that.")
+        done.append(recording)
+        every.append(found)
+    return Records(tuple(done), tuple(every))
+
+
+def beginnings(model: Model, recordings: tuple[Recording, ...], what: str, notes: list[str]
+               ) -> tuple[Recording, ...]:
+    """The recordings, or as much of them from their start on as can be diagnosed in a minute.
+
+    Args:
+        model: That names the outputs.
+        recordings: Each is cut alike.
+        what: They are, for a note.
+        notes: Get a sentence where something is cut.
+    """
+    total = sum(len(r[o].time) for r in recordings for o in model.output_names)
+    if total <= MOST:
+        return recordings
+    share = MOST * oversampling(model, recordings) / total
+    if share >= 1:
+        return recordings
+    notes.append(f"{what[0].upper()}{what[1:]} is long: its first {100 * share:.2g} % are "
+                 f"diagnosed, {share * total:.0f} of {total} samples.")
+    return tuple(r.window(r.start, r.start + share * (r.stop - r.start)) for r in recordings)
+
+
+def loud_enough(level: Level, channel: Channel) -> Level:
+    """The level, or that of the least noise that a simulation can be compared with.
+
+    Recordings without noise, or with a given σ that nothing measured has, would ask for more digits
+    than a simulation has.
+    """
+    seen = channel.values[np.isfinite(channel.values)]
+    floor = EXACT * float(np.ptp(seen)) / 2 if len(seen) else 0.0
+    return level if level.sigma >= floor else replace(level, sigma=floor)
+
+
+def check_freedom(model: Model, records: Records) -> None:
+    """Refuse recordings that leave too little beside what is estimated.
+
+    Raises:
+        BadRecording: With the number of samples that is needed.
+    """
+    count, free, needed = freedom(model, records)
+    if count < needed:
+        raise errors.BadRecording(errors.too_few_to_diagnose(count, free, needed))
+
+
+def freedom(model: Model, records: Records) -> tuple[int, int, int]:
+    """Usable samples of the outputs, free parameters, and samples that these ask for."""
+    count = sum(int(np.isfinite(r[o].values).sum()) for r in records.recordings
+                for o in model.output_names)
+    free = sum(1 if p.scope == "shared" else len(records.recordings)
+               for p in model.parameters if p.free)
+    return count, free, free + FREEDOM
+
+
+def oversampling(model: Model, recordings: tuple[Recording, ...]) -> int:
+    """How many samples of the outputs may become one: of records that are long, and recorded far
+    faster than anything in them moves.
+
+    Above the frequency that 99.9 % of an output's changes stay below, `FINE` samples a period are
+    kept.
+    """
+    total = sum(len(r[o].time) for r in recordings for o in model.output_names)
+    counts = [total // LONG]
+    for recording in recordings:
+        for name in model.output_names:
+            c = recording[name]
+            y = c.values[np.isfinite(c.values)]
+            steps = np.diff(c.time)
+            if len(y) < LONG // 4 or np.ptp(steps) > 0.01 * np.median(steps):
+                return 1
+            y = (y - np.linspace(y[0], y[-1], len(y))) * np.hanning(len(y))
+            power = np.cumsum(np.abs(np.fft.rfft(y)) ** 2)
+            fast = int(np.searchsorted(power, 0.999 * power[-1])) + 1
+            counts.append(int(len(y) / (FINE * fast)))
+    odd = max(min(counts), 1)
+    return odd - 1 + odd % 2
+
+
+def averaged(channel: Channel, count: int) -> Channel:
+    """A channel in which `count` (odd) neighbouring samples become one.
+
+    Each is the value, in the middle, of the parabola through them (A. Savitzky and M. J. E. Golay,
+    Anal. Chem. 36, 1964), which follows a motion to third order.
+    """
+    half = count // 2
+    k = np.arange(-half, half + 1)
+    weights = np.linalg.pinv(np.vander(k / max(half, 1), 3))[2]
+    middles = np.arange(half, len(channel.time) - half, count)
+    values = np.convolve(channel.values, weights[::-1], "valid")[middles - half]
+    sigma = channel.sigma
+    if sigma is not None:
+        sigma = np.broadcast_to(np.asarray(sigma, float), channel.time.shape)[middles] * float(
+            np.linalg.norm(weights))
+    return replace(channel, time=channel.time[middles], values=values, sigma=sigma)
+
+
+def with_refined_noise(records: Records, fit: Estimate, rate: float,
+                       quiet: tuple[float, float] | None, explained: bool = False
+                       ) -> tuple[Records, int]:
+    """Noise levels again, from what a fit leaves, and without the outliers that it shows; how many
+    these are.
+    """
+    outputs = [(r, name) for r, found in enumerate(records.levels) for name in found]
+    fits = dict(zip(outputs, fit.fits, strict=True))
+    records, count = without_lone(records, [(*key, f.t, f.residual) for key, f in fits.items()])
+    levels = []
+    for r, (recording, found) in enumerate(zip(records.recordings, records.levels, strict=True)):
+        new = {}
+        for name, level in found.items():
+            f = fits[r, name]
+            kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
+            new[name] = loud_enough(refined(level, recording[name], f.t[kept], f.residual[kept],
+                                            rate, quiet, explained), recording[name])
+        levels.append(new)
+    return Records(records.recordings, tuple(levels)), count
+
+
+def set_aside(train: tuple[Recording, ...], model: Model, notes: list[str]
+               ) -> tuple[tuple[Recording, ...], tuple[Recording, ...] | None]:
+    """Recordings without their ends, and the same with nothing but their ends to be seen.
+
+    Hypotheses that cannot even predict how the same run goes on are refused; a run driven the same
+    way proves no more than that.
+    """
+    notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
+    if min(len(r[o].time) for r in train for o in model.output_names) < LEAST:
+        return train, None
+    kept, ends = [], []
+    for r in train:
+        cut = r.start + (1 - ASIDE) * (r.stop - r.start)
+        kept.append(r.window(r.start, cut))
+        unseen = [replace(r[o], values=np.where(r[o].time < cut, np.nan, r[o].values))
+                  for o in model.output_names]
+        ends.append(r.with_channels(*unseen))
+    if any(np.isinf(r[o].changes_at) for r in (*kept, *ends) for o in model.output_names):
+        return train, None  # what does not change proves nothing
+    notes.append(f"The last {100 * ASIDE:.0f} % of the recording are set aside: what is found has "
+                 "to predict them.")
+    return tuple(kept), tuple(ends)
+
+
+def check_pair(train: tuple[Recording, ...], later: tuple[Recording, ...]) -> None:
+    """Refuse held-out recordings that lack a channel of the train ones, or are the same.
+
+    Raises:
+        BadRecording: If one does, or is.
+    """
+    for a in train:
+        for b in later:
+            missing = [n for n in a.names if n not in b]
+            if missing:
+                raise errors.BadRecording(errors.held_out_channels(b.name, missing))
+            if all(np.array_equal(a[n].values, b[n].values, equal_nan=True) for n in a.names):
+                raise errors.BadRecording(errors.held_out_same(a.name, b.name))
+
+
+def held_as_recorded(model: Model, train: tuple[Recording, ...]) -> Model:
+    """A recording that declares how an input is held overrides the model."""
+    return model.replace(inputs=tuple(
+        replace(i, hold=train[0][i.name].hold or i.hold) if i.name in train[0] else i
+        for i in model.inputs))
+
+
+def with_sigma(records: Records, model: Model) -> list[Recording]:
+    """The recordings with the standard deviation of the noise that was found."""
+    return [r.with_sigma({o: levels[o].sigma for o in model.output_names})
+            for r, levels in zip(records.recordings, records.levels, strict=True)]

@@ -1,0 +1,217 @@
+"""Residuals of a model against recordings, whitened by the noise, with exact derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.data.noise_level import Level
+from pikanid.model import Model
+from pikanid.problem.problem import Problem
+from pikanid.recording import Recording
+from pikanid.simulation.simulator import Response, Steps
+from pikanid.simulation.translated import Translated
+
+CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
+SHARE = 0.05  # of the noise that a simulation may err by
+FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
+SHARP = 8  # steps a sample from which on it is better to stop at corners than to run through them
+GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
+
+
+@dataclass(frozen=True)
+class Records:
+    """Recordings as they are judged: without outliers, each output with its noise level."""
+
+    recordings: tuple[Recording, ...]
+    levels: tuple[dict[str, Level], ...]
+
+    @property
+    def spread(self) -> float:
+        """Relative standard error of the noise's power, where it is known least."""
+        return max(level.spread for found in self.levels for level in found.values())
+
+    def beginning(self, rows: int) -> Records:
+        """The same with about so many rows in all, each recording cut alike, from its start; not
+        before each output has changed: a rig may rest at first.
+        """
+        times = [np.sort(np.concatenate([r[o].time[np.isfinite(r[o].values)] for o in found]))
+                 for r, found in zip(self.recordings, self.levels, strict=True)]
+        share = rows / max(sum(map(len, times)), 1)
+        if share >= 1:
+            return self
+        cut = []
+        for r, found, t in zip(self.recordings, self.levels, times, strict=True):
+            moved = (min(r[o].changes_at, r.stop) for o in found)
+            cut.append(_cut(r, max(float(t[int(share * (len(t) - 1))]), *moved)))
+        return Records(tuple(cut), self.levels)
+
+    def with_levels(self, levels: dict[str, Level]) -> Records:
+        """The same with one noise level of each output for all recordings."""
+        return Records(self.recordings, tuple(levels for _ in self.recordings))
+
+
+def _cut(recording: Recording, stop: float) -> Recording:
+    short = []
+    for name in recording.names:
+        c = recording[name]
+        n = max(int(np.searchsorted(c.time, stop, "right")), 2)
+        sigma = c.sigma if c.sigma is None or np.ndim(c.sigma) == 0 else np.asarray(c.sigma)[:n]
+        short.append(replace(c, time=c.time[:n], values=c.values[:n], sigma=sigma))
+    return recording.with_channels(*short)
+
+
+def allowance(misfit: float) -> float:
+    """How many times more than usual an integration may err where χ² per row is `misfit`."""
+    return max(1.0, 0.2 * misfit**0.5)
+
+
+class Whitened:
+    """(ŷ - y) of a model, whitened to unit variance, as a function of θ (n_free,).
+
+    >>> from pikanid.model import systems
+    >>> systems.sloshing().free_names                       # what θ holds
+    ('l_theta', 'd_theta')
+    """
+
+    def __init__(self, model: Model, records: Records):
+        held = [r.with_hold(**{i.name: i.hold for i in model.inputs if i.name in r})
+                for r in records.recordings]
+        self.problem = Problem(model, held)
+        self.records = records
+        self.simulators = [Translated(model, e) for e in self.problem.experiments]
+        self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
+        self.steps: list[Steps] = []
+        # errors of the last choice of steps, and what is allowed of each where nothing is left [σ]
+        self.weighed: list[tuple[float, float]] = []
+        self.rows = self.problem.n_samples
+        self.sigma = [self._sigmas(r) for r in range(len(self.simulators))]
+        self.work = 0.0
+
+    def choose_steps(self, theta: np.ndarray, share: float = SHARE, misfit: float = 1.0) -> bool:
+        """Steps whose error stays below a share of the noise; False where nothing can be run.
+
+        Where a misfit of many times the noise is left anyway (`misfit`, χ² per row), a fifth of
+        that share of the misfit is allowed instead.
+        """
+        found = []
+        self.weighed = []
+        finest = 64 if misfit < GROSS else 16
+        for r, simulator in enumerate(self.simulators):
+            allowed = share * allowance(misfit)
+            steps = self._steps(r, theta, allowed, SHARP if simulator.corners else finest)
+            self._weigh(steps, share)
+            if simulator.corners and (steps is None or steps.error > allowed):
+                self.simulators[r] = Translated(
+                    simulator.model, simulator.experiment, located=True)
+                steps = self._steps(r, theta, allowed, finest)
+                if steps is None:  # a motion at rest on a corner meets it without end
+                    self.simulators[r] = simulator
+                    steps = self._steps(r, theta, allowed, finest)
+                self._weigh(steps, share)
+            if steps is None or steps.error > 20 * allowed:
+                return False
+            found.append(steps)
+        self.steps = found
+        return True
+
+    def step_errors(self, theta: np.ndarray) -> list[float]:
+        """Errors of the steps in use elsewhere than where they were chosen, as shares of what
+        `choose_steps` allows where nothing is left; by halving each step once.
+        """
+        found = []
+        for r, simulator in enumerate(self.simulators):
+            p = self.problem.parameters(theta, r)
+            halved = replace(self.steps[r], longest=self.steps[r].longest / 2)
+            rough, fine = (simulator.run(p, steps=s) for s in (self.steps[r], halved))
+            size = float(np.abs((fine.y - rough.y) / self.sigma[r]).max(initial=0.0)) * 16 / 15
+            found.append(size / SHARE if rough.finished and fine.finished else np.inf)
+        return found
+
+    def step_as(self, *others: Whitened) -> None:
+        """Simulate as others do that hold the same recordings, one after the other."""
+        self.simulators = [s for other in others for s in other.simulators]
+        self.steps = [s for other in others for s in other.steps]
+
+    def _weigh(self, steps: Steps | None, usual: float) -> None:
+        if steps is not None:
+            self.weighed.append((steps.error, usual))
+
+    def _sigmas(self, r: int) -> np.ndarray:
+        """σ (rows,) of every sample of recording r, in the unit of its output."""
+        levels, outputs = self.records.levels[r], self.problem.model.outputs
+        return np.concatenate([np.full(len(s.t), levels[outputs[s.output].name].sigma)
+                               for s in self.problem.experiments[r].samples])
+
+    def _steps(self, r: int, theta: np.ndarray, allowed: float, finest: int) -> Steps | None:
+        try:
+            return self.simulators[r].choose_steps(
+                self.problem.parameters(theta, r), allowed, "explicit",
+                finest=self._spacing(r) / finest, scale=self.sigma[r])
+        except errors.SimulationFailed:
+            return None
+
+    def _spacing(self, r: int) -> float:
+        samples = self.problem.experiments[r].samples[0]
+        return float(np.median(np.diff(samples.t)))
+
+    def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
+        """Simulate every recording, with derivatives by its own parameters."""
+        self.work += self.cost
+        return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
+                for r, s in enumerate(self.simulators)]
+
+    @property
+    def cost(self) -> float:
+        """Of a simulation with derivatives: states times steps."""
+        spans = [e.samples[0].t[-1] - e.samples[0].t[0] for e in self.problem.experiments]
+        steps = [max(span / s.longest, len(e.samples[0].t)) for span, s, e in zip(
+            spans, self.steps, self.problem.experiments, strict=True)]
+        return float(len(self.problem.model.states) * sum(steps))
+
+    def residual(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run, or no
+        steps were found that could.
+        """
+        if not self.steps:
+            return None
+        responses = self.responses(theta)
+        if not all(r.finished for r in responses):
+            return None
+        parts, jacobians = [], []
+        for r, response in enumerate(responses):
+            J = np.zeros((len(response.y), len(theta)))
+            J[:, self.columns[r][1]] = response.sensitivity
+            parts.append(self.whiten(r, response.y - self.measured(r)))
+            jacobians.append(self.whiten(r, J))
+        return np.concatenate(parts), np.concatenate(jacobians)
+
+    def chi2(self, theta: np.ndarray) -> float:
+        """Sum of squares of the whitened residual, without derivatives; infinite if it fails, or
+        where no steps were found that could do.
+        """
+        if not self.steps:
+            return np.inf
+        total = 0.0
+        for r, simulator in enumerate(self.simulators):
+            response = simulator.run(self.problem.parameters(theta, r), steps=self.steps[r])
+            if not response.finished:
+                return np.inf
+            total += float(np.sum(self.whiten(r, response.y - self.measured(r)) ** 2))
+        return total
+
+    def measured(self, r: int) -> np.ndarray:
+        """All samples of recording r (rows,)."""
+        return np.concatenate([s.y for s in self.problem.experiments[r].samples])
+
+    def whiten(self, r: int, rows: np.ndarray) -> np.ndarray:
+        """Rows (rows,) or (rows, k) of recording r as white noise of unit variance."""
+        out, first = np.empty_like(rows), 0
+        for s in self.problem.experiments[r].samples:
+            level = self.records.levels[r][self.problem.model.outputs[s.output].name]
+            part = slice(first, first + len(s.t))
+            out[part] = level.whiten(rows[part], s.t)
+            first += len(s.t)
+        return out

@@ -1,0 +1,1 @@
+"""Before any data: what an experiment can reveal, and which one comes next."""

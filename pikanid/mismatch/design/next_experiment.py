@@ -1,0 +1,291 @@
+"""The next experiment: the feasible input profile that tells most.
+
+*Which hypothesis is true?*  For hypotheses a and b, complete models with their values, the
+recording of a profile would differ from the best that b can still do by
+
+    D²(a, b) = min_δ Σ_e |r_e - J_e δ|²,   r_e = (y_a - y_b)/σ,   J_e = (∂y_b/∂θ_b)/σ,
+
+summed over the profile and what was recorded before, δ within the bounds of b's free parameters.
+The finalists are judged again by refitting b's simulation.  D² is the non-centrality of the
+likelihood-ratio test between the two; the worst pair decides.
+
+*What are the parameters?*  Of all profiles the D-optimal one has the largest determinant of the
+Fisher information F = Σ_e J_eᵀ J_e (V. V. Fedorov, Theory of Optimal Experiments, 1972).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.design.profiles import Bounds, profiles, scaled
+from pikanid.mismatch.design.response import Seen, Sigma, Watch, joined, natural_frequency
+from pikanid.mismatch.design.separation import distance, mean_precision, refitted_within
+from pikanid.model import Model
+from pikanid.problem.arguments import a_model, several
+from pikanid.recording import Recording
+from pikanid.recording.channel import Array, Channel
+from pikanid.uncertainty.information import covariance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Score = Callable[[Mapping[str, list[Seen]], Sequence[Recording]], float]
+FINALISTS = 5  # candidates that are judged again after refitting simulations
+TELLS_APART = 4.0  # [σ] between a hypothesis and its best rival
+
+
+@dataclass(frozen=True, eq=False)
+class NextExperiment:
+    """A profile to run, and what it promises.
+
+    Attributes:
+        profile: Inputs, ready to run.
+        purpose: What it was chosen for.
+        value: `separate`: smallest D [σ] between two hypotheses, with all that was recorded before;
+            `parameters`: geometric mean of the standard errors' inverses.
+        before: The same without the profile, 0 where nothing was recorded before.
+        repeated: The same if the last recording were repeated instead, or, where there is none, of
+            the median candidate.
+        ranking: (name, value) of the finalists, the best first.
+        responses: Name of a hypothesis -> its outputs under the profile: name -> (times, values).
+        std: Foretold standard errors of the parameters, for `parameters`.
+    """
+
+    profile: Recording
+    purpose: Literal["separate", "parameters"]
+    value: float
+    before: float
+    repeated: float
+    ranking: tuple[tuple[str, float], ...]
+    responses: Mapping[str, Mapping[str, tuple[Array, Array]]]
+    std: Mapping[str, float]
+
+    @property
+    def gain(self) -> float:
+        """How many times better than what it is compared with (`repeated`)."""
+        return self.value / self.repeated if self.repeated > 0 else np.inf
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the profile to a CSV, TSV or Parquet file.
+
+        Raises:
+            BadRecording: If the place cannot be written to.
+        """
+        self.profile.write(path)
+
+    def plot(self) -> Figure:
+        """The profile, and the outputs that the hypotheses foretell."""
+        from pikanid.mismatch.design.figure import design_figure
+
+        return design_figure(self.profile, self.responses)
+
+    def to_dict(self) -> dict[str, object]:
+        """What can go into a report as JSON."""
+        return {"profile": self.profile.name, "purpose": self.purpose, "value": self.value,
+                "before": self.before, "repeated": self.repeated,
+                "gain": self.gain if np.isfinite(self.gain) else None,
+                "std": dict(self.std), "ranking": [list(row) for row in self.ranking]}
+
+    def __str__(self) -> str:
+        name = self.profile.name
+        if self.purpose == "separate":
+            verdict = "tells them apart" if self.value >= TELLS_APART else (
+                f"does not tell them apart yet ({TELLS_APART:g} σ are needed)")
+            return (f"Next experiment: {name}. The closest two hypotheses are {self.value:.3g} σ "
+                    f"apart afterwards ({self.before:.3g} σ now): it {verdict}.")
+        bounds = ", ".join(f"{key} ± {std:.2g}" for key, std in self.std.items())
+        return (f"Next experiment: {name}. Standard errors of {bounds}; "
+                f"{self.gain:.3g} times smaller on average than otherwise.")
+
+
+def next_experiment(
+    hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
+    sigma: Sigma = None, candidates: Sequence[Recording] | None = None,
+    bounds: Bounds | None = None, duration: float = 20.0, dt: float = 0.01,
+    limits: Mapping[str, float] | None = None, seed: int = 0, workers: int = 1,
+) -> NextExperiment:
+    """The feasible profile that best separates hypotheses.
+
+    Args:
+        hypotheses: Name -> model at its parameter values; its free parameters are those that a fit
+            could still adjust.
+        recorded: What was recorded before.
+        sigma: Noise of the outputs, if recordings and models do not carry it.
+        candidates: Profiles to choose from; by default those of `profiles`.
+        bounds: Of the drive, for the default candidates.
+        duration: Of the default candidates [s].
+        dt: Their sampling interval [s].
+        limits: Output -> largest |value| that the experiment may reach; profiles are made smaller
+            until every hypothesis keeps to it.
+        seed: Of the default candidates.
+        workers: Threads that simulate hypotheses side by side; the choice does not depend on them.
+
+    Raises:
+        BadSetting: With fewer than two hypotheses, no σ, or bounds that leave no room.
+        SimulationFailed: If no candidate can be simulated.
+
+    >>> from pikanid.recording import excitation
+    >>> from pikanid.model import systems
+    >>> from pikanid.model import Parameter
+    >>> nominal = systems.sloshing()
+    >>> rough = nominal.with_term("theta_dot", "-c*sign(theta_dot)", [Parameter("c", 0.5)])
+    >>> drag = nominal.with_term("theta_dot", "-q*abs(theta_dot)*theta_dot", [Parameter("q", 0.5)])
+    >>> chosen = next_experiment({"friction": rough, "drag": drag}, sigma=0.1*np.pi/180,
+    ...                          candidates=[excitation.two_pulse(), excitation.two_pulse(20.0)])
+    >>> len(chosen.profile.t), chosen.value > 4
+    (2001, True)
+    """
+    if not isinstance(hypotheses, Mapping):
+        raise errors.BadSetting(errors.not_of_kind(
+            "'hypotheses'", type(hypotheses).__name__, "a dictionary: name -> model"))
+    if len(hypotheses) < 2:
+        raise errors.BadSetting(errors.too_few_hypotheses(len(hypotheses)))
+    past = [] if isinstance(recorded, Sequence) and not recorded else list(several(recorded))
+    models = {str(name): a_model(model) for name, model in hypotheses.items()}
+    watch = Watch(models, sigma, workers)
+    known = watch.seen(past)
+
+    def worst(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
+        return min(distance([*known[a], *new[a]], [*known[b], *new[b]])
+                   for a, b in permutations(models, 2))
+
+    def refit(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
+        def nearest(b: str) -> float:
+            watched = [watch.of(b, e) for e in (*past, *profiles)]
+            return min(refitted_within([*known[a], *new[a]], watched) for a in models if a != b)
+
+        return min(watch.of_each(nearest).values())
+
+    offered = (_default_candidates(models, bounds, duration, dt, seed) if candidates is None
+               else candidates)
+    return _chosen(watch, "separate", worst, refit, known, past, offered, limits or {})
+
+
+def d_optimal(
+    model: Model, recorded: Sequence[Recording] | Recording = (), sigma: Sigma = None,
+    candidates: Sequence[Recording] | None = None, bounds: Bounds | None = None,
+    duration: float = 20.0, dt: float = 0.01, limits: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> NextExperiment:
+    """The feasible profile from which a model's free parameters are learnt best.
+
+    Arguments and errors as for `next_experiment`.
+
+    >>> from pikanid.recording import excitation
+    >>> from pikanid.model import systems
+    >>> chosen = d_optimal(systems.sloshing(), sigma=0.1*np.pi/180,
+    ...                    candidates=[excitation.two_pulse(), excitation.two_pulse(amplitude=0.5)])
+    >>> chosen.profile["u_x"].values.max(), float(f"{chosen.std['l_theta']:.2e}")
+    (np.float64(1.0), 9.89e-06)
+    """
+    if not a_model(model).free_names:
+        raise errors.BadSetting(errors.nothing_to_learn(model.name))
+    past = [] if isinstance(recorded, Sequence) and not recorded else list(several(recorded))
+    models = {model.name: model}
+    watch = Watch(models, sigma)
+    known = watch.seen(past)
+
+    def precision(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
+        every = [*known[model.name], *new[model.name]]
+        return mean_precision(joined(every).jacobian) if every else 0.0
+
+    offered = (_default_candidates(models, bounds, duration, dt, seed) if candidates is None
+               else candidates)
+    return _chosen(watch, "parameters", precision, precision, known, past, offered, limits or {})
+
+
+def _chosen(
+    watch: Watch, purpose: Literal["separate", "parameters"], quick: Score,
+    full: Score, known: Mapping[str, list[Seen]], past: Sequence[Recording],
+    candidates: Sequence[Recording], limits: Mapping[str, float],
+) -> NextExperiment:
+    """The best candidate, ready to run: all are ranked by `quick`, the first of them by `full`."""
+    tried = []
+    for candidate in candidates:
+        try:
+            profile, responses = _within(watch, candidate, limits)
+        except errors.SimulationFailed:
+            continue  # a profile too rough for one of the hypotheses is no candidate
+        new = {name: [r] for name, r in responses.items()}
+        tried.append((quick(new, [profile]), profile, new))
+    if not tried:
+        raise errors.SimulationFailed(errors.no_profile_simulated(len(candidates)))
+    tried.sort(key=lambda entry: -entry[0])
+    finalists = [(full(new, [profile]), profile, new) for _, profile, new in tried[:FINALISTS]]
+    finalists.sort(key=lambda entry: -entry[0])
+    value, profile, new = finalists[0]
+    if past:
+        again = {name: responses[-1:] for name, responses in known.items()}
+        repeated = full(again, past[-1:])
+    else:
+        _, usual, responses_to_it = tried[len(tried) // 2]
+        repeated = full(responses_to_it, [usual])
+    nothing: dict[str, list[Seen]] = {name: [] for name in watch.models}
+    before = full(nothing, []) if past else 0.0
+    model = next(iter(watch.models.values()))
+    std = _foretold(model, known, new) if purpose == "parameters" else {}
+    return NextExperiment(
+        profile, purpose, value, before, repeated,
+        tuple((entry[1].name, entry[0]) for entry in finalists),
+        {name: responses[0].outputs for name, responses in new.items()}, std)
+
+
+def _foretold(model: Model, known: Mapping[str, list[Seen]],
+              new: Mapping[str, list[Seen]]) -> dict[str, float]:
+    """Standard errors of the shared free parameters after the experiment."""
+    every = joined([*known[model.name], *new[model.name]])
+    spread = np.sqrt(np.diag(covariance(every.jacobian, np.ones(len(every.low), bool))))
+    shared = [p.name for p in model.parameters if p.free and p.scope == "shared"]
+    return {name: float(x) for name, x in zip(shared, spread, strict=False)}
+
+
+def _within(watch: Watch, profile: Recording, limits: Mapping[str, float]
+            ) -> tuple[Recording, dict[str, Seen]]:
+    """The profile, made smaller until every model keeps to the limits, and the responses to it."""
+    for _ in range(8):
+        try:
+            responses = {name: found[0] for name, found in watch.seen([profile]).items()}
+        except errors.SimulationFailed:
+            if not limits:
+                raise
+            profile = scaled(profile, 0.5)
+            continue
+        share = min((limit / max(r.reached(output), 1e-300) for r in responses.values()
+                     for output, limit in limits.items()), default=1.0)
+        if share >= 1.0:
+            return profile, responses
+        # A little more than proportional, or a softening spring would never get there.
+        profile = scaled(profile, 0.99 * share)
+    raise errors.SimulationFailed(errors.limits_not_kept(profile.name))
+
+
+def _default_candidates(models: Mapping[str, Model], bounds: Bounds | None, duration: float,
+                        dt: float, seed: int) -> list[Recording]:
+    """Profiles for the first input, and others at the same time for further axes of motion."""
+    inputs = {i.name: i for model in models.values() for i in model.inputs if i.default is None}
+    if not inputs:
+        raise errors.BadSetting(errors.nothing_to_drive(", ".join(models)))
+    first, *others = inputs.values()
+    frequency = natural_frequency(next(iter(models.values()))) or 10.0 / duration
+    # A hypothesis that rings faster than the profile can follow is driven at the fastest it can.
+    frequency = min(frequency, 0.05 / dt)
+    made = profiles(frequency, bounds, duration, dt, min(2.0, 0.2 * duration), first.name,
+                    first.unit, seed=seed)
+    channels = []
+    for k, profile in enumerate(made):
+        along = profile
+        for shift, other in enumerate(others, 1):
+            values = made[(k + 2 * shift) % len(made)][first.name].values
+            if other.unit != first.unit:
+                values = np.zeros_like(values)
+            along = along.with_channels(
+                Channel(other.name, profile.t, values, other.unit, hold="zero"))
+        channels.append(along)
+    return channels

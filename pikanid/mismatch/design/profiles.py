@@ -1,0 +1,191 @@
+"""Input profiles that a planar motor can run: bounded acceleration, velocity and stroke.
+
+Every profile rests at first, is scaled to the bounds and ends at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.recording import Recording
+from pikanid.recording.channel import Array
+from pikanid.recording.excitation import grid
+
+DIGITS = 6  # of a profile's values: a file of decimals is run as it was designed
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What the drive can do.
+
+    Attributes:
+        acceleration: Largest |u|, in the input's unit.
+        velocity: Largest |∫u dt|; infinite for an input that is no acceleration.
+        stroke: Range of ∫∫u dt², from end to end; infinite likewise.
+
+    Raises:
+        BadSetting: If one is not positive.
+
+    >>> Bounds(acceleration=2.0).share(np.array([0.0, 1.0, -1.0, 0.0]), 0.01)
+    2.0
+    """
+
+    acceleration: float = 1.0
+    velocity: float = 0.5
+    stroke: float = 0.4
+
+    def __post_init__(self) -> None:
+        for name in ("acceleration", "velocity", "stroke"):
+            if not getattr(self, name) > 0:
+                raise errors.BadSetting(errors.bad_drive_bound(name, getattr(self, name)))
+
+    def share(self, u: Array, dt: float) -> float:
+        """By how much u (N,), held over steps of dt [s], may be enlarged."""
+        velocity, position = motion(u, dt)
+        shares = [bound / reached for bound, reached in (
+            (self.acceleration, np.max(np.abs(u))), (self.velocity, np.max(np.abs(velocity))),
+            (self.stroke, np.ptp(position))) if reached > 0]
+        return float(min(shares, default=np.inf))
+
+
+def motion(u: Array, dt: float) -> tuple[Array, Array]:
+    """Velocity and position (N,) at the sample times under a zero-order hold of u (N,)."""
+    velocity = np.concatenate([[0.0], np.cumsum(u[:-1])]) * dt
+    position = np.concatenate([[0.0], np.cumsum(velocity[:-1] * dt + 0.5 * u[:-1] * dt**2)])
+    return velocity, position
+
+
+def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 20.0,
+             dt: float = 0.01, quiet: float = 2.0, channel: str = "u_x", unit: str = "m/s^2",
+             draws: int = 3, seed: int = 0) -> list[Recording]:
+    """Candidates for an experiment, each at its largest feasible size and at a third of it.
+
+    Args:
+        frequency: Around which the model rings [Hz].
+        bounds: Of the drive.
+        duration: Of each profile [s].
+        dt: Sampling interval [s].
+        quiet: Rest at the start, from which the noise can be learnt [s].
+        channel: Name of the input.
+        unit: Of the input.
+        draws: Random versions of each kind.
+        seed: Of what is random.
+
+    Raises:
+        BadSetting: If no time is left after the rest, or the sampling is too coarse for
+            `frequency`.
+
+    >>> made = profiles(2.35, duration=10.0, draws=1)
+    >>> made[0].name, len(made), made[0].names
+    ('kicks, full size', 14, ('u_x',))
+    """
+    bounds = bounds or Bounds()
+    t = grid(duration, dt)
+    if not (0 < frequency * dt < 0.1 and quiet >= 0 and duration - quiet > 2 / frequency):
+        raise errors.BadSetting(errors.no_room_for_profile(duration, quiet, frequency, dt))
+    first = int(np.ceil(quiet / dt - 1e-9))
+    rng = np.random.default_rng(seed)
+    made = []
+    for draw in range(draws):
+        for name, u in _drawn(rng, t, first, frequency, dt):
+            # Rounding adds up along the way: a hair below the bounds.
+            share = 0.9995 * bounds.share(u, dt)
+            for size, word in ((1.0, "full"), (1.0 / 3.0, "a third")):
+                values = _rounded(u * share * size)
+                title = f"{name}, {word if word == 'a third' else 'full size'}"
+                made.append(Recording.from_arrays(
+                    t, {channel: values}, {channel: unit}, hold={channel: "zero"},
+                    name=title + (f" ({draw + 1})" if draws > 1 else "")))
+    return made
+
+
+def scaled(profile: Recording, factor: float) -> Recording:
+    """A profile with all inputs multiplied by a factor."""
+    return profile.with_channels(*(
+        replace(ch, values=_rounded(ch.values * factor)) for ch in profile.channels.values()))
+
+
+def _drawn(rng: np.random.Generator, t: Array, first: int, frequency: float,
+           dt: float) -> Iterator[tuple[str, Array]]:
+    """One profile of every kind, of any size."""
+    n = len(t) - first
+    s = np.linspace(0.0, 1.0, n)
+    window = np.sin(0.5 * np.pi * np.clip(np.minimum(s, 1 - s) / 0.1, 0, 1)) ** 2
+    active = t[first:] - t[first]
+    span = active[-1]
+
+    def laid(u: Array) -> Array:
+        return np.concatenate([np.zeros(first), u])
+
+    yield "kicks", laid(_kicks(n, frequency, dt, (1.0,), int(rng.integers(2, 5))))
+    yield "kicks of three sizes", laid(_kicks(n, frequency, dt, (1.0, 0.5, 0.2),
+                                              int(rng.integers(1, 4))))
+    yield "pulses", laid(_at_rest(_pulses(rng, n, frequency, dt), dt))
+    yield "binary", laid(_at_rest(_binary(rng, n, frequency, dt), dt))
+    ratio = rng.uniform(3.0, 6.0)
+    low = frequency / np.sqrt(ratio)
+    phase = 2 * np.pi * low * span / np.log(ratio) * (ratio**s - 1)
+    yield "chirp", laid(_at_rest(np.sin(phase + rng.uniform(0, 2 * np.pi)) * window, dt))
+    lines = frequency * np.arange(0.4, 2.6, 0.15)
+    phases = rng.uniform(0, 2 * np.pi, len(lines))
+    sines = np.cos(2 * np.pi * np.outer(active, lines) + phases).sum(axis=1)
+    yield "multisine", laid(_at_rest(sines * window, dt))
+    off = frequency * float(rng.choice([0.55, 0.75, 1.3, 1.6]))
+    swell = np.sin(np.pi * s) ** 2
+    yield "drive beside resonance", laid(_at_rest(np.sin(2 * np.pi * off * active) * swell, dt))
+
+
+def _kicks(n: int, frequency: float, dt: float, sizes: tuple[float, ...], pairs: int) -> Array:
+    """Half periods forth and back in time with the swing, then a free decay, for each size."""
+    u, half = np.zeros(n), max(1, round(0.5 / frequency / dt))
+    slot = n // len(sizes)
+    pairs = max(1, min(pairs, slot // (4 * half)))
+    for k, size in enumerate(sizes):
+        # As long forth as back: the shuttle is at rest afterwards, and nothing disturbs the decay.
+        burst = np.repeat(np.tile([1.0, -1.0], pairs), half)
+        u[k * slot : k * slot + len(burst)] = size * burst
+    return u
+
+
+def _pulses(rng: np.random.Generator, n: int, frequency: float, dt: float) -> Array:
+    """Pulses of random size, length and distance, each with its counterpart."""
+    u, at = np.zeros(n), 0
+    while True:
+        length = max(1, round(rng.uniform(0.2, 1.0) / frequency / dt))
+        gap = round(rng.uniform(0.0, 1.0) / frequency / dt)
+        if at + 2 * length + gap >= n:
+            return u
+        size = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 1.0))
+        u[at : at + length] += size
+        u[at + length + gap : at + 2 * length + gap] -= size
+        at += 2 * length + gap + round(rng.uniform(0.3, 4.0) / frequency / dt)
+
+
+def _binary(rng: np.random.Generator, n: int, frequency: float, dt: float) -> Array:
+    """A random sequence of full acceleration either way."""
+    step = max(1, round(0.2 / frequency / dt))
+    signs = rng.choice([-1.0, 1.0], n // step + 1)
+    return np.repeat(signs, step)[:n]
+
+
+def _at_rest(u: Array, dt: float) -> Array:
+    """u (n,) less two slow bows, so that velocity and position are zero at the end."""
+    u = np.append(u[:-1], 0.0)
+    s = np.linspace(0.0, 1.0, len(u))
+    bows = np.stack([np.sin(np.pi * s) ** 2, np.sin(np.pi * s) ** 2 * (s - 0.5)])
+
+    def ends(a: Array) -> Array:
+        velocity, position = motion(a, dt)
+        return np.array([velocity[-1] + a[-1] * dt, position[-1]])
+
+    weights = np.linalg.solve(np.stack([ends(bow) for bow in bows], axis=1), ends(u))
+    return u - weights @ bows
+
+
+def _rounded(u: Array) -> Array:
+    """To decimals that a file holds."""
+    return np.round(u, DIGITS)

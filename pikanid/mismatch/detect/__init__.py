@@ -1,0 +1,1 @@
+"""Is anything left in a residual, and of which kind, to first order?"""

@@ -1,0 +1,203 @@
+"""How small changes of forces, inputs and sensors would show, to first order about a fit.
+
+    δx' = f_x δx + f_u δu + force,   δy = h_x δx + seen
+
+solved along the fitted motion.  One pass over a recording serves every entry of the catalogue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.data.whitened import Whitened
+from pikanid.model import Model
+from pikanid.problem.evaluated import paths
+from pikanid.problem.held import HeldInput
+from pikanid.recording import Recording
+from pikanid.simulation.input_paths import combined
+from pikanid.simulation.vectorfield import VectorField
+
+TOGETHER = 100  # signs integrated at once
+CELLS = 400_000  # of signs times steps: fewer at once on long recordings, to keep memory small
+STABLE = 1.5  # rate times step that the Runge-Kutta method follows well enough
+MOST_PARTS = 64  # of a step
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Signs of all candidates: whitened columns D (rows, m) and what each stands for."""
+
+    D: np.ndarray
+    candidates: tuple[Candidate, ...]
+    owner: np.ndarray
+    signs: tuple[Sign, ...]
+
+    @property
+    def one_sided(self) -> np.ndarray:
+        """(m,) whether only positive amplitudes make sense."""
+        return np.array([s.one_sided for s in self.signs], bool)
+
+
+def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candidate]
+               ) -> Directions:
+    """The columns of every candidate's signs at θ; recordings below each other.
+
+    A recording in which an effect has fewer signs, or none, shows nothing of the others.
+    """
+    blocks: list[np.ndarray] = []
+    places: list[list[tuple[int, int]]] = []
+    known: dict[tuple[int, int], Sign] = {}
+    several = len(whitened.simulators) > 1
+    chosen = [c for c in candidates if not (several and c.per_recording)]
+    for r, response in enumerate(whitened.responses(theta, states=True)):
+        line = Tangent(whitened, theta, r, response.states)
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
+            listed = {(k, n): s for k, c in enumerate(chosen) for n, s in enumerate(
+                c.signs(line.view))}
+            blocks.append(whitened.whiten(r, line.columns(
+                [(chosen[k], s) for (k, _), s in listed.items()])))
+        places.append(list(listed))
+        known = {**listed, **known}
+    every = {place: column for column, place in enumerate(sorted(known))}
+    D, first = np.zeros((sum(map(len, blocks)), len(every))), 0
+    for own in places:
+        block = blocks.pop(0)  # of a long recording there is no room for two
+        D[first:first + len(block), [every[place] for place in own]] = block
+        first += len(block)
+    return Directions(D, tuple(chosen), np.array([k for k, _ in every], int),
+                      tuple(known[p] for p in every))
+
+
+class Tangent:
+    """The motion in one recording and its linearisation."""
+
+    def __init__(self, whitened: Whitened, theta: np.ndarray, r: int, states: np.ndarray):
+        self.simulator = whitened.simulators[r]
+        self.model: Model = self.simulator.acting
+        experiment = whitened.problem.experiments[r]
+        p = whitened.problem.parameters(theta, r)
+        grid = self.simulator.grid(p)
+        self.t, self.x, self.u, self.p = grid.T, states, grid.U, p
+        field = VectorField(self.model)
+        self.fx, self.fp = field.rhs_jacobians(self.t, self.x, self.u, p)
+        self.hx, _ = field.output_jacobians(self.t, self.x, self.u, p)
+        self.thirds = self._thirds(field, grid.V)
+        seen = grid.seen
+        counts = np.diff(seen.first)
+        self.stop = np.empty(grid.rows, int)
+        self.stop[seen.row] = np.repeat(np.arange(len(self.t)), counts)
+        self.output = np.empty(grid.rows, int)
+        self.output[seen.row] = seen.output
+        self.view = self._view(field, whitened.records.recordings[r], experiment.held)
+
+    def _thirds(self, field: VectorField, slopes: np.ndarray
+                ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """(∂f/∂x (L-1, n, n), ∂f/∂u (L-1, n, m)) at the left end, the middle and the right end of
+        each step, the inputs as they run in it; the middle state from a cubic through both ends.
+        """
+        t, x, h = self.t, self.x, np.diff(self.t)[:, None]
+        left, right = self.u[:-1], self.u[:-1] + slopes[:-1] * h
+        f0 = field.rhs(t[:-1], x[:-1], left, self.p)
+        f1 = field.rhs(t[1:], x[1:], right, self.p)
+        middle = 0.5 * (x[:-1] + x[1:]) + h / 8 * (f0 - f1)
+        places = [(t[:-1], x[:-1], left), (0.5 * (t[:-1] + t[1:]), middle, 0.5 * (left + right)),
+                  (t[1:], x[1:], right)]
+        return [(field.rhs_jacobians(at, state, u, self.p)[0], self._by_input(field, at, state, u))
+                for at, state, u in places]
+
+    def _by_input(self, field: VectorField, t: np.ndarray, x: np.ndarray, u: np.ndarray
+                  ) -> np.ndarray:
+        """∂f/∂u (L, n, m) by differences: exact where f is linear in u."""
+        columns = []
+        for j in range(u.shape[1]):
+            size = max(float(np.abs(u[:, j]).max(initial=0.0)), 1e-3) * 1e-4
+            up, down = u.copy(), u.copy()
+            up[:, j] += size
+            down[:, j] -= size
+            columns.append((field.rhs(t, x, up, self.p)
+                            - field.rhs(t, x, down, self.p)) / (2 * size))
+        return np.stack(columns, axis=2) if columns else np.zeros((len(t), x.shape[1], 0))
+
+    def _view(self, field: VectorField, recording: Recording, held: Sequence[HeldInput]) -> View:
+        names = self.model.state_names
+        y = field.outputs(self.t, self.x, self.u, self.p)
+        f = field.rhs(self.t, self.x, self.u, self.p)
+        rate = np.einsum("lqn,ln->lq", self.hx, f)
+        extra = {}
+        for name in recording.names:
+            if name not in self.model.output_names:
+                c = recording[name]
+                if np.all(np.isfinite(c.values)):
+                    extra[name] = HeldInput(name, c.time, c.values, "zero").at(self.t)
+        nominal = self.simulator.model
+        acting = combined(nominal, self.u, *paths(nominal, self.p))
+        force = {}
+        for name in self.model.free_names:
+            k = self.model.parameter_names.index(name)
+            for i, s in enumerate(names):
+                if self.model.equations[s].has(symbol(name)):
+                    force[s, name] = self.fp[:, i, k] * self.p[k]
+        return View(self.t, {s: self.x[:, i] for i, s in enumerate(names)},
+                    {s: f[:, i] for i, s in enumerate(names)},
+                    {h.name: acting[:, j] for j, h in enumerate(held)}, extra,
+                    {o.name: y[:, i] for i, o in enumerate(self.model.outputs)},
+                    {o.name: rate[:, i] for i, o in enumerate(self.model.outputs)}, force)
+
+    def columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
+        """δy (rows, m) of every sign; a few at a time, to keep long recordings in memory."""
+        together = min(TOGETHER, max(CELLS // len(self.t), 1))
+        parts = [self._columns(listed[k:k + together]) for k in range(0, len(listed), together)]
+        return np.concatenate(parts, axis=1) if parts else np.empty((len(self.stop), 0))
+
+    def _columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
+        L, n, m = len(self.t), self.x.shape[1], len(listed)
+        force, start = np.zeros((L, n, m)), np.zeros((n, m))
+        seen = np.zeros((L, len(self.model.outputs), m))
+        places = {s: i for i, s in enumerate(self.model.state_names)}
+        inputs = {i: j for j, i in enumerate(self.model.input_names)}
+        for k, (candidate, sign) in enumerate(listed):
+            if sign.force is not None:
+                force[:, places[candidate.site.v], k] += sign.force
+            if sign.seen is not None:
+                o = self.model.output_names.index(candidate.site.output.name)
+                seen[:, o, k] += sign.seen
+            for name, value in sign.initial.items():
+                start[places[name], k] = value
+        F = np.empty((3, L - 1, n, m))
+        F[0], F[1], F[2] = force[:-1], _middle(force), force[1:]
+        for k, (_, sign) in enumerate(listed):
+            for name, du in sign.push.items():
+                for block, (_, fu) in zip(F, self.thirds, strict=True):
+                    block[:, :, k] += fu[:, :, inputs[name]] * du[:-1, None]
+        state = self._integrated(F, start)
+        y = np.einsum("lqn,lnm->lqm", self.hx, state) + seen
+        return y[self.stop, self.output]
+
+    def _integrated(self, F: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """δx (L, n, m) by the classical Runge-Kutta method: over dozens of periods small errors of
+        phase would look like damping.  Forces F (3, L-1, n, m) are cubics between stops, inputs
+        held.
+        """
+        from pikanid.mismatch.catalogue.recurrences import follow
+
+        h = np.diff(self.t)
+        A = np.stack([fx for fx, _ in self.thirds])
+        every = max(len(h) // 50, 1)
+        few = h[::every, None, None] * A[0, ::every]
+        fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))
+        # states that forget within a step need shorter ones
+        parts = min(max(int(np.ceil(fastest / STABLE)), 1), MOST_PARTS)
+        return np.asarray(follow(A, F, h, start, parts))
+
+
+def _middle(rows: np.ndarray) -> np.ndarray:
+    """Values (L-1, ...) between neighbouring rows (L, ...), by cubics where there are four."""
+    between = 0.5 * (rows[:-1] + rows[1:])
+    if len(rows) > 3:
+        between[1:-1] += (rows[1:-2] - rows[:-3] + rows[2:-1] - rows[3:]) / 16
+    return between

@@ -1,0 +1,1 @@
+"""One hypothesis: the nominal model with effects added, refitted."""

@@ -1,0 +1,35 @@
+"""A hypothesis' fit as an `Estimate`, from the search's own run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pikanid.estimate import Estimate
+from pikanid.estimate.data import Fit, Trajectory
+from pikanid.estimate.estimate import total_cost
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.objective.adequacy import judge
+from pikanid.version import __version__
+
+
+def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
+    """The estimate of the extended model; covariance with the noise's colour."""
+    whitened = h.whitened
+    problem = whitened.problem
+    fits, trajectories = [], []
+    for r, response in enumerate(whitened.responses(h.minimum.theta, states=True)):
+        trajectories.append(Trajectory(response.t, response.states))
+        experiment, row = problem.experiments[r], 0
+        for s in experiment.samples:
+            output = problem.model.outputs[s.output]
+            sigma = whitened.records.levels[r][output.name].sigma
+            fits.append(Fit(experiment.name, output.name, output.unit, s.t, s.y,
+                            response.y[row:row + len(s.t)].copy(), np.full(len(s.t), sigma)))
+            row += len(s.t)
+    adequacy = judge([f.residual for f in fits], [f.sigma for f in fits],
+                     [f.measured for f in fits], len(h.minimum.theta))
+    return Estimate(
+        model=problem.model, strategy="nls", free=problem.free, theta=h.minimum.theta,
+        covariance=h.covariance, fits=tuple(fits), trajectories=tuple(trajectories),
+        cost=total_cost(fits), adequacy=adequacy, converged=h.minimum.converged,
+        settings={**like.settings, "effects": sorted(h.key)}, version=__version__)

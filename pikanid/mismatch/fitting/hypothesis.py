@@ -1,0 +1,208 @@
+"""One complete explanation of a recording: the nominal model with some effects added, refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
+from pikanid.mismatch.data.whitened import CERTAIN, GROSS, Records, Whitened
+from pikanid.mismatch.fitting.closest import Closest
+from pikanid.mismatch.fitting.descent import Start, descended, over_hills, per_row, place, renewed
+from pikanid.mismatch.fitting.least_squares import Minimum
+from pikanid.mismatch.fitting.progressive_horizon import grown, hits, lost
+from pikanid.model import Model
+
+LIMIT = 30  # iterations of a fit
+HURRIED = 12  # and of one among gross misfits
+OTHER = 1.0  # of χ²: what another way to put the same effects together has to matter
+FAR = 2.0  # times the closest χ², and that of the noise: fits above both together are given up
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Effects, the model that holds them, and its fit.
+
+    `penalty` is what the effects must gain in χ²: the number of parameters times ln N, and twice
+    the logarithm of how many effects there are to choose from, for each (extended Bayesian
+    information criterion: J. Chen and Z. Chen, Biometrika 95, 2008).
+    """
+
+    effects: tuple[Candidate, ...]
+    model: Model
+    whitened: Whitened
+    minimum: Minimum
+    penalty: float
+
+    @property
+    def key(self) -> frozenset[str]:
+        """The effects' keys."""
+        return frozenset(e.key for e in self.effects)
+
+    @property
+    def fit(self) -> tuple[frozenset[str], float]:
+        """Identifies this fit of the effects: another one may find a lower χ²."""
+        return self.key, self.minimum.chi2
+
+    def place(self) -> tuple[int, tuple[str, ...]]:
+        """Its place among hypotheses that a criterion does not tell apart: fewest effects first,
+        then by name.
+        """
+        return len(self.effects), tuple(sorted(self.key))
+
+    @property
+    def known(self) -> bool:
+        """Whether all effects are entries of the catalogue."""
+        return all(e.known for e in self.effects)
+
+    @property
+    def symbolic(self) -> bool:
+        """Whether an effect is a formula that was read, not an entry of the catalogue."""
+        return any(e.ids[0].startswith(SYMBOLIC) for e in self.effects)
+
+    @property
+    def far(self) -> bool:
+        """Whether so much is left that no test is needed to see it."""
+        return self.minimum.chi2 > CERTAIN * max(self.whitened.rows, 1)
+
+    @property
+    def pinned(self) -> bool:
+        """Whether an estimate lies at a bound."""
+        problem, theta = self.whitened.problem, self.minimum.theta
+        near = 1e-6 * np.maximum(np.abs(theta), 1e-12)
+        return bool(np.any((theta - problem.lower < near) | (problem.upper - theta < near)))
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of what is left, in units of the noise that was assumed."""
+        return (self.minimum.chi2 / max(self.whitened.rows - len(self.minimum.theta), 1)) ** 0.5
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates by name; the first recording's where each has its own."""
+        both = list(zip(self.whitened.problem.free, self.minimum.theta, strict=True))
+        return {f.name: float(v) for f, v in reversed(both)}
+
+    @property
+    def point(self) -> dict[str, float]:
+        """Where another fit may begin: estimates by name, and by label for every recording."""
+        both = zip(self.whitened.problem.free, self.minimum.theta, strict=True)
+        return {**self.values, **{f.label: float(v) for f, v in both}}
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(n, n) of the estimates; infinite variances become very large ones."""
+        J = self.minimum.J
+        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-100)
+        _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
+        inverse = vt.T / np.maximum(s, 1e-9 * (s[0] or 1.0) if len(s) else 1.0) ** 2 @ vt
+        return np.asarray(inverse / np.outer(norms, norms))
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard errors by name."""
+        free = self.whitened.problem.free
+        return {f.name: float(v) for f, v in zip(free, np.sqrt(np.diag(self.covariance)),
+                                                 strict=True)}
+
+    def score(self, scale: float = 1.0) -> float:
+        """The criterion: smaller is better; `scale` divides χ² where noise is underestimated."""
+        return self.minimum.chi2 / scale + self.penalty
+
+
+def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
+    """The nominal model with all effects."""
+    model = nominal
+    for effect in effects:
+        model = effect.applied(model)
+    return model
+
+
+def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
+           starts: Sequence[Start | Mapping[str, float]], choices: int,
+           closest: Closest | None = None, settled: frozenset[str] = frozenset()
+           ) -> Hypothesis | None:
+    """Refit the nominal model with effects added.
+
+    Args:
+        nominal: Without effects.
+        effects: To add.
+        records: To fit.
+        starts: From where; parameters not named begin at the model's values.
+        choices: Number of effects to choose from.
+        closest: χ² of the closest fit so far: one that stays far above is not carried through, and
+            simulations need not be much more accurate than it is.
+        settled: Keys of effects that need not be looked for beyond the hills about the start.
+
+    Returns:
+        The best local fit, or None where none of the starts can be simulated.
+    """
+    model = extended(nominal, effects)
+    whitened = Whitened(model, records)
+    rows = max(whitened.rows, 1)
+    closest = closest or Closest()
+    limit = closest.ask(lambda chi2: LIMIT if per_row(chi2, rows) < GROSS else HURRIED)
+
+    def beyond(size: float) -> bool:
+        return closest.ask(lambda chi2: size > FAR * (chi2 + rows))
+
+    best = descended(whitened, starts, closest, limit, beyond)
+    hilly = [e for e in effects if (e.hills or e.absent) and e.key not in settled]
+    astray = hits(hilly) and bool(starts) and (
+        best is None or (lost(best.chi2, rows) and (
+            len(effects) == 1 or not beyond(best.chi2))))
+    whole = grown(whitened, hilly, place(whitened, starts[0])) if astray else None
+    if whole is not None and (best is None or whole.chi2 < best.chi2):
+        best = whole
+    elif best is not None and not beyond(best.chi2):
+        for effect in hilly:
+            best = over_hills(whitened, best, effect, limit)
+    if hilly:
+        best = renewed(whitened, best, closest, limit, beyond)
+    if best is None:
+        return None
+    penalty = _penalty(effects, whitened.rows, choices)
+    found = Hypothesis(tuple(effects), model, whitened, best, penalty)
+    for otherwise in (turned, read_otherwise):
+        other = otherwise(found.effects)
+        if other != found.effects and not beyond(found.minimum.chi2):
+            found = _instead(found, other, nominal, closest, limit, beyond) or found
+    return found
+
+
+def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, closest: Closest,
+             limit: int, beyond: Callable[[float], bool]) -> Hypothesis | None:
+    """The fit with the same effects put together in another way, where that is closer."""
+    model = extended(nominal, effects)
+    whitened = Whitened(model, found.whitened.records)
+    theta = place(whitened, found.point)
+    if not closest.choose_steps(whitened, theta, partial(per_row, rows=max(whitened.rows, 1))) or \
+            abs(whitened.chi2(theta) - found.minimum.chi2) < OTHER:
+        return None
+    best = descended(whitened, [found.point], closest, limit, beyond)
+    if best is None or best.chi2 > found.minimum.chi2 - OTHER:
+        return None
+    return Hypothesis(effects, model, whitened, best, found.penalty)
+
+
+def read_otherwise(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """Several effects, those with another reading in that one."""
+    return tuple(replace(e, extend=e.other, other=e.extend)
+                 if e.other is not None and len(effects) > 1 else e for e in effects)
+
+
+def turned(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """What happens to inputs, and to outputs, in the opposite order: a sensor that bends and drifts
+    may bend first.
+    """
+    last = {channel: [e for e in effects if e.channel == channel]
+            for channel in ("input", "sensor")}
+    return tuple(last[e.channel].pop() if e.channel in last else e for e in effects)
+
+
+def _penalty(effects: Sequence[Candidate], rows: int, choices: int) -> float:
+    free = sum(max(len(e.parameters), 1) for e in effects)
+    return free * float(np.log(rows)) + 2 * len(effects) * float(np.log(max(choices, 1)))

@@ -1,0 +1,1 @@
+"""What a hypothesis predicts of held-out recordings, and the verdict."""

@@ -1,0 +1,292 @@
+"""Is a hypothesis adequate: on what it was fitted to, and on a recording that it never saw?"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.detect.remainder import residual_tests
+from pikanid.mismatch.detect.residual_tests import Detection
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, extended
+from pikanid.mismatch.fitting.least_squares import Minimum, held, minimise
+from pikanid.mismatch.fitting.progressive_horizon import besides, grown, rough
+from pikanid.mismatch.judge.beginning import own_beginning
+from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit, room
+from pikanid.model import Model
+
+NEAR, AGAIN = 3.0, 4  # standard deviations that a linearisation holds for; how often it is renewed
+Residual = tuple[int, str, np.ndarray, np.ndarray]  # recording, output, times, values
+MISSED = 15.0  # of χ² that a fit to all recordings may exceed fits to each by, where it is best
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What a hypothesis makes of a recording that it was not fitted to.
+
+    Attributes:
+        rmse: Of the residual of each output, in its unit, by name.
+        misfit: Root mean square of the residual of all outputs, in units of their noise.
+        tested, tested_together: Make `detection` and `together`.
+        chi2: Of the residual with that forgiveness.
+        evidence: -2 ln of the probability density of the recording, given the fit (up to a
+            constant that all hypotheses share).
+        predicted, measured, t: First output.
+        moved, rmse_moved: The same prediction, and the RMSE of each output, with the parameters
+            moved within their errors to where they suit this recording best.
+        rest: (N,) whitened residual with that forgiveness.
+        inert: Names of parameters that hardly act there: a limit that is not met.
+        motion: χ² of the whole predicted motion about its mean: what can be seen there at all.
+        residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
+        known: Tests made so far.
+    """
+
+    rmse: Mapping[str, float]
+    misfit: float
+    tested: Callable[[], Detection]
+    tested_together: Callable[[], Detection | None]
+    chi2: float
+    evidence: float
+    t: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    moved: np.ndarray
+    rmse_moved: Mapping[str, float]
+    residuals: tuple[Residual, ...]
+    rest: np.ndarray
+    inert: frozenset[str]
+    motion: float
+    known: dict[str, Detection | None] = field(default_factory=dict, repr=False)
+
+    # cached properties would let threads wait for each other
+    @property
+    def detection(self) -> Detection:
+        """Tests of what is left, with the parameters' uncertainty forgiven."""
+        if "alone" not in self.known:
+            self.known["alone"] = self.tested()
+        return cast(Detection, self.known["alone"])
+
+    @property
+    def together(self) -> Detection | None:
+        """Tests of what one fit of all recordings leaves in them; None where no such fit is."""
+        if "together" not in self.known:
+            self.known["together"] = self.tested_together()
+        return self.known["together"]
+
+
+def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
+             candidates: tuple[Candidate, ...], rate: float) -> HeldOut | None:
+    """Predict records that the hypothesis was not fitted to, and test what is left.
+
+    Shared parameters keep their estimates, with the fit's uncertainty as prior: the residual is
+    whitened by I + J_h (JᵀJ)⁻¹ J_hᵀ.  Where that leads far from the estimates, J is taken anew: far
+    from a wall that was touched once, the uncertainty is no ellipsoid.  What each recording has for
+    itself is estimated anew; what happens once (a disturbance) is left out.
+    """
+    effects = [e for e in hypothesis.effects if not e.absent]
+    bare = extended(nominal, effects)
+    model = bare.with_values({n: v for n, v in hypothesis.values.items()
+                              if n in bare.parameter_names})
+    whitened = Whitened(model, records)
+    free = whitened.problem.free
+    guess = whitened.problem.guess.copy()
+    names = [f.name for f in hypothesis.whitened.problem.free]
+    shared = [k for k, f in enumerate(free) if f.recording is None and f.name in names]
+    known = [free[k].name for k in shared]
+    guess[shared] = [hypothesis.values[n] for n in known]
+    prior = fit = of_fit(hypothesis, known)
+    misfit = hypothesis.minimum.chi2 / max(hypothesis.whitened.rows, 1)
+    if not whitened.choose_steps(guess, misfit=misfit):
+        return None
+
+    own = np.array([k not in shared for k in range(len(free))])
+    if own.any():
+        begun = own_beginning(whitened.problem, guess, tuple({c.site.q: c.site
+                                                              for c in candidates}.values()))
+        guess = min(guess, begun, key=whitened.chi2)
+        first = minimise(whitened.residual, guess, np.where(own, whitened.problem.lower, guess),
+                         np.where(own, whitened.problem.upper, guess), 40)
+        if first is not None:
+            guess = first.theta
+    found, prior = _moved(hypothesis, whitened, guess, shared, prior)
+    if found is None or not np.isfinite(found.J).all():
+        return None
+    tests = functools.partial(residual_tests, whitened, found.theta, found.r, found.J, candidates,
+                              rate)
+    together = functools.partial(_tested_together, hypothesis, whitened, found, candidates, rate)
+    predicted, gaps = _shown(whitened, guess)
+    moved, closer = _shown(whitened, found.theta)
+    # where corners stop the fit, as of a wall hardly touched, the tests forgive a last linear step
+    pushed = held(found.theta, found.J.T @ found.r, whitened.problem.lower, whitened.problem.upper)
+    q, _ = np.linalg.qr(found.J[:, ~pushed])
+    left = found.r - q @ (q.T @ found.r)
+    # nowhere does the first recording suit better than where it was fitted
+    worse = max(float(np.sum(left[whitened.rows:] ** 2)) + prior.constant, 0.0)
+    chi2 = float(np.sum(left[: whitened.rows] ** 2)) + worse
+    samples = whitened.problem.experiments[0].samples[0]
+    residuals = tuple(_residuals(whitened, gaps))
+    sized = np.concatenate([g / sigma for g, sigma in zip(gaps, whitened.sigma, strict=True)])
+    return HeldOut(_rmse(residuals), float(np.sqrt(np.mean(sized**2))), tests, together, chi2,
+                   chi2 + room(found.J, shared, fit), samples.t, samples.y, predicted, moved,
+                   _rmse(_residuals(whitened, closer)), residuals, found.r[: whitened.rows],
+                   _inert(whitened, found), _motion(whitened, gaps))
+
+
+def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared: list[int],
+           prior: Prior) -> tuple[Minimum | None, Prior]:
+    """Where parameters suit both a recording and a prior, and that prior, linearised near there."""
+    problem = whitened.problem
+    effects = [e for e in hypothesis.effects if not e.absent]
+
+    def known(before: Prior, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows = np.zeros((len(before.root), len(theta)))
+        rows[:, shared] = before.root
+        return before.residual(theta[shared]), rows
+
+    def suited(before: Prior, begin: np.ndarray) -> Minimum | None:
+        return minimise(besides(whitened, functools.partial(known, before)), begin, problem.lower,
+                        problem.upper, 25)
+
+    found = suited(prior, guess)
+    suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects)
+    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
+        whole = grown(whitened, effects, guess, functools.partial(known, prior))
+        found = min(found, whole or found, key=lambda m: m.chi2)
+    for _ in range(AGAIN):
+        if found is None or prior.distance(found.theta[shared]) < NEAR:
+            break
+        anew = elsewhere(prior, hypothesis, found.theta[shared])
+        if anew is None:
+            break
+        prior, found = anew, suited(anew, found.theta)
+    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
+        # a wall that was hardly touched is stiffer than any line from there leads to
+        both = _fitted_together(hypothesis, whitened, found, whitened.rows)
+        begin = None if both is None else _part(both, whitened)
+        anew = None if begin is None else elsewhere(prior, hypothesis, begin[shared])
+        other = None if begin is None or anew is None else suited(anew, begin)
+        if anew and other and other.chi2 + anew.constant < found.chi2 + prior.constant:
+            prior, found = anew, other
+    return found, prior
+
+
+def _inert(whitened: Whitened, found: Minimum) -> frozenset[str]:
+    """Names of the parameters whose whole size changes the residual by less than one row of it."""
+    acts = np.linalg.norm(found.J[: whitened.rows], axis=0) * np.abs(found.theta)
+    free = whitened.problem.free
+    return frozenset(f.name for f, size in zip(free, acts, strict=True) if size < 1)
+
+
+def _motion(whitened: Whitened, gaps: Sequence[np.ndarray]) -> float:
+    """χ² of what is predicted about the mean of each output, from the gaps to what is measured."""
+    total = 0.0
+    for r, gap in enumerate(gaps):
+        moved, first = gap + whitened.measured(r), 0
+        for s in whitened.problem.experiments[r].samples:
+            part = slice(first, first + len(s.t))
+            moved[part] -= moved[part].mean()
+            first += len(s.t)
+        total += float(np.sum(whitened.whiten(r, moved) ** 2))
+    return total
+
+
+def _shown(whitened: Whitened, theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The first output as predicted (N,), and what is left of every recording."""
+    responses = whitened.responses(theta)
+    gaps = [response.y - whitened.measured(r) for r, response in enumerate(responses)]
+    return responses[0].y[: len(whitened.problem.experiments[0].samples[0].t)], gaps
+
+
+def _rmse(residuals: Iterable[Residual]) -> dict[str, float]:
+    """By output, over all recordings: residuals in several units have no mean."""
+    found: dict[str, list[np.ndarray]] = {}
+    for _, name, _, gap in residuals:
+        found.setdefault(name, []).append(gap)
+    return {name: float(np.sqrt(np.mean(np.concatenate(own) ** 2))) for name, own in found.items()}
+
+
+def _residuals(whitened: Whitened, gaps: list[np.ndarray]) -> Iterator[Residual]:
+    for r, gap in enumerate(gaps):
+        first = 0
+        for s in whitened.problem.experiments[r].samples:
+            name = whitened.problem.model.outputs[s.output].name
+            yield r, name, s.t, gap[first:first + len(s.t)]
+            first += len(s.t)
+
+
+def _tested_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum,
+                     candidates: tuple[Candidate, ...], rate: float) -> Detection | None:
+    """Test what a hypothesis leaves in the recordings that it was fitted to and in others, all
+    fitted at once: what is weak in each of them adds up where it is the same in all.
+
+    The fit begins where that of the held-out ones alone ended.
+    """
+    both = _fitted_together(hypothesis, later, apart, apart.chi2)
+    return both and residual_tests(both[0], both[1].theta, both[1].r, both[1].J, candidates, rate)
+
+
+def _fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, left: float
+                     ) -> tuple[Whitened, Minimum] | None:
+    """One fit of all recordings, of which the later ones alone leave χ² of about `left`; none of
+    what happens once: that is not the same in all.
+    """
+    if any(e.absent for e in hypothesis.effects):
+        return None
+    first = hypothesis.whitened
+    count = len(first.records.recordings)
+    whitened = Whitened(hypothesis.model, Records(
+        first.records.recordings + later.records.recordings,
+        first.records.levels + later.records.levels))
+    whitened.step_as(first, later)
+    own = {(f.name, f.recording): v for f, v in zip(
+        first.problem.free, hypothesis.minimum.theta, strict=True)}
+    own |= {(f.name, None if f.recording is None else f.recording + count): v
+            for f, v in zip(later.problem.free, apart.theta, strict=True)}
+    problem = whitened.problem
+    start = np.array([own[f.name, f.recording] for f in problem.free])
+    found = minimise(whitened.residual, start, problem.lower, problem.upper, 25)
+    if found is None:
+        return None
+    if found.chi2 > hypothesis.minimum.chi2 + left + MISSED:
+        found = _from_levels(whitened, hypothesis, found)
+    return whitened, found
+
+
+def _part(both: tuple[Whitened, Minimum], later: Whitened) -> np.ndarray:
+    """θ (n,) of the later recordings in a fit of all."""
+    whitened, found = both
+    first = len(whitened.simulators) - len(later.simulators)
+    values = {(f.name, f.recording): v
+              for f, v in zip(whitened.problem.free, found.theta, strict=True)}
+    return np.array([values[f.name, None if f.recording is None else f.recording + first]
+                     for f in later.problem.free])
+
+
+def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> Minimum:
+    """The closest of fits that begin where laws without a first step to them may act: a wall that
+    was touched once can be soft or hard, and only other recordings tell which.
+    """
+    problem = whitened.problem
+
+    def at(theta: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+        both = zip(problem.free, theta, strict=True)
+        return np.array([values.get(f.name, v) for f, v in both])
+
+    for effect in hypothesis.effects:
+        # where a law does not act at all, others do as well
+        seen = {whitened.chi2(theta): theta
+                for theta in (at(found.theta, level) for level in effect.levels)}
+        for chi2 in sorted(seen)[:AGAIN]:
+            theta, name = seen[chi2], effect.parameters[0].name
+            size = next(v for f, v in zip(problem.free, theta, strict=True) if f.name == name)
+            beside = [at(theta, {name: share * size}) for share in (1.0, *effect.hills)]
+            theta = min(beside, key=whitened.chi2)
+            if whitened.choose_steps(theta):
+                other = minimise(whitened.residual, theta, problem.lower, problem.upper, 25)
+                found = min(found, other or found, key=lambda m: m.chi2)
+    return found

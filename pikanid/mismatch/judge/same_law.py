@@ -1,0 +1,87 @@
+"""Hypotheses that are one law under several names: whole exponents and free ones, and twins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.search.screen import EXPONENTS
+
+SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
+WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
+OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
+NARROW = 0.03  # of the swing: a loop no wider is dry friction that gives a little before it slips
+
+
+def integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
+    """A power law whose exponent is sharply a whole number is left to the law of that name."""
+    kept = [h for h in near if not any(
+        (gap := _exponent_gap(h, whole)) is not None and gap < WHOLE and _sharp(h)
+        for whole in (0, 1, 2))]
+    return kept or near
+
+
+def _exponent(h: Hypothesis) -> str | None:
+    """Name of the exponent of a hypothesis' power law, if it has one."""
+    return next((e.parameters[1].name for e in h.effects if e.ids[0] == "power_drag"), None)
+
+
+def _exponent_gap(h: Hypothesis, whole: float) -> float | None:
+    """Standard errors between that exponent and a whole number; one at its lower bound is zero."""
+    n = _exponent(h)
+    if n is None:
+        return None
+    if whole == 0 and h.values[n] <= h.model.parameter(n).bounds[0]:
+        return 0.0
+    return abs(h.values[n] - whole) / max(h.std[n], 1e-9)
+
+
+def _sharp(h: Hypothesis) -> bool:
+    n = _exponent(h)
+    return n is not None and h.std[n] < SHARP
+
+
+def _open_exponent(h: Hypothesis, whole: float) -> bool:
+    """Whether the exponent of a hypothesis' power law may be `whole`, or something else as well."""
+    gap = _exponent_gap(h, whole)
+    return gap is not None and gap < OPEN and not (gap < WHOLE and _sharp(h))
+
+
+def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) -> Hypothesis | None:
+    """The hypothesis with a law of free exponent in the place of one of `h`'s effects."""
+    rest = h.key - {effect.key}
+    return next((o for o in tried for e in o.effects
+                 if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
+
+
+def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
+                 ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
+    """Hypotheses that differ in twins only become one; what stands for what is noted.
+
+    A law of whole exponent has the power law as a twin where the recording leaves the exponent
+    open, and hysteresis dry friction where its loop is narrow (P. Dahl, AIAA J. 14, 1976).
+    """
+    def group(e: Candidate) -> str:
+        return e.twin + e.site.suffix if e.twin else e.key
+
+    first: dict[frozenset[str], Hypothesis] = {}
+    twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = {}
+    absorbed = set()
+    for h in known:
+        signature = frozenset(group(e) for e in h.effects)
+        leader = first.setdefault(signature, h)
+        table = twins.setdefault(leader.key, {e.key: e.names for e in leader.effects})
+        for e in leader.effects:
+            for o in h.effects:
+                if group(o) == group(e):
+                    table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.names)))
+        for e in h.effects:
+            power = _power_law(h, e, tried) if e.ids[0] in EXPONENTS else None
+            if leader is h and power and _open_exponent(power, EXPONENTS[e.ids[0]]):
+                table[e.key] += ("power_drag",)
+                absorbed.add(power.key)
+            if leader is h and e.ids[0] == "hysteresis" and e.channel == "dynamics" and (
+                    h.values[e.parameters[1].name] < NARROW * e.site.swing):
+                table[e.key] += ("coulomb_friction",)
+    return [h for h in first.values() if h.key not in absorbed], twins

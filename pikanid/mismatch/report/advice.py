@@ -1,0 +1,89 @@
+"""What to record next, in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.catalogue.candidate import SYMBOLIC
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.design.next_experiment import TELLS_APART, NextExperiment, next_experiment
+from pikanid.mismatch.design.profiles import profiles
+from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.mismatch.report.findings import Explanation, titles_apart
+from pikanid.model import Model
+from pikanid.model.parts import Input
+
+LONGEST = 20.0  # [s] of a profile that is proposed
+COMPARED = 2  # of the hypotheses in a set, the most probable
+PROVE = ("Record the system once more, driven differently and over another range of amplitudes, "
+         "and give that recording as held-out: it decides what is confirmed.")
+EXPLORE = ("No law in the catalogue holds. Record (1) a free decay over a three-fold range of "
+           "amplitude, (2) a slow sweep through the resonance at two input levels, and (3) two "
+           "seconds at rest before each: they tell laws of the state, of the input and of the "
+           "sensor apart.")
+STRENGTHEN = ("Record the same again for several times as long, with a larger swing or with less "
+              "noise: what an effect gains in chi-squared grows with the time, and with the square "
+              "of its size over the noise.")
+
+
+def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rate: float,
+           proves: bool, workers: int = 1, weak: bool = False) -> str:
+    """The next experiment for a verdict; empty where none is needed.
+
+    Args:
+        verdict: Of the diagnosis.
+        given: Its hypotheses.
+        records: That it was made from.
+        rate: Natural frequency [rad/s].
+        proves: Whether a held-out recording was there.
+        workers: Threads.
+        weak: Whether something given predicts what is held out, but is too weak to be sure of.
+    """
+    if verdict in ("none", "named"):
+        return ""
+    outside = any(e.ids[0].startswith(SYMBOLIC) for h in given for e in h.effects)
+    if verdict == "set" or (weak and outside and len(given) > 1):
+        return _separating(given[:COMPARED], records, rate, workers)
+    if not given:
+        return EXPLORE
+    return STRENGTHEN if weak else EXPLORE if proves else PROVE
+
+
+def _separating(given: Sequence[Explanation], records: Records, rate: float, workers: int) -> str:
+    """The profile that best tells the most probable hypotheses apart."""
+    model = given[0].model
+    driven = [i for i in model.inputs if i.default is None]
+    names = titles_apart(given)
+    text = f"To tell {' from '.join(names)}: "
+    if len(driven) != 1 or not rate > 0:
+        return text + "let it swing freely from amplitudes at least three times apart, and long."
+    models = {name: e.model for name, e in zip(names, given, strict=True)}
+    found = _best(models, records, driven[0], rate, workers)
+    if found is None:
+        return text + "choose another excitation; of the usual ones none can be simulated with all."
+    apart = f"{found.value:.2g} standard deviations apart"
+    if found.value < TELLS_APART:
+        return (f"No usual profile tells {' from '.join(names)} (at best {apart}): only a larger "
+                "stroke, less noise or a second sensor would.")
+    outcome = (f"expected to set them {apart} (now {found.before:.2g}; repeating the last "
+               f"experiment, {found.repeated:.2g})")
+    return text + f"run {found.profile.name}, {outcome}. `pikanid design` writes the profile."
+
+
+def _best(models: Mapping[str, Model], records: Records, driven: Input, rate: float, workers: int
+          ) -> NextExperiment | None:
+    """The best of the usual profiles, beside what was recorded if that can be simulated with all
+    models; None where nothing can.
+    """
+    sigma = {o: level.sigma for o, level in records.levels[0].items()}
+    for recorded in (records.recordings, ()):
+        try:
+            offered = profiles(min(rate / (2 * np.pi), 5.0), duration=LONGEST,
+                               channel=driven.name, unit=driven.unit, draws=1)
+            return next_experiment(models, recorded, sigma, offered, workers=workers)
+        except errors.PikanidError:
+            continue
+    return None

@@ -1,0 +1,52 @@
+"""Hypotheses as they are reported."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.doubt import Predict
+from pikanid.mismatch.judge.verdict import Answer, Test, criterion
+from pikanid.mismatch.report.findings import Explanation, NamedEffect, values_of
+
+
+def explanations(answer: Answer, scale: float, test: Test, predict: Predict
+                 ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
+    """Given and rejected hypotheses, for reports."""
+    pool = [*answer.given, *answer.others]
+    if not pool:
+        return (), ()
+
+    scores = np.array([criterion(h, predict(h), scale) for h in answer.given] or [0.0])
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    weights = weights / weights.sum()
+
+    def one(h: Hypothesis, probability: float, why: str) -> Explanation:
+        table = answer.twins.get(h.key, {})
+        effects = tuple(NamedEffect(
+            table.get(e.key, e.names), e.name, e.expression,
+            values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
+        p = predict(h) if h in answer.given else None
+        return Explanation(effects, probability, h.model.with_values(
+            {n: v for n, v in h.values.items()}), h.score(scale),
+            test(h).p_value if h in answer.given else None,
+            None if p is None else p.detection.p_value, why)
+
+    given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
+    best = answer.given[0].score(scale) if answer.given else pool[0].score(scale)
+    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(h.score(scale) - best))
+                   for h in answer.others)
+    return given, others
+
+
+def _behind(gap: float) -> str:
+    """Why a hypothesis is not given whose criterion exceeds that of the first one given by `gap`.
+
+    >>> _behind(12.3)
+    'chi-squared with the penalty for its parameters is higher by 12'
+    >>> _behind(-0.2)
+    'explains the recording no better than what is given'
+    """
+    if gap < 0.5:
+        return "explains the recording no better than what is given"
+    return f"chi-squared with the penalty for its parameters is higher by {gap:.0f}"

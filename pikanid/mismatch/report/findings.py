@@ -1,0 +1,210 @@
+"""What a `Diagnosis` holds: where, which explanations, what proves them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from pikanid.estimate import Estimate
+from pikanid.mismatch.beyond.force_shape import ForceShape
+from pikanid.mismatch.beyond.latent_force import ForceOverTime
+from pikanid.mismatch.beyond.patch import Patch
+from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.model import Model
+from pikanid.model.parts import Parameter
+
+# times the held-out RMSE with parameters moved within their errors: more is theirs, not a law's
+SENSITIVE = 1.2
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its standard error and unit."""
+
+    value: float
+    std: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """One effect of a hypothesis: its ids (several where twins cannot be told apart), its name for
+    people, what is added to the model, and its parameters.
+    """
+
+    ids: tuple[str, ...]
+    name: str
+    expression: str
+    parameters: Mapping[str, Value]
+    channel: str = "dynamics"
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A hypothesis: effects, probability among those considered, model, tests."""
+
+    effects: tuple[NamedEffect, ...]
+    probability: float
+    model: Model
+    score: float
+    p_train: float | None
+    p_held_out: float | None
+    why_not: str = ""
+
+    @property
+    def title(self) -> str:
+        """In words."""
+        return " and ".join(e.name for e in self.effects) or "nothing"
+
+
+@dataclass(frozen=True)
+class Where:
+    """Channel, equation, states, seconds, and whether a static law of the states can do it."""
+
+    channel: Literal["dynamics", "input", "sensor", "undecided"]
+    equation: str
+    depends_on: tuple[str, ...]
+    time: tuple[tuple[float, float], ...]
+    static_law: bool | None
+
+
+@dataclass(frozen=True)
+class OutputError:
+    """RMSE of one output's prediction, in its unit: before, after, and after with the parameters
+    `moved` within their errors; and its noise.
+    """
+
+    before: float
+    after: float
+    moved: float
+    noise: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """Held-out record: errors of each output by name, p-value; and the first output's curves."""
+
+    outputs: Mapping[str, OutputError]
+    p_value: float
+    t: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    moved: np.ndarray
+
+    @property
+    def sensitive(self) -> bool:
+        """Whether the prediction depends on how exactly the parameters are known: after impacts, a
+        small error makes another motion.
+        """
+        return any(e.after > SENSITIVE * e.moved for e in self.outputs.values())
+
+    @property
+    def first(self) -> OutputError:
+        """Of the output that is drawn."""
+        return next(iter(self.outputs.values()))
+
+    @property
+    def rmse_before(self) -> float:
+        """Of the first output."""
+        return self.first.before
+
+    @property
+    def rmse_after(self) -> float:
+        """Of the first output."""
+        return self.first.after
+
+    @property
+    def rmse_moved(self) -> float:
+        """Of the first output."""
+        return self.first.moved
+
+    @property
+    def noise(self) -> float:
+        """Of the first output."""
+        return self.first.noise
+
+    @property
+    def unit(self) -> str:
+        """Of the first output."""
+        return self.first.unit
+
+    def to_dict(self) -> dict[str, Any]:
+        """For diagnosis.json: numbers of the first output, and of each where there are several."""
+        found: dict[str, Any] = {
+            "rmse_before": self.rmse_before, "rmse_after": self.rmse_after, "noise": self.noise,
+            "unit": self.unit, "p_value": self.p_value}
+        if len(self.outputs) > 1:
+            found["outputs"] = {name: {
+                "rmse_before": e.before, "rmse_after": e.after, "noise": e.noise, "unit": e.unit}
+                for name, e in self.outputs.items()}
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisData:
+    """The fields of `pikanid.Diagnosis`, where they are described."""
+
+    verdict: Verdict
+    p_value: float
+    alpha: float
+    where: Where
+    hypotheses: tuple[Explanation, ...]
+    rejected: tuple[Explanation, ...]
+    before: Estimate
+    after: Estimate
+    held_out: Proof | None
+    noise: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    undetectable_below: Mapping[str, Value] = field(default_factory=dict)
+    next_experiment: str = ""
+    seconds: float = 0.0
+    shape: ForceShape | None = None
+    force_over_time: ForceOverTime | None = None
+    patch: Patch | None = None
+    doubt: str = ""
+
+    @property
+    def mismatch(self) -> bool:
+        """Whether something is missing."""
+        return self.verdict != "none"
+
+    @property
+    def model(self) -> Model:
+        """The extended model at its estimates; the nominal one where nothing is named."""
+        return self.after.fitted_model
+
+    def sentence(self) -> str:
+        """The verdict as an engineer would put it."""
+        if self.verdict == "none":
+            return (f"The model explains the recording: nothing beyond noise (p = "
+                    f"{self.p_value:.2g}).")
+        head = f"Something is missing in the model (p = {self.p_value:.1g}): "
+        titles = list(dict.fromkeys(titles_apart(self.hypotheses)))
+        if self.verdict == "named" or (self.verdict == "set" and len(titles) == 1):
+            return head + f"{titles[0]}, confirmed on the held-out recording."
+        if self.verdict == "set":
+            return head + "one of " + "; or ".join(titles) + ", which these recordings cannot " \
+                "tell apart."
+        if self.verdict == "unconfirmed":
+            return head + "perhaps " + "; or ".join(titles) + ", not confirmed" + (
+                f": {self.doubt}." if self.doubt else " on other data.")
+        return head + "nothing in the catalogue explains it."
+
+
+def titles_apart(given: Sequence[Explanation]) -> list[str]:
+    """The title of each; of hypotheses that share one, with what they add to the model."""
+    titles = [h.title for h in given]
+    return [t if titles.count(t) == 1 else f"{t} ({'; '.join(e.expression for e in h.effects)})"
+            for t, h in zip(titles, given, strict=True)]
+
+
+def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],
+              std: Mapping[str, float]) -> dict[str, Value]:
+    """Estimates of an effect's parameters."""
+    return {p.name: Value(values[p.name], std[p.name], p.unit) for p in parameters
+            if p.name in values}

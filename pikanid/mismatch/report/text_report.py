@@ -1,0 +1,40 @@
+"""A diagnosis in words."""
+
+from __future__ import annotations
+
+from pikanid.estimate.estimate import rounded
+from pikanid.mismatch.report.findings import DiagnosisData
+
+
+def lines_of(dx: DiagnosisData) -> list[str]:
+    """Verdict, where, what, proof, what to do next and notes, line by line."""
+    lines = [dx.sentence()]
+    if dx.mismatch:
+        place = dx.where.channel if dx.where.channel != "undecided" else "channel undecided"
+        spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time[:6])
+        lines.append(f"Where: {place}" + (f"; in time at {spans}" if spans else ""))
+    for h in dx.hypotheses:
+        lines.append(f"What: {h.title} (probability {h.probability:.2f})")
+        for e in h.effects:
+            lines.append(f"  {e.expression}   [{', '.join(e.ids)}]")
+            for name, v in e.parameters.items():
+                lines.append(f"    {name} = {rounded(v.value, v.std)} {v.unit}".rstrip())
+    for h in dx.rejected[:4]:
+        lines.append(f"Not: {h.title}: {h.why_not}")
+    if dx.held_out is not None and dx.hypotheses:
+        p = dx.held_out
+        several = len(p.outputs) > 1
+        told = []
+        for output, error in p.outputs.items():
+            moved = (f", {error.moved:.3g} with the parameters moved within their errors"
+                     if p.sensitive else "")
+            change = f"{error.before:.3g} -> {error.after:.3g} {error.unit}".rstrip()
+            whose = f"of '{output}' " if several else ""
+            told.append(f"{whose}{change}{moved} (noise {error.noise:.3g})")
+        lines.append(f"Proof: held-out RMSE {'; '.join(told)}, p = {p.p_value:.2g}")
+    if dx.patch is not None:
+        unit = dx.held_out.unit if dx.held_out is not None else ""
+        lines.append(f"Patch: {dx.patch.sentence(unit)}.")
+    if dx.next_experiment:
+        lines.append(f"Next: {dx.next_experiment}")
+    return [*lines, *dx.noise, *dx.notes]

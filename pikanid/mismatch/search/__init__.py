@@ -1,0 +1,1 @@
+"""Which hypotheses are fitted, and in which order."""

@@ -1,0 +1,118 @@
+"""Hypotheses next to one: an effect left out, or another one in its place.
+
+Each comes with the starts of its fit, on from where the hypothesis stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.fitting.descent import Start
+from pikanid.mismatch.fitting.hypothesis import FAR, Hypothesis
+from pikanid.mismatch.search.screen import Screen, as_strong
+
+WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
+Job = tuple[Sequence[Candidate], Sequence[Start | Mapping[str, float]]]
+
+
+def without_one(h: Hypothesis) -> Iterator[Job]:
+    """The hypothesis without each of its effects, where it has several."""
+    for effect in h.effects if len(h.effects) > 1 else ():
+        yield _rest(h, effect), [h.point]
+
+
+def beside(h: Hypothesis, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """What may be added to a hypothesis."""
+    groups = {e.twin for e in h.effects if e.twin}
+    return [c for c in candidates if c.fits and c.suits(h.effects) and c.key not in h.key
+            and (not c.twin or c.twin not in groups) and not (c.absent and h.far)]
+
+
+def afresh(h: Hypothesis) -> Iterator[Job]:
+    """The same, effects begun where what it leaves shows them as well: a mode, or a moment, may
+    have been a wrong one.
+    """
+    for effect in h.effects:
+        if len(effect.parameters) > 2:
+            for _, starts in Screen(h, [effect]).singles(1):
+                yield h.effects, starts
+
+
+def with_simpler(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With a law that one of its effects contains in that one's place."""
+    for effect in h.effects:
+        for simple in candidates:
+            if simple.key in effect.covers and simple.key not in h.key:
+                size = as_strong(h, effect, simple)
+                yield (*_rest(h, effect), simple), [
+                    {**h.point, simple.parameters[0].name: size * share} for share in (1.0, 2.0)]
+
+
+def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With what contains one of its effects as a special case in that one's place: the law of free
+    exponent, and laws outside the catalogue.
+    """
+    for effect in h.effects:
+        for other in candidates:
+            if effect.key not in other.covers:
+                continue
+            rest = [e for e in h.effects if e is not effect and e is not other]
+            size, *more = other.parameters
+            if other.known:
+                n = {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8)
+                starts = [{size.name: as_strong(h, effect, other, n), more[0].name: n}]
+            else:
+                starts = [{size.name: as_strong(h, effect, other),
+                           **{p.name: p.value for p in more if p.name not in h.point},
+                           more[-1].name: share * more[-1].value} for share in WIDER]
+            yield (*rest, other), [{**h.point, **start} for start in starts]
+
+
+def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With what small motions cannot tell from one of its effects in that one's place."""
+    for effect in h.effects:
+        for other in candidates:
+            if effect.twin and other.twin == effect.twin and other.fits and other is not effect:
+                yield (*_rest(h, effect), other), [h.point]
+
+
+def leading(ranked: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """Hypotheses to extend, best first: none that only adds effects to a better one."""
+    found: list[Hypothesis] = []
+    for h in ranked:
+        if h.effects and not any(o.key < h.key for o in found):
+            found.append(h)
+    return found
+
+
+def wide(h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
+    """Whether a law that one of its effects contains does nearly as well in that one's place: then
+    more is added to the simpler one.
+    """
+    simpler = (fits.get(h.key - {e.key} | {part}) for e in h.effects for part in e.covers)
+    return any(o is not None and o.minimum.chi2 < FAR * h.minimum.chi2 for o in simpler)
+
+
+def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """The hypothesis that fits best of each number of effects from two on, most effects first.
+
+    What a first step out of a large misfit does not see can come to light beside another effect,
+    which then has to go.
+    """
+    several = [h for h in fits if len(h.effects) > 1 and h.known]
+    counts = sorted({len(h.effects) for h in several}, reverse=True)
+    return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
+            for n in counts]
+
+
+def _rest(h: Hypothesis, effect: Candidate) -> tuple[Candidate, ...]:
+    return tuple(e for e in h.effects if e is not effect)
+
+
+def signature(job: Job) -> object:
+    """Tells a job from others: its effects, and where its fits begin."""
+    effects, starts = job
+    return frozenset(e.key for e in effects), tuple(
+        (tuple(sorted(s.values.items())), tuple(sorted(s.origin.items())))
+        if isinstance(s, Start) else tuple(sorted(s.items())) for s in starts)

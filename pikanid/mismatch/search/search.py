@@ -1,0 +1,298 @@
+"""Which effects explain a recording: screened to first order, then refitted one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.fitting.closest import Closest
+from pikanid.mismatch.fitting.decisions import below, in_order
+from pikanid.mismatch.fitting.descent import Start
+from pikanid.mismatch.fitting.hypothesis import FAR, Hypothesis, fitted
+from pikanid.mismatch.fitting.parallel import in_turn
+from pikanid.mismatch.fitting.progressive_horizon import hits, lost
+from pikanid.mismatch.search.neighbours import (
+    Job,
+    afresh,
+    beside,
+    closest_of_each,
+    leading,
+    signature,
+    wide,
+    with_simpler,
+    with_twins,
+    with_wider,
+    without_one,
+)
+from pikanid.mismatch.search.overdispersion import what_counts
+from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, law, nothing
+from pikanid.model import Model
+
+SINGLES, PAIRS = 14, 8  # refits of one effect, of two at once
+MORE, LATER = 8, 4  # of one more beside one, beside two or three
+LEADING = 3  # single effects that a second one is added to
+CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
+PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
+EQUAL = 0.05  # of χ²: another fit of the same is no better, and what was tested stands
+KEPT = 0.5  # of what an effect promises, to first order, that a fit of it must gain
+TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
+ASKED = 2  # hypotheses to be given that are looked at once more
+MOST = 4  # effects in a hypothesis
+EFFORT = 8e6  # states times steps simulated for combinations, before nothing new is begun
+EACH = 6e4  # that setting up one fit takes as much time as, as measured
+NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
+Adequate = Callable[[Hypothesis], bool]
+Starts = Sequence[Start | Mapping[str, float]]
+
+
+@dataclass
+class Search:
+    """Finds hypotheses about records; keeps every fit it has made.
+
+    Attributes:
+        nominal: Model, at its refitted parameters.
+        records: To explain.
+        candidates: Entries of the catalogue and guards.
+        tell: Called with what is being done.
+        predicts: Whether the second hypothesis is worth its effects beyond the first one, as far as
+            other recordings say.
+        fits: The closest fit of each set of effects.
+        begun: Where fits have begun.
+        astray: Effects that were looked for beyond all hills, and explained nothing.
+        guess: Parameters that the nominal model was given with.
+        workers: Threads that fit side by side; the results do not depend on their number.
+    """
+
+    nominal: Model
+    records: Records
+    candidates: tuple[Candidate, ...]
+    tell: Callable[[str], None] = lambda text: None
+    predicts: Callable[[Hypothesis, Hypothesis], bool] = lambda fewer, more: True
+    guess: Mapping[str, float] = field(default_factory=dict)
+    fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
+    begun: set[object] = field(default_factory=set)
+    astray: set[frozenset[str]] = field(default_factory=set)
+    spent: float = 0.0
+    workers: int = 1
+
+    @property
+    def tired(self) -> bool:
+        """Whether so much has been simulated that what has been found must do."""
+        return self.spent > EFFORT
+
+    @property
+    def choices(self) -> int:
+        """Number of entries to choose from."""
+        return sum(c.known and c.suits() for c in self.candidates)
+
+    def base(self) -> Hypothesis:
+        """The nominal model without effects, refitted; SimulationFailed where that cannot be."""
+        self._fit_all([((), [{}])], always=True)
+        if frozenset() not in self.fits:
+            raise errors.SimulationFailed(errors.too_rough_to_diagnose(self.nominal.name))
+        return self.fits[frozenset()]
+
+    def run(self, adequate: Adequate) -> list[Hypothesis]:
+        """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
+        every = [c for c in self.candidates if c.fits and c.suits()]
+        screen = Screen(self.base(), every, self.guess)
+        self.tell("single effects")
+        always = entry if self.base().far else law
+        self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES, always=always)],
+                      always=True)
+        if self.base().far and self.base().pinned:
+            # at a bound the model explains as little as it can: effects show about the guess
+            about = fitted(self.nominal, (), self.records, [self.guess], self.choices,
+                           Closest(self._closest_chi2()))
+            self._fit_all([] if about is None else [
+                ((c,), starts) for c, starts in Screen(about, every).singles(SINGLES)],
+                again=True, always=True, reach=self.base().minimum.chi2)
+        self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
+        self._simplify()
+        if not adequate(self.ranked()[0]):
+            self.tell("pairs of effects")
+            self._fit_all(screen.pairs(PAIRS))
+            self._simplify()
+        return self.grow(adequate)
+
+    def grow(self, adequate: Adequate) -> list[Hypothesis]:
+        """Add effects to the best hypotheses as long as something is left and that helps."""
+        for count in range(1, MOST):
+            if not adequate(best := self.ranked()[0]):
+                self._fit_all([*afresh(best)], again=True)
+            if adequate(best := self.ranked()[0]) or self.tired:
+                break
+            self.tell(f"{count + 1} effects together")
+            rows = best.whitened.rows
+            near = rows + FAR * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
+            simple = [h for h in leading(self.ranked()) if not wide(h, self.fits)] or [best]
+            for h in simple[: LEADING if count == 1 else 1]:
+                if len(h.effects) < MOST and (h is simple[0] or h.minimum.chi2 < near):
+                    self._extend(h, MORE if count == 1 else LATER,
+                                 always=law if count == 1 and h is simple[0] else nothing)
+            if self.ranked()[0] is best or (
+                    len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
+                break
+            self._simplify()  # what led out of a dead end may have done its part
+        self._simplify()
+        if not (best := self.ranked()[0]).known:
+            self._exchange(best, anyway=True)
+        if not adequate(self.ranked()[0]):
+            for h in leading(self.ranked())[:LEADING]:
+                self._fit_all([job for job in with_wider(h, self.candidates)
+                               if all(e.known for e in job[0])], always=True)
+        best = self.ranked()[0]
+        if any(e.hills for e in best.effects) and not adequate(best):
+            best = self._fit(best.effects, [best.point], again=True)  # hills left for later
+        if adequate(best):
+            # what a test of everything misses may still be worth its penalty, or nearly
+            price = float(np.log(best.whitened.rows) + 2 * np.log(self.choices))
+            self._extend(best, LATER, self.scale() * (price - CLOSE), anyway=True)
+            for h in self._contenders():
+                self._exchange(h)
+            for h in self.ranked()[:NEAR]:
+                # fewer effects that explain almost as much may do with another one
+                if 0 < len(h.effects) < len(best.effects) and not self.tired and not adequate(h) \
+                        and below(h.score(self.scale()), best.score(self.scale()) + 2 * CLOSE):
+                    self._extend(h, MORE)
+            self._simplify()
+        # however tired, no name without the laws that keep wrong ones away, of its parts as well
+        parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
+        for h in (*parts, *self._contenders()):
+            for job in with_wider(h, self.candidates):
+                self._fit_all([job], again=not job[0][-1].known, always=True)
+        return self.ranked()
+
+    def _contenders(self) -> Iterator[Hypothesis]:
+        """The hypotheses that score about as well as the best."""
+        scale, ranked = self.scale(), self.ranked()
+        for h in ranked[:NEAR]:
+            if below(h.score(scale), ranked[0].score(scale) + CLOSE) and not self.tired:
+                yield h
+
+    def _simplify(self) -> None:
+        """Leave each effect of the best hypothesis out, or put a law that it contains in its place,
+        the fit going on where it stood: what led there may have been no more than a way out of a
+        local minimum.
+        """
+        if self.ranked()[0].far:
+            for closest in closest_of_each(self.fits.values()):
+                self._fit_all([*without_one(closest)], again=True, always=True)
+        for _ in range(MOST):
+            best = self.ranked()[0]
+            self._fit_all([*without_one(best), *with_simpler(best, self.candidates)], again=True,
+                          always=True, settled=best.key if self.tired else frozenset())
+            if self.ranked()[0] is best:
+                break
+
+    def _exchange(self, best: Hypothesis, anyway: bool = False) -> None:
+        """Put others in the place of each effect: rivals that no path led to."""
+        for effect in best.effects if len(best.effects) > 1 else ():
+            rest = tuple(e for e in best.effects if e is not effect)
+            without = self._fit(rest, [best.point])
+            if without.key == frozenset(e.key for e in rest):
+                gap = without.minimum.chi2 - best.minimum.chi2
+                # a law outside the catalogue takes up what no first step to an entry sees
+                always = (partial(entry, channel=effect.channel) if not effect.known
+                          else drag if anyway else nothing)
+                self._extend(without, MORE, PROMISING * gap, always, anyway)
+
+    def closer(self, hypotheses: Sequence[Hypothesis]) -> bool:
+        """Fit hypotheses with one effect less, or another one in its place, on from where they
+        stand; whether that found anything.
+        """
+        before = {h.fit for h in self.fits.values()}
+        for h in hypotheses[:ASKED]:
+            self._fit_all([*without_one(h), *with_twins(h, self.candidates)], again=True,
+                          always=True)
+            self._exchange(h, anyway=True)
+        return {h.fit for h in self.fits.values()} != before
+
+    def offer(self, formulas: Sequence[Candidate]) -> None:
+        """Fit laws that no catalogue holds, each alone."""
+        self.candidates += tuple(formulas)
+        self._fit_all([((candidate,), [self.base().point]) for candidate in formulas])
+
+    def carried_over(self, records: Records) -> Search:
+        """The same search with other noise levels; the best hypotheses are refitted to them."""
+        new = replace(self, records=records, fits={}, begun=set(), astray=set(self.astray))
+        new.base()
+        ranked = self.ranked()
+        near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
+        new._fit_all([(h.effects, [h.point]) for h in ranked[: FEW if ranked[0].far else CARRIED]
+                      if h.effects and h.minimum.chi2 < near], always=True,
+                     settled=frozenset(c.key for c in self.candidates))
+        return new
+
+    def ranked(self) -> list[Hypothesis]:
+        """Best first; the noise counts as what the best explanation leaves."""
+        scale = self.scale()
+        return in_order(self.fits.values(), lambda h: h.score(scale), Hypothesis.place)
+
+    def scale(self) -> float:
+        """What χ² counts for."""
+        return what_counts(self.fits.values())
+
+    def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
+                always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
+        screen = Screen(hypothesis, beside(hypothesis, self.candidates))
+        least = TELLING * hypothesis.minimum.chi2 if hypothesis.far else least
+        bent = any(e.channel == "input" for e in hypothesis.effects)
+        jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
+                           for candidate, starts in screen.singles(
+                               count, least, lambda c: always(c) or (bent and fixed(c)))]
+        # from far off a fit of the same effects may have lost its way
+        lost = [] if hypothesis.far else [
+            job for job in jobs if (known := self.fits.get(frozenset(e.key for e in job[0])))
+            and known.minimum.chi2 > hypothesis.minimum.chi2 - KEPT * screen.promised(job[0][-1])]
+        settled = frozenset() if hypothesis.far else hypothesis.key
+        self._fit_all(jobs, always=anyway, settled=settled)
+        self._fit_all(lost, again=True, settled=settled)
+
+    def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False) -> Hypothesis:
+        self._fit_all([(effects, starts)], again, always=True)
+        return self.fits.get(frozenset(e.key for e in effects), self.fits[frozenset()])
+
+    def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False,
+                 reach: float = 0.0, settled: frozenset[str] = frozenset()) -> None:
+        """Fit these effects from these starts, one after the other, and keep what is better; what
+        is known is fitted `again` only, and nothing once the search is tired, except `always`.
+        Fits far above the closest one, and above `reach` [χ²], are given up; effects that are
+        `settled` are not looked for beyond hills.
+        """
+        order = {c.key: k for k, c in enumerate(self.candidates)}
+        astray = frozenset(self.astray)
+
+        def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
+            (effects, starts), closest = job, Closest(chi2)
+            effects = sorted(effects, key=lambda e: order[e.key])
+            key = frozenset(e.key for e in effects)
+            return fitted(self.nominal, effects, self.records, starts, self.choices, closest,
+                          key if key in astray else settled), closest
+
+        def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
+            found, _ = result
+            self.spent += EACH + (found.whitened.work if found else 0.0)
+            key = frozenset(e.key for e in job[0])
+            self.begun.add(signature(job))
+            if found and hits(found.effects) and lost(found.minimum.chi2, found.whitened.rows):
+                self.astray.add(key)
+            if found and (key not in self.fits
+                          or below(found.minimum.chi2, self.fits[key].minimum.chi2 - EQUAL)):
+                self.fits[key] = found
+
+        jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])
+                and (again or frozenset(e.key for e in job[0]) not in self.fits)
+                and signature(job) not in self.begun]  # from there it would end there again
+        in_turn(jobs, lambda: max(self._closest_chi2(), reach), work, take,
+                lambda: always or not self.tired, self.workers,
+                lambda result, chi2: result[1].stands(chi2))
+
+    def _closest_chi2(self) -> float:
+        return min((h.minimum.chi2 for h in self.fits.values()), default=np.inf)

@@ -1,0 +1,1 @@
+"""What is minimised: Eq. (2), shooting, and whether what is left is noise."""

@@ -1,0 +1,119 @@
+"""Does the fitted model explain the recording?  A bad optimum must never look like a success.
+
+With known σ the sum of squared standardised residuals follows χ² with N - n_free degrees of
+freedom when the model is right (Seber & Wild, Nonlinear Regression, 1989, sec. 2.1).  Without σ the
+residual is compared with the recording's own high-frequency noise.
+
+A few degrees of freedom decide nothing: where a residual of twice the noise would be missed more
+often than not, a model that is not refuted is not confirmed either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any, Literal
+
+import numpy as np
+
+from pikanid.noise.floor import rounding_noise
+
+Verdict = Literal["fits", "misfit", "unknown"]
+TWICE, MOSTLY = 2.0, 0.5  # times the noise, and the share of such residuals that a test must see
+SEEN = 12  # samples of an output that show its noise: eight fourth differences
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """The χ² verdict.
+
+    `value` is Σ (residual/σ)² over `dof` degrees of freedom; `p_value` the probability of a larger
+    one if the model is right; `source` says where σ came from ("given" or "differences").  The
+    verdict is "unknown" where nothing was measured, or too little to judge by.
+    """
+
+    value: float
+    dof: int
+    p_value: float
+    verdict: Verdict
+    source: Literal["given", "differences", "none"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        return {"value": self.value, "dof": self.dof, "p_value": self.p_value,
+                "verdict": self.verdict, "sigma_source": self.source}
+
+
+def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
+          data: Sequence[np.ndarray], n_free: int, alpha: float = 1e-3) -> Adequacy:
+    """Judge the residuals of all outputs together.
+
+    Parameters
+    ----------
+    residuals, sigmas, data : one array (N_o,) an output and recording; σ None where unknown
+    n_free : number of estimated parameters
+    alpha : probability of calling a right model a misfit
+
+    >>> r = np.random.default_rng(0).normal(0, 2.0, 500)
+    >>> judge([r], [np.full(500, 2.0)], [r], 2).verdict
+    'fits'
+    >>> judge([r], [np.full(500, 1.0)], [r], 2).verdict
+    'misfit'
+    """
+    from scipy.special import chdtrc
+
+    count = sum(map(len, residuals))
+    dof = max(count - n_free, 1)
+    if count == 0:
+        return Adequacy(np.nan, dof, np.nan, "unknown", "none")
+    otherwise: Verdict = "fits" if decides(count - n_free, alpha) else "unknown"
+    if all(s is not None for s in sigmas):
+        value = float(sum(np.sum((r / s) ** 2) for r, s in zip(residuals, sigmas, strict=True)))
+        p = float(chdtrc(dof, value))
+        return Adequacy(value, dof, p, "misfit" if p < alpha and count > n_free else otherwise,
+                        "given")
+    value, threshold = 0.0, 0.0
+    for r, s, y in zip(residuals, sigmas, data, strict=True):
+        noise = difference_noise(y) if s is None else s
+        floor = 1e-9 * max(float(np.ptp(y)), 1e-300)
+        value += float(np.sum((r / np.maximum(noise, floor)) ** 2))
+        threshold += len(r)
+    if not any(s is not None or len(r) >= SEEN for r, s in zip(residuals, sigmas, strict=True)):
+        return Adequacy(value, dof, float(chdtrc(dof, value)), "unknown", "differences")
+    # the noise is itself estimated, and coloured noise fools differences: ask for a factor of four
+    far = value > 4 * threshold and count > n_free
+    return Adequacy(value, dof, float(chdtrc(dof, value)), "misfit" if far else otherwise,
+                    "differences")
+
+
+def decides(dof: int, alpha: float = 1e-3) -> bool:
+    """Whether a χ² test with so many degrees of freedom sees a residual of twice the noise at least
+    every other time.
+
+    >>> [dof for dof in range(-2, 20) if decides(dof)][0]
+    7
+    """
+    from scipy.special import chdtrc, chdtri
+
+    return dof > 0 and float(chdtrc(dof, chdtri(dof, alpha) / TWICE**2)) >= MOSTLY
+
+
+def difference_noise(y: np.ndarray, order: int = 4) -> float:
+    """σ of white noise on a smooth, evenly sampled signal, from its differences; at least that of
+    rounding to the sensor's step.
+
+    The `order`-th difference removes polynomials below that degree and multiplies the variance of
+    white noise by binomial(2 order, order) (Rice, Annals of Statistics 12, 1984, p. 1215).
+
+    >>> t = np.arange(2000) * 0.01
+    >>> noisy = np.sin(t) + np.random.default_rng(0).normal(0, 0.1, 2000)
+    >>> bool(abs(difference_noise(noisy) - 0.1) < 0.01)
+    True
+    """
+    if len(y) <= order:
+        return float(np.std(y))
+    d = np.diff(y, order)
+    # median, not mean: a few kinks must not count
+    spread = float(np.median(np.abs(d))) / 0.6744897501960817
+    return max(spread / float(np.sqrt(comb(2 * order, order))), rounding_noise(y))

@@ -1,0 +1,168 @@
+"""Shooting: standardised residuals of all recordings and their exact Jacobian by θ."""
+
+from __future__ import annotations
+
+import functools
+from typing import Literal
+
+import numpy as np
+
+from pikanid.objective.adequacy import Adequacy, difference_noise, judge
+from pikanid.problem.problem import Problem, Samples
+from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
+
+Accuracy = Literal["coarse", "fine"]
+HURRY = 16.0  # how many times shorter steps another start may take
+
+
+class Shooting:
+    """Residuals (ŷ - y)/σ (rows,) of a problem by simulation.
+
+    Outputs without a known σ are weighted by their own high-frequency noise when there are several
+    (so that units do not decide), and equally when there is one.  A trajectory that cannot be
+    finished gives huge residuals: a bad step, not a crash.
+    """
+
+    def __init__(self, problem: Problem, method: MethodChoice = "auto"):
+        self.problem = problem
+        self.method = method
+        self.simulators = [Simulator(problem.model, e) for e in problem.experiments]
+        self.columns = [problem.columns(r) for r in range(len(self.simulators))]
+        self.steps: list[Steps] = []
+        self.limits: list[Steps] = []
+        self.data = [s.y for e in problem.experiments for s in e.samples]
+        self.known = [s.sigma for e in problem.experiments for s in e.samples]
+        several = len(problem.model.outputs) > 1
+        spreads = [_spread(s, several) for e in problem.experiments for s in e.samples]
+        self.weights = 1.0 / np.concatenate([np.empty(0), *spreads])
+        self.y = np.concatenate([np.empty(0), *self.data])
+        self.rows = len(self.y)
+        self._at = b""
+        self._kept: tuple[np.ndarray, np.ndarray] | None = None
+        self._tried: tuple[bytes, dict[tuple[int, str, float], Response]] = (b"", {})
+
+    def choose_steps(self, theta: np.ndarray, accuracy: Accuracy) -> bool:
+        """Choose integration steps at θ; returns whether they changed.
+
+        "fine": the integration error moves no estimate by more than about a hundredth of its
+        standard error (0.01 σ/√N an output), or, where no σ is known, is 1e-10 of the signal;
+        "coarse": ten times that (1e-5 of the signal), never more than 1e-3 of the signal.  Each
+        output has a tolerance of its own, in its own unit.
+        """
+        old, self.steps = self.steps, []
+        for r, simulator in enumerate(self.simulators):
+            p = self.problem.parameters(theta, r)
+            samples = [s for s in self.problem.experiments[r].samples if len(s.t)]
+            fine = [_tolerance(s) for s in samples]
+            scale = np.concatenate([np.full(len(s.t), limit) for s, limit in zip(
+                samples, fine, strict=True)]) if samples else None
+            tolerance = 1.0 if samples else None
+            if samples and accuracy == "coarse":
+                tolerance = min(_coarser(s, limit) for s, limit in zip(samples, fine, strict=True))
+            known = old[r] if old and accuracy == "fine" else None
+            method, finest = self.method, 0.0
+            if self.limits:
+                method, finest = self.limits[r].method, self.limits[r].longest / HURRY
+            trial = functools.partial(self._trial, theta, r)
+            self.steps.append(
+                simulator.choose_steps(p, tolerance, method, known, finest, trial, scale))
+        self._at = b""
+        return [(s.method, s.longest) for s in old] != [
+            (s.method, s.longest) for s in self.steps]
+
+    def hurry(self) -> None:
+        """From now on refuse steps much shorter than the present ones, and other methods.
+
+        A far-off starting point can ask for steps a thousand times shorter than the optimum does.
+        """
+        self.limits = list(self.steps)
+
+    def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
+        """Simulate every recording at θ with sensitivities of its own parameters."""
+        if states:
+            return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r],
+                          states=True) for r, s in enumerate(self.simulators)]
+        return [self._trial(theta, r, steps, True) for r, steps in enumerate(self.steps)]
+
+    def _trial(self, theta: np.ndarray, r: int, steps: Steps, likely: bool) -> Response:
+        """The response of recording r at θ, with sensitivities if the steps are `likely` used.
+
+        Those at the latest θ are kept: where steps are checked the optimiser starts.
+        """
+        key = (r, steps.method, steps.longest)
+        at = theta.tobytes()
+        if self._tried[0] != at:
+            self._tried = (at, {})
+        kept = self._tried[1]
+        if key in kept:
+            return kept[key]
+        active = self.columns[r][0] if likely else None
+        response = self.simulators[r].run(self.problem.parameters(theta, r), active, steps)
+        if likely:
+            kept[key] = response
+        return response
+
+    def residual(self, theta: np.ndarray) -> np.ndarray:
+        """(ŷ - y)/σ (rows,)."""
+        return self._evaluate(theta)[0]
+
+    def jacobian(self, theta: np.ndarray) -> np.ndarray:
+        """∂ residual/∂θ (rows, n_free)."""
+        return self._evaluate(theta)[1]
+
+    def _evaluate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        at = theta.tobytes()
+        if self._kept is None or self._at != at:
+            self._at, self._kept = at, self._simulate(theta)
+        return self._kept
+
+    def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        responses = self.responses(theta)
+        if not all(r.finished for r in responses):
+            return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
+        if len(responses) == 1:
+            predicted, jacobian = responses[0].y, responses[0].sensitivity
+        else:
+            predicted = np.concatenate([r.y for r in responses])
+            jacobian = np.zeros((self.rows, len(theta)))
+            row = 0
+            for r, (_, outside) in zip(responses, self.columns, strict=True):
+                jacobian[row:row + len(r.y), outside] = r.sensitivity
+                row += len(r.y)
+        residual = predicted - self.y
+        residual *= self.weights
+        # column by column: of rows as short as these, broadcasting would take longer
+        weighted = np.empty(jacobian.shape)
+        for k in range(jacobian.shape[1]):
+            np.multiply(jacobian[:, k], self.weights, out=weighted[:, k])
+        return residual, weighted
+
+    def adequacy(self, theta: np.ndarray) -> Adequacy:
+        """The χ² verdict at θ."""
+        r = self.residual(theta) / self.weights
+        ends = np.cumsum([len(d) for d in self.data])[:-1]
+        return judge(np.split(r, ends), self.known, self.data, len(theta))
+
+    def explains(self, theta: np.ndarray) -> bool:
+        """Whether the fit at θ is within the noise, so that no other start is needed."""
+        return self.adequacy(theta).verdict == "fits"
+
+
+def _spread(samples: Samples, several: bool) -> np.ndarray:
+    if samples.sigma is not None:
+        return samples.sigma
+    noise = difference_noise(samples.y) if several else 1.0
+    floor = 1e-6 * float(np.ptp(samples.y)) if several and len(samples.y) else 1e-300
+    return np.full(len(samples.y), max(noise, floor))
+
+
+def _tolerance(samples: Samples) -> float:
+    if samples.sigma is not None:
+        return 0.01 * float(np.min(samples.sigma)) / np.sqrt(len(samples.t))
+    return 1e-10 * max(float(np.ptp(samples.y)), 1e-300)
+
+
+def _coarser(samples: Samples, limit: float) -> float:
+    """How many times more than `limit` an output may err at first."""
+    usual = 10.0 if samples.sigma is not None else 1e5
+    return min(usual, 1e-3 * float(np.ptp(samples.y)) / limit)

@@ -1,0 +1,97 @@
+"""Formulas of parameters alone, as numbers: delays and paths of channels, the initial state."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from pikanid.formula.expressions import symbol
+from pikanid.model import Input, Model, Output
+
+# what NumPy lacks of the formula language, where an initial value needs it
+_TOOLS = {
+    "abs_power": lambda x, n: 0.0 if x == 0 else abs(x) ** n,
+    "signed_power": lambda x, n: 0.0 if x == 0 else np.sign(x) * abs(x) ** n,
+    "log_abs": lambda x: 0.0 if x == 0 else np.log(abs(x)),
+    "DiracDelta": lambda x: 0.0,
+}
+
+
+def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
+    """The delays [s] of inputs or outputs at parameters p (P,)."""
+    table = dict(zip(model.parameter_names, p, strict=True))
+    return np.array([_number(item.delay, table) for item in items])
+
+
+def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
+    """∂delay/∂p (channels, P)."""
+    table = dict(zip(model.parameter_names, p, strict=True))
+    return np.array([[_number(slope, table) for slope in _slopes(item.delay, model.parameter_names)]
+                     for item in items]).reshape(len(items), len(p))
+
+
+def paths(model: Model, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Half the play and the greatest rate of every input (m,), at parameters p (P,).
+
+    A rate that is not limited is infinite.
+    """
+    table = dict(zip(model.parameter_names, p, strict=True))
+    return (np.array([_number(i.backlash, table) for i in model.inputs]),
+            np.array([_number(i.rate_limit, table) if i.rate_limit != 0 else np.inf
+                      for i in model.inputs]))
+
+
+@functools.lru_cache(maxsize=256)
+def _slopes(expr: sp.Expr, names: tuple[str, ...]) -> tuple[sp.Expr, ...]:
+    return tuple(expr.diff(symbol(n)) for n in names)
+
+
+def _number(expr: sp.Expr, table: dict[str, float]) -> float:
+    if expr.is_Symbol:  # most delays are one parameter
+        return float(table[expr.name])
+    if expr.is_number:
+        return float(expr)
+    return float(expr.xreplace({symbol(n): sp.Float(v) for n, v in table.items()}))
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """The symbolic initial state as functions of p (P,) and the first inputs u0 (m,)."""
+
+    value: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    jacobian: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@functools.lru_cache(maxsize=64)
+def initial_state(model: Model) -> InitialState:
+    """x0 (n,) and ∂x0/∂p (n, P) as functions."""
+    n, p_symbols = len(model.states), [symbol(q) for q in model.parameter_names]
+    start = [s.initial for s in model.states]
+    if all(e.is_number for e in start):
+        x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
+        return InitialState(lambda p, u: x0, lambda p, u: zero)
+    used = [k for k, q in enumerate(p_symbols) if any(e.has(q) for e in start)]
+    value, slopes = _start_functions(tuple(start), tuple(p_symbols[k] for k in used),
+                                     model.input_names)
+
+    def jacobian(p: np.ndarray, u: np.ndarray) -> np.ndarray:
+        full = np.zeros((n, len(p_symbols)))
+        full[:, used] = np.array(slopes(p[used], u), float).reshape(n, len(used))
+        return full
+
+    return InitialState(lambda p, u: np.array(value(p[used], u), float), jacobian)
+
+
+# models that differ elsewhere begin alike
+@functools.lru_cache(maxsize=64)
+def _start_functions(start: tuple[sp.Expr, ...], parameters: tuple[sp.Symbol, ...],
+                     inputs: tuple[str, ...]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    arguments = [parameters, [symbol(q) for q in inputs]]
+    table = [[e.diff(q) for q in parameters] for e in start]
+    return (sp.lambdify(arguments, list(start), [_TOOLS, "numpy"], cse=True),
+            sp.lambdify(arguments, table, [_TOOLS, "numpy"], cse=True))

@@ -1,0 +1,130 @@
+"""Inputs as functions of time: samples, what happens between them, and play behind them."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+Side = Literal["left", "right"]
+
+
+@dataclass(frozen=True)
+class HeldInput:
+    """An input as a function of time: samples (N,) and what happens between them."""
+
+    name: str
+    time: np.ndarray
+    values: np.ndarray
+    hold: Literal["zero", "first"]
+
+    def at(self, t: np.ndarray, delay: float = 0.0, side: Side = "right") -> np.ndarray:
+        """Values at times t (M,), `delay` seconds late; outside the record its end values."""
+        if len(self.time) == 1:
+            return np.full(len(t), self.values[0])
+        shifted = np.asarray(t, float) - delay
+        if self.hold == "first":
+            return np.interp(shifted, self.time, self.values)
+        # a sample time met up to rounding belongs to the interval that starts there
+        slack = 1e-9 * self._spacing
+        probe = shifted + (slack if side == "right" else -slack)
+        index = np.searchsorted(self.time, probe, side="right") - 1
+        return self.values[np.maximum(index, 0)]  # never beyond the last one
+
+    def slope(self, t: np.ndarray, delay: float = 0.0) -> np.ndarray:
+        """du/dt inside the intervals that hold the times t."""
+        if self.hold == "zero" or len(self.time) < 2:
+            return np.zeros(len(t))
+        index = np.searchsorted(self.time, np.asarray(t) - delay, side="right") - 1
+        inside = (index >= 0) & (index < len(self.time) - 1)
+        index = np.clip(index, 0, len(self.time) - 2)
+        slopes = np.diff(self.values) / np.diff(self.time)
+        return np.where(inside, slopes[index], 0.0)
+
+    @functools.cached_property
+    def switches(self) -> np.ndarray:
+        """Times at which the value (zero-order hold) or the slope (first-order) changes."""
+        if len(self.time) < 2:
+            return np.empty(0)
+        if self.hold == "zero":
+            return self.time[1:][np.diff(self.values) != 0]
+        slopes = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.time), [0.0]])
+        change = np.abs(np.diff(slopes)) > 1e-9 * np.max(np.abs(slopes), initial=0.0)
+        return self.time[change]
+
+    @functools.cached_property
+    def _spacing(self) -> float:
+        return float(np.min(np.diff(self.time))) if len(self.time) > 1 else 1.0
+
+
+@dataclass(frozen=True)
+class PiecewiseInput:
+    """Straight pieces: from each knot (K,) on, a value and a slope; before the first, its value."""
+
+    knots: np.ndarray
+    values: np.ndarray
+    slopes: np.ndarray
+
+    def at(self, t: np.ndarray, delay: float = 0.0, side: Side = "right") -> np.ndarray:
+        """Values at times t (M,), `delay` seconds late."""
+        shifted = np.asarray(t, float) - delay
+        k = self._piece(shifted, side)
+        return self.values[k] + self.slopes[k] * np.maximum(shifted - self.knots[k], 0.0)
+
+    def slope(self, t: np.ndarray, delay: float = 0.0) -> np.ndarray:
+        """Slopes inside the pieces that hold the times t (M,)."""
+        shifted = np.asarray(t, float) - delay
+        return np.where(shifted < self.knots[0], 0.0, self.slopes[self._piece(shifted, "right")])
+
+    def _piece(self, t: np.ndarray, side: Side) -> np.ndarray:
+        slack = 1e-9 * (float(self.knots[-1] - self.knots[0]) / max(len(self.knots), 1))
+        probe = t + (slack if side == "right" else -slack)
+        return np.maximum(np.searchsorted(self.knots, probe, side="right") - 1, 0)
+
+    @functools.cached_property
+    def switches(self) -> np.ndarray:
+        """Knots (K-1,) behind the first at which the value jumps or the slope changes."""
+        ends = self.values[:-1] + self.slopes[:-1] * np.diff(self.knots)
+        return self.knots[1:][(ends != self.values[1:]) | (self.slopes[:-1] != self.slopes[1:])]
+
+
+def acting(held: HeldInput, half: float | None = None, rate: float = np.inf
+           ) -> tuple[PiecewiseInput, PiecewiseInput, PiecewiseInput]:
+    """What follows an input through a play of ±half, and no faster than `rate` per second.
+
+    Three signals c, s, q, straight between their knots, with v = c + s·half + q·rate and, exactly,
+    ∂v/∂half = s and ∂v/∂rate = q.
+
+    Behind the play v stays until u has crossed it and then follows u ∓ half (M. A. Krasnosel'skii
+    and A. V. Pokrovskii, Systems with Hysteresis, 1989, sec. 2); it is 0 before the record begins.
+    The limit on the rate comes after the play and starts from its first value; without it s is -1
+    where u pushes upwards or did so last, +1 downwards, 0 before the first contact.
+
+    >>> u = HeldInput("u", np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 0.9]), "zero")
+    >>> carrier, side, _ = acting(u, 0.25)
+    >>> (carrier.values + 0.25 * side.values).tolist(), side.values.tolist()
+    ([0.0, 0.75, 0.75], [0.0, -1.0, -1.0])
+    >>> carrier, _, ramp = acting(u, rate=2.0)
+    >>> t = np.array([1.0, 1.25, 1.75])
+    >>> (carrier.at(t) + 2.0 * ramp.at(t)).tolist()
+    [0.0, 0.5, 1.0]
+    """
+    from pikanid.problem.backlash import limited, play
+
+    u = np.asarray(held.values, float)
+    slopes = np.zeros(len(u))
+    if held.hold == "first" and len(u) > 1:
+        slopes[:-1] = np.diff(u) / np.diff(held.time)
+    knots, carrier, rates, side = np.asarray(held.time, float), u, slopes, np.zeros(len(u))
+    ramp = ramp_rates = moves = np.zeros(len(u))
+    if half is not None:
+        knots, carrier, rates, side, moves = play(knots, carrier, rates, float(half))
+        ramp = ramp_rates = np.zeros(len(knots))
+    if np.isfinite(rate):
+        knots, carrier, rates, side, ramp, ramp_rates = limited(
+            knots, carrier, rates, side, moves, float(half or 0.0), float(rate))
+    return (PiecewiseInput(knots, carrier, rates),
+            PiecewiseInput(knots, side, np.zeros(len(knots))),
+            PiecewiseInput(knots, ramp, ramp_rates))

@@ -1,0 +1,179 @@
+"""What every file format is turned into before channels are made of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from numbers import Real
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.recording.channel import Array
+
+_DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
+_EMPTY = frozenset(["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"])
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of numbers, or why it is none.
+
+    Attributes:
+        header: As in the file.
+        values: (N,) numbers, NaN where a cell is empty or not a number.
+        defect: The sentence to raise when the column is asked for, "" if it is sound.
+        text: Whether most of its cells are words, so that it was never meant as a signal.
+        unit: Where the format itself carries one (Parquet metadata); None: look in the header.
+        time: Header of the column that holds its times, where the file's structure says so.
+        sigma, hold: Where the format itself carries them.
+    """
+
+    header: str
+    values: Array
+    defect: str = ""
+    text: bool = False
+    unit: str | None = None
+    time: str | None = None
+    sigma: float | None = None
+    hold: str | None = None
+    is_clock: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The columns of a file.
+
+    Attributes:
+        columns: In the order of the file.
+        rows: Number of each row as an editor shows it, or None where there are none to see
+            (MAT, NPZ), and messages count samples instead.
+        shared_time: Whether all columns are rows of one table, sharing one time base.
+    """
+
+    columns: tuple[Column, ...]
+    rows: Sequence[int] | None = None
+    shared_time: bool = True
+
+    def place(self, k: int) -> str:
+        """How to call the k-th data row in a message."""
+        return f"sample {k + 1}" if self.rows is None else f"row {self.rows[k]}"
+
+
+def from_rows(
+    where: str, rows: list[list[object]], numbers: list[int], decimal: str = "."
+) -> Table:
+    """A table from rows of cells, the first of which is the header unless it is all numbers.
+
+    Args:
+        where: Name of the file, for messages.
+        rows: Cells, either text or numbers; all rows of one length.
+        numbers: Row numbers as an editor shows them.
+        decimal: Decimal sign of numbers given as text.
+
+    Raises:
+        BadRecording: If there is no data row.
+    """
+    headed = heads(rows[0], decimal)
+    headers = [str(cell or "").strip() for cell in rows[0]] if headed else []
+    body, shown = (rows[1:], numbers[1:]) if headed else (rows, numbers)
+    if not body:
+        raise errors.BadRecording(errors.no_rows(where))
+    if not headed:
+        headers = [str(k + 1) for k in range(len(rows[0]))]
+    columns = tuple(
+        from_cells(where, header, cells, shown, decimal)
+        for header, cells in zip(headers, zip(*body, strict=True), strict=True)
+    )
+    return Table(columns, shown)
+
+
+def heads(row: Sequence[object], decimal: str) -> bool:
+    """Whether the first row of a file holds headers: not all of it are numbers or empty.
+
+    >>> heads(["t", "1"], "."), heads(["0", "1,5"], ",")
+    (True, False)
+    """
+    return not all(_number(cell, decimal) is not None for cell in row)
+
+
+def from_cells(
+    where: str, header: str, cells: Sequence[object], rows: Sequence[int], decimal: str = "."
+) -> Column:
+    """One column of numbers from cells of text, numbers, dates or None.
+
+    A column of dates becomes seconds since its first one.
+    """
+    quick = _quick(cells, decimal)
+    if quick is not None:
+        return Column(header, quick)
+    clock = _clock(cells)
+    if clock is not None:
+        return Column(header, clock, unit="s", is_clock=True)
+    parsed = [_number(cell, decimal) for cell in cells]
+    bad = [k for k, value in enumerate(parsed) if value is None]
+    values = np.array([np.nan if value is None else value for value in parsed])
+    if not bad:
+        return Column(header, values)
+    defect = errors.not_a_number(where, rows[bad[0]], header, str(cells[bad[0]]))
+    words = sum(1 for k in bad if not _DIGIT_FIRST.match(str(cells[k])))
+    return Column(header, values, defect, text=words > np.isfinite(values).sum())
+
+
+def _quick(cells: Sequence[object], decimal: str) -> Array | None:
+    """All cells at once, where all of them are plainly numbers or empty text."""
+    try:
+        if decimal == ",":
+            if any("." in cell for cell in cells):  # type: ignore[operator]  # caught below
+                return None
+            cells = [cell.replace(",", ".") for cell in cells]  # type: ignore[attr-defined]  # likewise
+        # what is no text ends in the except clause
+        values = np.array([float(cell) if cell != "" else np.nan for cell in cells])  # type: ignore[arg-type]
+    except (ValueError, TypeError, AttributeError, OverflowError):
+        return None
+    # float() takes "1_000", which no instrument writes.
+    if any("_" in cell for cell in cells if isinstance(cell, str)):
+        return None
+    return values
+
+
+def _number(cell: object, decimal: str = ".") -> float | None:
+    """The number in a cell, NaN if it is empty, None if it is something else."""
+    if cell is None:
+        return float("nan")
+    if isinstance(cell, Real):
+        try:
+            return float(cell)
+        except OverflowError:
+            return float("inf")
+    if not isinstance(cell, str):
+        return None
+    text = cell.strip()
+    if text.casefold() in _EMPTY:
+        return float("nan")
+    if decimal == ",":
+        if "." in text:
+            return None
+        text = text.replace(",", ".")
+    try:
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None
+
+
+def _clock(cells: Sequence[object]) -> Array | None:
+    """Seconds since the first of a column of dates, None if it is not one."""
+    stamps: list[datetime] = []
+    for cell in cells:
+        try:
+            stamp = datetime.fromisoformat(cell.strip()) if isinstance(cell, str) else cell
+        except ValueError:
+            return None
+        if not isinstance(stamp, datetime):
+            return None
+        stamps.append(stamp)
+    if len({stamp.tzinfo is None for stamp in stamps}) != 1:
+        return None
+    return np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])

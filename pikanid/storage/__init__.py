@@ -1,0 +1,1 @@
+"""Files and what is kept in them: checked when read, whole when written; processes that end."""

@@ -1,0 +1,116 @@
+"""Linear algebra of the information matrix F = JᵀJ: covariance, what is not identified, shares."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.problem.problem import FreeParameter
+
+FAR, FURTHER = 10.0, 100.0  # times a parameter's size, from which on its standard error is told of
+
+
+def covariance(jacobian: np.ndarray, estimated: np.ndarray) -> np.ndarray:
+    """(JᵀJ)⁻¹ (n, n) of standardised residuals, by singular values of the scaled Jacobian.
+
+    Directions that the data do not see get an infinite variance; parameters that are not
+    `estimated` (n,) (held at a bound) get NaN.
+    """
+    n = jacobian.shape[1]
+    result = np.full((n, n), np.nan)
+    inside = np.flatnonzero(estimated)
+    J: np.ndarray = np.asarray(np.linalg.qr(jacobian[:, inside], mode="r"))
+    norms = np.linalg.norm(J, axis=0) if len(inside) else np.empty(0)
+    seen = norms > 0
+    block = np.zeros((len(inside), len(inside)))
+    if seen.any():
+        _, s, vt = np.linalg.svd(J[:, seen] / norms[seen], full_matrices=False)
+        good = s > s[0] * 1e-12
+        inner = (vt[good].T / s[good] ** 2) @ vt[good] if good.all() else (
+            (vt.T / np.where(good, s, s[0] * 1e-12) ** 2) @ vt)
+        block[np.ix_(seen, seen)] = inner / np.outer(norms[seen], norms[seen])
+    block[~seen, ~seen] = np.inf
+    result[np.ix_(inside, inside)] = block
+    return result
+
+
+def identifiability_warnings(jacobian: np.ndarray, free: Sequence[FreeParameter],
+                             estimated: np.ndarray, limit: float = 1e6) -> list[str]:
+    """Sentences about parameters, or combinations of them, that the data do not determine."""
+    names = [f.label for f, e in zip(free, estimated, strict=True) if e]
+    if not names:
+        return []
+    J: np.ndarray = np.asarray(np.linalg.qr(jacobian[:, estimated], mode="r"))
+    norms = np.linalg.norm(J, axis=0)
+    notes = [errors.no_influence(n) for n, size in zip(names, norms, strict=True) if size == 0]
+    seen = norms > 0
+    if seen.sum() < 2:
+        return notes
+    _, s, vt = np.linalg.svd(J[:, seen] / norms[seen], full_matrices=False)
+    if s[-1] < s[0] / limit:
+        visible = [n for n, k in zip(names, seen, strict=True) if k]
+        weights = vt[-1] / np.max(np.abs(vt[-1]))
+        parts = [f"{w:+.2g}·{n}" for w, n in zip(weights, visible, strict=True) if abs(w) > 0.1]
+        notes.append(errors.unidentifiable(" ".join(parts), s[0] / max(s[-1], 1e-300)))
+    return notes
+
+
+def undetermined_warnings(free: Sequence[FreeParameter], theta: np.ndarray,
+                          covariance: np.ndarray) -> list[str]:
+    """Sentences about parameters whose standard errors say that they could be anything.
+
+    Beside a value, and a guess, that are not zero ten times are far; beside an estimate near zero
+    alone (an offset, an initial state), which has no size of its own, only hundreds are.
+    """
+    with np.errstate(invalid="ignore"):
+        std = np.sqrt(np.diag(covariance))
+    found = []
+    for f, value, error in zip(free, theta, std, strict=True):
+        limit = FAR * max(abs(value), abs(f.guess)) if f.guess else FURTHER * abs(value)
+        if np.isfinite(error) and error > limit > 0:
+            found.append(errors.undetermined(f.label, float(value), float(error)))
+    return found
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Information about p with the trajectory's coefficients known and with them estimated as well.
+
+    `alone` (n, n) = F_pp, `effective` (n, n) = F_pp - F_pc F_cc⁻¹ F_cp (Schur complement); `shares`
+    (n,) how much of each parameter's own information is left.
+    """
+
+    alone: np.ndarray
+    effective: np.ndarray
+
+    @property
+    def shares(self) -> np.ndarray:
+        """effective/alone for each parameter with the others known."""
+        return np.diag(self.effective) / np.diag(self.alone)
+
+
+def information_partition(coefficients: np.ndarray, parameters: np.ndarray) -> Partition:
+    """Effective Fisher information on p when coefficients c are estimated jointly.
+
+    Parameters
+    ----------
+    coefficients : ∂r/∂c (rows, K) of the standardised residual [data; √λ physics]
+    parameters : ∂r/∂p (rows, n)
+
+    >>> part = information_partition(np.array([[1.0], [0.0]]), np.array([[1.0], [1.0]]))
+    >>> part.shares
+    array([0.5])
+    """
+    from scipy.linalg import qr
+
+    alone = parameters.T @ parameters
+    q, r, _ = qr(coefficients, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(r))
+    # a coefficient that repeats others, or that no residual sees, takes no information of its own
+    independent = sizes > max(coefficients.shape) * np.finfo(float).eps * sizes.max(initial=0.0)
+    q = q[:, :len(sizes)][:, independent]
+    rest = parameters - q @ (q.T @ parameters)
+    return Partition(alone, rest.T @ rest)

@@ -1,0 +1,120 @@
+"""Which case hides what: dealt so that every id of the catalogue occurs equally often."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.validation.concealed.effect import Effect
+from pikanid.validation.concealed.effects import IDS, NEAR, OUTSIDE, POTENTIAL_FLOW, variants
+
+CLASSES = ("nothing", "single", "pair", "near", "outside")
+DEFAULT_MIX: Mapping[str, float] = {
+    "nothing": 0.10, "single": 0.45, "pair": 0.20, "near": 0.12, "outside": 0.13}
+FLOW = Effect(POTENTIAL_FLOW, "outside", "dynamics")
+# Laws that stand for each other or contain each other do not make a pair.
+_OVERLAP = (
+    {"coulomb_friction", "quadratic_drag", "power_drag", "amplitude_damping"},
+    {"input_delay", "sensor_delay", "actuator_lag", "sensor_lag"},
+    {"input_gain", "sensor_gain"}, {"static_bias", "sensor_offset"},
+    {"sensor_saturation", "wall_impact"}, {"input_saturation", "input_dead_zone", "hysteresis"})
+
+
+@dataclass(frozen=True)
+class Card:
+    """What one case hides.
+
+    Attributes:
+        kind: One of CLASSES.
+        effects: None, one or two.
+    """
+
+    kind: str
+    effects: tuple[Effect, ...]
+
+
+def parse_mix(text: str) -> dict[str, float]:
+    """Shares of the classes, summing to 1.
+
+    Raises:
+        BadSetting: If a class is unknown, a share no number ≥ 0, or all are 0.
+
+    >>> parse_mix("single=3,nothing=1")
+    {'nothing': 0.25, 'single': 0.75, 'pair': 0.0, 'near': 0.0, 'outside': 0.0}
+    """
+    shares = dict.fromkeys(CLASSES, 0.0)
+    for part in text.split(","):
+        name, _, number = part.partition("=")
+        try:
+            share = float(number)
+        except ValueError:
+            share = -1.0
+        if name.strip() not in shares or not 0.0 <= share < 1e6:
+            raise errors.BadSetting(errors.conceal_mix(text, CLASSES))
+        shares[name.strip()] = share
+    total = sum(shares.values())
+    if total <= 0.0:
+        raise errors.BadSetting(errors.conceal_mix(text, CLASSES))
+    return {name: share / total for name, share in shares.items()}
+
+
+def deal(cases: int, mix: Mapping[str, float], rng: np.random.Generator) -> list[Card]:
+    """Cards in random order.
+
+    >>> cards = deal(200, DEFAULT_MIX, np.random.default_rng(0))
+    >>> met = [effect.id for card in cards for effect in card.effects]
+    >>> len(cards), min(met.count(identifier) for identifier in IDS) >= 5
+    (200, True)
+    """
+    ids = _endless(IDS, rng)
+    near = _endless(tuple(range(len(NEAR))), rng)
+    # The flow is the outsider that matters most: every second one.
+    outside = _endless((*OUTSIDE, *[FLOW] * len(OUTSIDE)), rng)
+    cards = []
+    for kind, number in _counts(cases, mix).items():
+        for _ in range(number):
+            if kind == "single":
+                cards.append(Card(kind, (_variant(next(ids), rng),)))
+            elif kind == "pair":
+                cards.append(Card(kind, _two(ids, rng)))
+            elif kind == "near":
+                cards.append(Card(kind, (NEAR[next(near)],)))
+            elif kind == "outside":
+                cards.append(Card(kind, (next(outside),)))
+            else:
+                cards.append(Card(kind, ()))
+    return [cards[k] for k in rng.permutation(len(cards))]
+
+
+def _counts(cases: int, mix: Mapping[str, float]) -> dict[str, int]:
+    """Whole numbers that sum to `cases`, by largest remainders."""
+    exact = {kind: cases * mix.get(kind, 0.0) for kind in CLASSES}
+    counts = {kind: int(number) for kind, number in exact.items()}
+    order = sorted(CLASSES, key=lambda kind: counts[kind] - exact[kind])
+    for kind in order[: cases - sum(counts.values())]:
+        counts[kind] += 1
+    return counts
+
+
+def _endless(things: tuple, rng: np.random.Generator) -> Iterator:
+    """All of them, again and again, each time in another order."""
+    while True:
+        for k in rng.permutation(len(things)):
+            yield things[k]
+
+
+def _variant(identifier: str, rng: np.random.Generator) -> Effect:
+    choices = variants(identifier)
+    return choices[int(rng.integers(len(choices)))]
+
+
+def _two(ids: Iterator[str], rng: np.random.Generator) -> tuple[Effect, Effect]:
+    first = next(ids)
+    second = next(ids)
+    while second == first or any({first, second} <= group for group in _OVERLAP):
+        # Put back at the end of nothing: a skipped id is made up for by the next round.
+        second = next(ids)
+    return _variant(first, rng), _variant(second, rng)
