@@ -61,7 +61,7 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
                  "response": "*", "sizing": "*"},
     LONGER: {"case": "SEARCHED", "preparation": "LONG FINE MOST", "remainder": "MOST_ROWS"},
     REPEATED: {"repeats": "*"},
-    STEPS: {"diagnose": "RELEVELLED ASKED", "case": "AGAIN", "descent": "HILLS COARSE RENEWED",
+    STEPS: {"diagnose": "RELEVELLED ASKED", "case": "AGAIN", "descent": "HOPS COARSE RENEWED",
             "progressive_horizon": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED",
             "prediction": "AGAIN", "least_squares": "PATIENCE", "tangent": "*",
             "whitened": "FINEST"},
@@ -177,7 +177,7 @@ def diagnosed(train: pk.Recording, other: pk.Recording, memory: Memory) -> dict[
         except PikanidError as failure:
             return {"verdict": f"failed: {failure}", "mismatch": False, "hypotheses": []}
     return {"verdict": dx.verdict, "mismatch": dx.mismatch, "hypotheses": [
-        {"effects": [{"ids": list(e.ids)} for e in h.effects], "probability": h.probability}
+        {"effects": [{"ids": list(e.ids)} for e in h.effects], "relative_weight": h.relative_weight}
         for h in dx.hypotheses]}
 
 

@@ -34,7 +34,7 @@ from provenance import provenance
 
 ROOT = Path(__file__).resolve().parents[1]
 # Where decisions are made close to an edge, and where sums are long.
-SHORT_TESTS = ("tests/test_verdict.py", "tests/test_judge.py", "tests/test_gauss_newton.py",
+SHORT_TESTS = ("tests/test_verdict.py", "tests/test_prediction.py", "tests/test_gauss_newton.py",
                "tests/test_uncertainty.py", "tests/test_noise.py")
 SHORT_SETTINGS = ("reference", "SkylakeX", "plainest")
 STANDARD_ERRORS, RELATIVE, PROBABILITY = 0.05, 1e-3, 0.02  # tolerances
@@ -174,7 +174,7 @@ def _names(answer: dict[str, Any]) -> list[str]:
 def _numbers(answer: dict[str, Any]) -> Iterator[tuple[str, tuple[float, float]]]:
     """Place -> number and its tolerance."""
     for name, h in zip(_names(answer), answer["hypotheses"], strict=True):
-        yield f"probability of {name}", (h["probability"], PROBABILITY)
+        yield f"relative weight of {name}", (h["relative_weight"], PROBABILITY)
         for effect in h["effects"]:
             for constant, v in effect["parameters"].items():
                 yield f"{constant} of {name}", _estimate(v)

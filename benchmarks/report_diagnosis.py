@@ -113,15 +113,15 @@ def _together(scores: list[Score], folder: Path) -> str:
         # neighbours in turn above and below
         axis.annotate(f"{share.count}/{share.n}", (p, t), textcoords="offset points",
                       xytext=(5, 5 - 15 * (k % 2)), fontsize=8)
-    axis.set(xlabel="probability stated of the first hypothesis", ylabel="share that was true",
+    axis.set(xlabel="relative weight stated of the first hypothesis", ylabel="share that was true",
              xlim=(0, 1.2), ylim=(-0.05, 1.12))
     axis.legend(loc="upper left", fontsize=8)
     save_figure(figure, folder / "figures" / "diagnosis_reliability.png")
     lines = [f"\n## All {len(scores)} cases together\n", "| what | share |", "| --- | --- |"]
     lines += [f"| {name.replace('_', ' ')} | {share} |" for name, share in tally(scores).items()]
-    lines += ["", "| probability stated | true |", "| --- | --- |"]
+    lines += ["", "| relative weight stated | true |", "| --- | --- |"]
     lines += [f"| {p:.2f} | {share} |" for p, share in rows]
-    return "\n".join([*lines, "", "![stated probability against truth]"
+    return "\n".join([*lines, "", "![stated weight against truth]"
                       "(figures/diagnosis_reliability.png)"]) + "\n"
 
 
@@ -237,7 +237,7 @@ def _section(one: Set, found: list[tuple[Score, dict[str, Any]]]) -> str:
                      f"{Share(sum(s.outcome == 'wrong' for s in own), len(own))} |")
     rows = reliability(scores)
     if rows:
-        lines += ["", "| probability stated | true |", "| --- | --- |"]
+        lines += ["", "| relative weight stated | true |", "| --- | --- |"]
         lines += [f"| {stated:.2f} | {share} |" for stated, share in rows]
     wrong = [f"{s.case} ({s.reason}, nominal {s.nominal:.0f} sigma)" for s in scores
              if s.outcome == "wrong"]

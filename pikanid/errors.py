@@ -1310,7 +1310,7 @@ def truth_case(detail: str) -> str:
 def diagnosis_unreadable(case: str, detail: object) -> str:
     return (
         f"The diagnosis of case '{_short(case)}' cannot be scored: {_short(str(detail))} (wanted: "
-        "verdict, mismatch, and hypotheses with effects' ids and a probability)."
+        "verdict, mismatch, and hypotheses with effects' ids and a relative_weight)."
     )
 
 

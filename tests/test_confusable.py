@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.design.confusable import Confusable, confusable
-from pikanid.mismatch.design.response import Watched, seen
+from pikanid.mismatch.design.response import Watched, response
 from pikanid.model import Parameter, systems
 from pikanid.recording import excitation
 
@@ -45,7 +45,7 @@ def test_smallest_friction_is_five_sigma_from_a_refitted_pendulum(pulses: Confus
     c = pulses.smallest("coulomb_friction")
     e, nominal = excitation.two_pulse(), systems.sloshing()
     rubbed = nominal.with_term("theta_dot", "-c*sign(theta_dot)", [Parameter("c", c)])
-    truth = seen(rubbed, e, SIGMA)
+    truth = response(rubbed, e, SIGMA)
     rival = Watched(nominal, e, SIGMA)
 
     def misfit(q: np.ndarray) -> float:
@@ -57,7 +57,7 @@ def test_smallest_friction_is_five_sigma_from_a_refitted_pendulum(pulses: Confus
 
 
 def test_limits_are_met_just_below_the_peak(pulses: Confusable) -> None:
-    peak = np.max(np.abs(seen(systems.sloshing(), excitation.two_pulse(), SIGMA).y)) * SIGMA
+    peak = np.max(np.abs(response(systems.sloshing(), excitation.two_pulse(), SIGMA).y)) * SIGMA
     assert 0.9 * peak < pulses.smallest("sensor_saturation") < peak
     assert 0.9 < pulses.smallest("input_saturation") < 1.0
     told = pulses.to_dict()

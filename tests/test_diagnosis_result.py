@@ -14,9 +14,9 @@ from pikanid.mismatch.report.findings import Explanation, NamedEffect, Where
 from pikanid.model.systems import sloshing
 
 
-def explanation(name: str, expression: str, probability: float = 0.5) -> Explanation:
+def explanation(name: str, expression: str, relative_weight: float = 0.5) -> Explanation:
     effect = NamedEffect((name.replace(" ", "_"),), name, expression, {})
-    return Explanation((effect,), probability, sloshing(), 0.0, None, None)
+    return Explanation((effect,), relative_weight, sloshing(), 0.0, None, None)
 
 
 def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:

@@ -13,7 +13,7 @@ import pikanid as pk
 from pikanid.mismatch import diagnose as api
 from pikanid.mismatch.beyond.latent_force import ForceOverTime, _means, _Motion, force_over_time
 from pikanid.mismatch.beyond.penalised import critical_value
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.locate import locate
 from pikanid.model import systems
@@ -69,7 +69,7 @@ def truth(law: str, seed: int, force: ForceOverTime) -> np.ndarray:
     assert pushed is not None
     candidate = Candidate(("force",), "", "", "dynamics", site, (), lambda m: m, lambda w: [])
     seen = pushed.whitened.whiten(0, pushed.line.columns(
-        [(candidate, Sign({}, force=np.interp(pushed.line.t, t, missing)))]))[:, 0]
+        [(candidate, TangentDirection({}, force=np.interp(pushed.line.t, t, missing)))]))[:, 0]
     parameters = np.linalg.lstsq(pushed.J, seen, rcond=None)[0]
     own = [names.index(f.name) for f in pushed.whitened.problem.free]
     missing = missing - np.interp(t, pushed.line.t, pushed.line.fp[:, 1, own] @ parameters)

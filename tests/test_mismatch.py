@@ -83,7 +83,7 @@ def test_signs_are_the_derivatives_of_the_extended_models(
     theta = whitened.problem.guess
     assert whitened.choose_steps(theta, 1e-5)
     found = directions(whitened, theta, [candidate])
-    sign, column = found.signs[0], found.D[:, 0]
+    sign, column = found.directions[0], found.D[:, 0]
     name = candidate.parameters[0].name
     null = candidate.parameters[0].value
     start = {**sign.start, name: null + size * sign.start[name]}

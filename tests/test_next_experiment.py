@@ -14,7 +14,7 @@ from pikanid import errors
 from pikanid.cli import main
 from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
 from pikanid.mismatch.design.profiles import Bounds, motion, profiles, scaled
-from pikanid.mismatch.design.response import Watched, joined, natural_frequency, seen
+from pikanid.mismatch.design.response import Watched, joined, natural_frequency, response
 from pikanid.mismatch.design.separation import distance, mean_precision, refitted, unexplained
 from pikanid.model import Model, Parameter, systems
 from pikanid.recording import excitation
@@ -107,12 +107,12 @@ def pendulum(length: float, damping: float) -> np.ndarray:
 
 
 def test_response_agrees_with_scipy_and_its_differences() -> None:
-    response = seen(systems.sloshing(), excitation.two_pulse(), SIGMA)
-    assert response.y == pytest.approx(pendulum(0.045, 0.15), abs=0.02)
+    found = response(systems.sloshing(), excitation.two_pulse(), SIGMA)
+    assert found.y == pytest.approx(pendulum(0.045, 0.15), abs=0.02)
     for k, (dl, dd) in enumerate(((1e-6, 0.0), (0.0, 1e-5))):
         up, down = pendulum(0.045 + dl, 0.15 + dd), pendulum(0.045 - dl, 0.15 - dd)
         slope = (up - down) / 2 / (dl + dd)
-        assert response.jacobian[:, k] == pytest.approx(slope, abs=2e-3 * np.max(np.abs(slope)))
+        assert found.jacobian[:, k] == pytest.approx(slope, abs=2e-3 * np.max(np.abs(slope)))
 
 
 def test_unexplained_agrees_with_bounded_least_squares() -> None:
@@ -146,36 +146,37 @@ def closest(rival: Watched, truth: np.ndarray, starts: np.ndarray) -> float:
 def test_distance_is_that_of_a_refit() -> None:
     """For a small effect the first order is what refitting the rival's simulation finds."""
     e, nominal = excitation.two_pulse(), systems.sloshing()
-    truth = seen(drag(0.01), e, SIGMA)
+    truth = response(drag(0.01), e, SIGMA)
     searched = closest(Watched(nominal, e, SIGMA), truth.y,
                        np.array([[0.045, 0.15], [0.04501, 0.15], [0.045, 0.16]]))
-    assert distance([truth], [seen(nominal, e, SIGMA)]) == pytest.approx(searched, rel=0.02)
+    assert distance([truth], [response(nominal, e, SIGMA)]) == pytest.approx(searched, rel=0.02)
     assert refitted([truth], nominal, [e], SIGMA) == pytest.approx(searched, rel=1e-3)
 
 
 def test_refit_goes_where_the_first_order_does_not() -> None:
     """Another length is no other physics, however far away it is."""
     e, nominal = excitation.two_pulse(), systems.sloshing()
-    truth = seen(nominal.with_values(l_theta=0.047, d_theta=0.3), e, SIGMA)
-    assert distance([truth], [seen(nominal, e, SIGMA)]) > 20
+    truth = response(nominal.with_values(l_theta=0.047, d_theta=0.3), e, SIGMA)
+    assert distance([truth], [response(nominal, e, SIGMA)]) > 20
     assert refitted([truth], nominal, [e], SIGMA) < 0.5
 
 
 def test_signs_separate_what_a_line_could_not() -> None:
     """Drag looks like friction with the other sign: at q >= 0 it explains none of it."""
     e = excitation.two_pulse(20.0)
-    bounded = distance([seen(friction(0.1), e, SIGMA)], [seen(drag(0.0), e, SIGMA)])
-    nominal = distance([seen(friction(0.1), e, SIGMA)], [seen(systems.sloshing(), e, SIGMA)])
+    bounded = distance([response(friction(0.1), e, SIGMA)], [response(drag(0.0), e, SIGMA)])
+    nominal = distance([response(friction(0.1), e, SIGMA)],
+                       [response(systems.sloshing(), e, SIGMA)])
     loose = systems.sloshing().with_term(
         "theta_dot", "-q*abs(theta_dot)*theta_dot", [Parameter("q", 0.0)])
-    free = distance([seen(friction(0.1), e, SIGMA)], [seen(loose, e, SIGMA)])
+    free = distance([response(friction(0.1), e, SIGMA)], [response(loose, e, SIGMA)])
     assert bounded == pytest.approx(nominal, rel=1e-6)
     assert free < 0.9 * bounded
 
 
 def test_free_initial_states_belong_to_their_recording() -> None:
     model = systems.sloshing().with_initial(theta="free")
-    one = seen(model, excitation.two_pulse(), SIGMA)
+    one = response(model, excitation.two_pulse(), SIGMA)
     both = joined([one, one])
     assert both.jacobian.shape == (2 * 501, 4)
     assert np.all(both.jacobian[501:, 2] == 0)
@@ -203,7 +204,7 @@ def test_best_profile_is_the_one_that_a_refit_would_choose() -> None:
     values = [value for _, value in chosen.ranking]
     assert values == sorted(values, reverse=True)
     assert (chosen.profile.name, chosen.value) == chosen.ranking[0]
-    truth = seen(models["drag"], chosen.profile, SIGMA).y
+    truth = response(models["drag"], chosen.profile, SIGMA).y
     starts = np.array([0.045, 0.2, 0.01]) + np.vstack([np.zeros(3), np.diag([2e-4, 0.1, 0.05])])
     rival = Watched(models["friction"], chosen.profile, SIGMA)
     # The other way round may be closer, but this one is not.
@@ -285,7 +286,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert main([*words, "--out", str(out), "--plot", str(plot)]) == 0
     assert "Standard errors" in capsys.readouterr().out
     profile = pk.Recording.read(out)
-    reached = seen(systems.sloshing(), profile.with_hold(u_x="zero"), SIGMA).reached("theta")
+    reached = response(systems.sloshing(), profile.with_hold(u_x="zero"), SIGMA).reached("theta")
     assert reached <= np.radians(10)
     assert plot.stat().st_size > 1000
     assert main([*words, "--out", str(out), "--velocity", "0"]) == 2

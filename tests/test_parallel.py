@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.fitting.parallel import in_turn, threads
+from pikanid.mismatch.fitting.parallel import ordered_parallel_map, threads
 
 
 def outcome(workers: int, limit: int) -> list[tuple[int, int]]:
@@ -21,7 +21,7 @@ def outcome(workers: int, limit: int) -> list[tuple[int, int]]:
         time.sleep(0.001 * (job % 3))
         return job - least if job > least else job
 
-    in_turn(jobs, lambda: min((r for _, r in taken), default=100), work,
+    ordered_parallel_map(jobs, lambda: min((r for _, r in taken), default=100), work,
             lambda job, result: taken.append((job, result)), lambda: len(taken) < limit, workers)
     return taken
 
@@ -38,7 +38,7 @@ def test_failures_arrive() -> None:
         return 1 / job
 
     with pytest.raises(ZeroDivisionError):
-        in_turn([2, 0, 1], lambda: 0, work, lambda job, result: None, lambda: True, 2)
+        ordered_parallel_map([2, 0, 1], lambda: 0, work, lambda job, result: None, lambda: True, 2)
 
 
 def test_threads_by_default() -> None:
@@ -79,7 +79,7 @@ def test_what_another_state_would_not_change_is_not_done_again() -> None:
         return job, least < job
 
     jobs = [50, 40, 90, 30, 80, 20]
-    in_turn(jobs, lambda: min((job for job, _ in taken), default=100), work,
+    ordered_parallel_map(jobs, lambda: min((job for job, _ in taken), default=100), work,
             lambda job, result: taken.append(result), lambda: True, 2,
             lambda result, least: result[1] == (least < result[0]))
     assert taken == [(50, False), (40, False), (90, True), (30, False), (80, True), (20, False)]

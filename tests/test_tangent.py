@@ -31,7 +31,7 @@ def test_every_column_means_the_same_in_all_recordings() -> None:
     still = pk.Recording.from_arrays(time, {"u_x": 0 * time, "theta": noise},
                                      {"u_x": "m/s^2", "theta": "rad"})
     alone, few, both = found(MOVED), found(still), found(still, MOVED)
-    assert len(few.signs) < len(alone.signs) == len(both.signs)
+    assert len(few.directions) < len(alone.directions) == len(both.directions)
     np.testing.assert_array_equal(both.owner, alone.owner)
     np.testing.assert_allclose(both.D[len(time):], alone.D, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(np.count_nonzero(both.D[:len(time)].any(axis=0)),

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 import pikanid as pk
 from pikanid.formula.expressions import TIME, symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.noise_level import Level
@@ -102,14 +102,16 @@ class Rig:
         return whitened.whiten(0, whitened.responses(theta)[0].y)
 
     def signs(self, wanted: Callable[[Candidate], bool]
-              ) -> list[tuple[Candidate, list[tuple[Sign, np.ndarray]]]]:
+              ) -> list[tuple[Candidate, list[tuple[TangentDirection, np.ndarray]]]]:
         """Candidates with their signs and columns."""
         found = directions(self.at, self.at.problem.guess,
                            [c for c in candidates(self.sites) if wanted(c)])
-        return [(c, [(found.signs[j], found.D[:, j]) for j in np.flatnonzero(found.owner == k)])
+        return [(c, [(found.directions[j], found.D[:, j])
+                     for j in np.flatnonzero(found.owner == k)])
                 for k, c in enumerate(found.candidates)]
 
-    def difference(self, candidate: Candidate, sign: Sign, column: np.ndarray) -> np.ndarray:
+    def difference(self, candidate: Candidate, sign: TangentDirection, column: np.ndarray
+                   ) -> np.ndarray:
         """What a simulation with the effect shows beside one without it, per amplitude."""
         values, size = dict(sign.start), 1.0
         if candidate.ids == ("wall_impact",):

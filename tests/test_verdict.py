@@ -33,7 +33,7 @@ A, B, GUARD = effect("a"), effect("b"), effect("outside", known=False)
 LAW = effect(f"{SYMBOLIC}k*q**2")
 
 
-# Relative errors of every χ² and evidence, as of a processor that adds in another order: none, one
+# Relative errors of every χ² and deviance, as of a processor that adds in another order: none, one
 # rounding up or down, any of that size, and errors just above the dead band, which show that no
 # case below sits on an edge.
 ERRORS = {"exact": (0.0, 0), "up": (1e-12, 1), "down": (-1e-12, 1), "mixed": (1e-12, 2),
@@ -67,7 +67,7 @@ def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothe
                       14.0 * len(effects))
 
 
-def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
+def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
              refused: tuple[str, ...] = (), unseen: tuple[str, ...] = (),
              contradicted: tuple[str, ...] = (), inert: tuple[str, ...] = (),
              misfit: dict[str, float] | None = None, motion: float = 1e4) -> Answer:
@@ -85,10 +85,10 @@ def answered(fits: list[Hypothesis], evidence: dict[str, float] | None = None,
 
     def predicted(h: Hypothesis) -> HeldOut:
         name = "+".join(sorted(h.key))
-        value = rounded((evidence or {}).get(name, 0.0))
+        value = rounded((deviance or {}).get(name, 0.0))
         rest = np.array([10.0 * (one in h.key) * (one not in unseen) for one in keys])
         return cast(HeldOut, SimpleNamespace(
-            detection=found(h), together=found(h, contradicted), evidence=value,
+            detection=found(h), together=found(h, contradicted), deviance=value,
             misfit=rounded((misfit or {}).get(name, 1.0)), rest=rest, motion=motion,
             inert=frozenset(f"p_{one}" for one in inert)))
 
@@ -172,10 +172,10 @@ def test_what_predicts_far_worse_than_the_nominal_model_is_not_proved() -> None:
 def test_an_effect_must_show_where_it_was_found() -> None:
     """The held-out recording is a proof, not where explanations are chosen."""
     fits = [hypothesis(2000.0), hypothesis(1000.0, A), hypothesis(995.0, A, B)]
-    evidence = {"": 500.0, "a": 200.0, "a+b": 0.0}
-    given = answered(fits, evidence)
+    deviance = {"": 500.0, "a": 200.0, "a+b": 0.0}
+    given = answered(fits, deviance)
     assert given.verdict == "unconfirmed" and "hardly shows b" in given.doubt
-    assert answered([*fits[:2], hypothesis(980.0, A, B)], evidence).verdict == "named"
+    assert answered([*fits[:2], hypothesis(980.0, A, B)], deviance).verdict == "named"
 
 
 def test_no_name_is_sure_while_what_is_refused_does_far_better() -> None:
@@ -195,10 +195,10 @@ def test_a_held_out_recording_proves_only_what_it_could_have_refuted() -> None:
         assert given.verdict == "unconfirmed" and "could not have refuted a" in given.doubt
     # each of several effects
     both = [*fits, hypothesis(1900.0, B), hypothesis(900.0, A, B)]
-    evidence = {"a": 50.0, "b": 50.0}
-    assert answered(both, evidence).verdict == "named"
-    assert "refuted b" in answered(both, evidence, unseen=("b",)).doubt
-    assert "refuted b" in answered(both, evidence, inert=("b",)).doubt
+    deviance = {"a": 50.0, "b": 50.0}
+    assert answered(both, deviance).verdict == "named"
+    assert "refuted b" in answered(both, deviance, unseen=("b",)).doubt
+    assert "refuted b" in answered(both, deviance, inert=("b",)).doubt
 
 
 def test_what_happened_once_is_proved_by_a_motion_without_it() -> None:

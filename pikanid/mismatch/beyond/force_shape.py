@@ -20,7 +20,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.stats import chi2
 
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import project
@@ -162,15 +162,16 @@ class _Spline:
 
 
 def _candidate(site: Site, name: str, spline: _Spline) -> Candidate:
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         values = view.x[name] if name in view.x else view.u[name]
         if not len(spline.visits):
             spline.visits = values
         if np.ptp(spline.visits) == 0:
             return []
-        return [Sign({}, force=column) for column in spline.matrix(values).T]
+        return [TangentDirection({}, force=column) for column in spline.matrix(values).T]
 
-    return Candidate(("edge",), name, name, "dynamics", site, (), lambda m: m, signs, variant=name)
+    return Candidate(("edge",), name, name, "dynamics", site, (), lambda m: m, directions,
+                     variant=name)
 
 
 def _smoothed(rest: np.ndarray, target: np.ndarray, owner: np.ndarray, size: np.ndarray

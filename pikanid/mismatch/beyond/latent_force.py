@@ -28,7 +28,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import solve_triangular
 
 from pikanid.mismatch.beyond.penalised import Penalised, critical_value
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.remainder import MOST_ROWS, condensed
@@ -208,6 +208,7 @@ class _Motion:
         blocks = []
         for k in range(0, splines.shape[1], TOGETHER):  # some at a time: all of them are large
             forces = splines[:, k:k + TOGETHER].toarray().T
-            columns = self.line.columns([(candidate, Sign({}, force=f)) for f in forces])
+            columns = self.line.columns(
+                [(candidate, TangentDirection({}, force=f)) for f in forces])
             blocks.append(condensed(self.whitened.whiten(0, columns), len(columns), together))
         return np.concatenate(blocks, axis=1)

@@ -37,7 +37,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Sign:
+class TangentDirection:
     """How a small effect would show: as a force on q'', a change of inputs, or of what is seen.
 
     `start` holds parameter values from where a fit begins; the first parameter is the size: it
@@ -68,7 +68,7 @@ class Candidate:
         site: In the model.
         parameters: Added; the first is the effect's size, with its value at no effect.
         extend: Adds it to a model that holds the parameters already.
-        signs: How it would show.
+        directions: How it would show.
         variant: Distinguishes candidates of one id.
         twin: Group of candidates that small motions cannot tell apart.
         per_recording: Whether another recording has its own instance (or none, if `absent`).
@@ -76,8 +76,8 @@ class Candidate:
         known: Whether the catalogue holds it; a guard only keeps wrong names away.
         fits: Whether it can be added and refitted, not only looked for.
         covers: Keys of candidates that it contains as special cases.
-        hills: Factors of its first parameter by which χ² may have other minima, as where a motion
-            comes to rest between two samples.
+        other_minima: Factors of its first parameter by which χ² may have other minima, as where a
+            motion comes to rest between two samples.
         levels: Values of its parameters, from the best of which a fit begins where the model is far
             off: no first step leads to them.
         other: Adds it in another reading, which makes a difference beside other effects only.
@@ -92,7 +92,7 @@ class Candidate:
     site: Site
     parameters: tuple[Parameter, ...]
     extend: Callable[[Model], Model]
-    signs: Callable[[View], Sequence[Sign]]
+    directions: Callable[[View], Sequence[TangentDirection]]
     variant: str = ""
     twin: str = ""
     per_recording: bool = False
@@ -100,7 +100,7 @@ class Candidate:
     known: bool = True
     fits: bool = True
     covers: tuple[str, ...] = ()
-    hills: tuple[float, ...] = ()
+    other_minima: tuple[float, ...] = ()
     levels: tuple[Mapping[str, float], ...] = ()
     beside: tuple[str, ...] = ()
     other: Callable[[Model], Model] | None = None

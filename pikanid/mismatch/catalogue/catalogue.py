@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pikanid.mismatch.catalogue import channels, forces, late_inputs
-from pikanid.mismatch.catalogue import decoys as guards
+from pikanid.mismatch.catalogue import channels, decoys, forces, late_inputs
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
 from pikanid.mismatch.catalogue.second_mode import second_mode
@@ -20,9 +19,9 @@ ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
     channels.sensor_drift, channels.sensor_saturation, channels.sensor_nonlinearity,
     forces.initial_state, channels.input_hold)
 GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
-    guards.even_stiffness, guards.quintic_stiffness, guards.one_way_friction,
-    guards.stribeck_friction, guards.dissipating_wall, guards.velocity_coupled_drive,
-    guards.soft_saturation, guards.clock_error, guards.wobble, guards.rate_limit)
+    decoys.even_stiffness, decoys.quintic_stiffness, decoys.one_way_friction,
+    decoys.stribeck_friction, decoys.dissipating_wall, decoys.velocity_coupled_drive,
+    decoys.soft_saturation, decoys.clock_error, decoys.wobble, decoys.rate_limit)
 
 
 def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:

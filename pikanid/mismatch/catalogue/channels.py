@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pikanid.mismatch.catalogue.candidate import Candidate, Channel, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model.parts import Parameter
 from pikanid.problem.held import HeldInput, acting
@@ -18,11 +18,11 @@ def _sensor(site: Site, identifier: str, name: str, size: Parameter, expression:
             shape: Callable[[View], np.ndarray], twin: str = "", **maps: object) -> Candidate:
     o = site.output.name
 
-    def signs(view: View) -> list[Sign]:
-        return [Sign({size.name: 1.0}, seen=shape(view))]
+    def directions(view: View) -> list[TangentDirection]:
+        return [TangentDirection({size.name: 1.0}, seen=shape(view))]
 
     return Candidate((identifier,), name, expression, "sensor", site, (size,),
-                     lambda m: m.map_output(o, **maps), signs, twin=twin)  # type: ignore[arg-type]  # all text
+                     lambda m: m.map_output(o, **maps), directions, twin=twin)  # type: ignore[arg-type]  # all text
 
 
 def sensor_offset(site: Site) -> list[Candidate]:
@@ -64,15 +64,15 @@ def sensor_saturation(site: Site) -> list[Candidate]:
     limit = Parameter(site.name("limit"), 1e6, site.output.unit, (1e-9, INF))
     o = site.output.name
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         y, top = view.y[o], float(np.abs(view.y[o]).max(initial=0.0))
-        return [Sign({limit.name: s * top}, seen=np.clip(y, -s * top, s * top) - y,
-                     one_sided=True, scales=False)
+        return [TangentDirection({limit.name: s * top}, seen=np.clip(y, -s * top, s * top) - y,
+                                 one_sided=True, scales=False)
                 for s in (0.99, 0.96, 0.9, 0.8, 0.65, 0.5)] if top else []
 
     return [Candidate(("sensor_saturation",), "saturation of the sensor",
                       f"clip({o}, -{limit.name}, {limit.name})", "sensor", site, (limit,),
-                      lambda m: m.map_output(o, clip=[f"-{limit.name}", limit.name]), signs)]
+                      lambda m: m.map_output(o, clip=[f"-{limit.name}", limit.name]), directions)]
 
 
 def delay(site: Site) -> list[Candidate]:
@@ -80,17 +80,17 @@ def delay(site: Site) -> list[Candidate]:
     tau = Parameter(site.name("tau"), 0.0, "s", (0.0, INF))
     o = site.output.name
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         step = float(np.median(np.diff(view.t)))
         found = []
         for shift in (0.3 * step, 3 * step, 8 * step):
             late = np.interp(view.t - shift, view.t, view.y[o])
-            found.append(Sign({tau.name: shift}, seen=late - view.y[o], one_sided=True))
+            found.append(TangentDirection({tau.name: shift}, seen=late - view.y[o], one_sided=True))
         return found
 
     ids = ("input_delay", "sensor_delay") if site.inputs else ("sensor_delay",)
     return [Candidate(ids, "a delay", f"{o}(t - {tau.name})", "sensor", site, (tau,),
-                      lambda m: m.map_output(o, delay=tau.name), signs, twin="delay")]
+                      lambda m: m.map_output(o, delay=tau.name), directions, twin="delay")]
 
 
 LAGS = (0.0015, 0.005, 0.015, 0.05)
@@ -101,12 +101,12 @@ def lags(site: Site) -> list[Candidate]:
     o = site.output.name
     tau = Parameter(site.name("tau_s"), 0.01, "s", (2e-4, 5.0))
 
-    def seen(view: View) -> list[Sign]:
+    def seen(view: View) -> list[TangentDirection]:
         # a first guess of the right size matters: far shorter lags are stiff
         from pikanid.mismatch.catalogue.recurrences import lagged
 
-        return [Sign({tau.name: s}, seen=lagged(view.t, view.y[o], s) - view.y[o],
-                     one_sided=True, null=0.0) for s in LAGS]
+        return [TangentDirection({tau.name: s}, seen=lagged(view.t, view.y[o], s) - view.y[o],
+                                 one_sided=True, null=0.0) for s in LAGS]
 
     found = [Candidate(("sensor_lag",), "a lag of the sensor", f"{o} behind a lag {tau.name}",
                        "sensor", site, (tau,), lambda m: m.map_output(o, lag=tau.name), seen,
@@ -114,11 +114,12 @@ def lags(site: Site) -> list[Candidate]:
     for u in site.inputs:
         t_u = Parameter(site.name("tau_a"), 0.01, "s", (2e-4, 5.0))
 
-        def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[Sign]:
+        def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[TangentDirection]:
             from pikanid.mismatch.catalogue.recurrences import lagged
 
-            return [Sign({t_u.name: s}, push={u: lagged(view.t, view.u[u], s, True) - view.u[u]},
-                         one_sided=True, null=0.0) for s in LAGS]
+            return [TangentDirection(
+                {t_u.name: s}, push={u: lagged(view.t, view.u[u], s, True) - view.u[u]},
+                one_sided=True, null=0.0) for s in LAGS]
 
         found.append(_input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),
                             f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name))
@@ -126,11 +127,12 @@ def lags(site: Site) -> list[Candidate]:
 
 
 def _input(site: Site, u: str, identifier: str, name: str, parameters: tuple[Parameter, ...],
-           expression: str, signs: Callable[[View], Sequence[Sign]], twin: str = "",
+           expression: str, directions: Callable[[View], Sequence[TangentDirection]],
+           twin: str = "",
            channel: Channel = "input", variant: str = "", **maps: object) -> Candidate:
     several = len(site.inputs) > 1
     return Candidate((identifier,), name, expression, channel, site, parameters,
-                     lambda m: m.map_input(u, **maps), signs,  # type: ignore[arg-type]  # all text
+                     lambda m: m.map_input(u, **maps), directions,  # type: ignore[arg-type]  # all text
                      ",".join([variant] * bool(variant) + [u] * several), twin)
 
 
@@ -140,11 +142,11 @@ def input_gain(site: Site) -> list[Candidate]:
     for u in site.inputs:
         k = Parameter(site.name("k_in"), 1.0, "", (0.05, 20.0))
 
-        def signs(view: View, u: str = u, k: Parameter = k) -> list[Sign]:
-            return [Sign({k.name: 1.0}, push={u: view.u[u]})]
+        def directions(view: View, u: str = u, k: Parameter = k) -> list[TangentDirection]:
+            return [TangentDirection({k.name: 1.0}, push={u: view.u[u]})]
 
         found.append(_input(site, u, "input_gain", "a scale error of the input", (k,),
-                            f"{k.name}*{u}", signs, "gain", gain=k.name))
+                            f"{k.name}*{u}", directions, "gain", gain=k.name))
     return found
 
 
@@ -156,16 +158,16 @@ def input_limits(site: Site) -> list[Candidate]:
         limit = Parameter(site.name("u_max"), 1e6, unit, (1e-9, INF))
         width = Parameter(site.name("u_dead"), 0.0, unit, (0.0, INF))
 
-        def clipped(view: View, u: str = u, p: Parameter = limit) -> list[Sign]:
+        def clipped(view: View, u: str = u, p: Parameter = limit) -> list[TangentDirection]:
             d, top = view.u[u], float(np.abs(view.u[u]).max())
-            return [Sign({p.name: s * top}, push={u: np.clip(d, -s * top, s * top) - d},
-                         one_sided=True, scales=False)
+            return [TangentDirection({p.name: s * top}, push={u: np.clip(d, -s * top, s * top) - d},
+                                     one_sided=True, scales=False)
                     for s in (0.985, 0.95, 0.88, 0.78, 0.65, 0.5)]
 
-        def dead(view: View, u: str = u, p: Parameter = width) -> list[Sign]:
+        def dead(view: View, u: str = u, p: Parameter = width) -> list[TangentDirection]:
             d, top = view.u[u], float(np.abs(view.u[u]).max())
-            return [Sign({p.name: s * top}, push={u: -np.clip(d, -s * top, s * top)},
-                         one_sided=True, scales=False)
+            return [TangentDirection({p.name: s * top}, push={u: -np.clip(d, -s * top, s * top)},
+                                     one_sided=True, scales=False)
                     for s in (0.003, 0.01, 0.03, 0.08, 0.2, 0.4)]
 
         found += [
@@ -182,19 +184,19 @@ def input_backlash(site: Site) -> list[Candidate]:
     for u in site.inputs:
         half = Parameter(site.name("half_play"), 0.0, site.model.input(u).unit, (0.0, INF))
 
-        def signs(view: View, u: str = u, half: Parameter = half) -> list[Sign]:
+        def directions(view: View, u: str = u, half: Parameter = half) -> list[TangentDirection]:
             d = HeldInput(u, view.t, view.u[u], "zero")
             top = float(np.abs(d.values).max(initial=0.0))
             found = []
             for size in top * np.array([0.003, 0.01, 0.03, 0.08, 0.2, 0.4]) if top else ():
                 carrier, side, _ = acting(d, size)
                 acts = carrier.at(view.t) + size * side.at(view.t)
-                found.append(Sign({half.name: float(size)}, push={u: acts - d.values},
-                                  one_sided=True, scales=False))
+                found.append(TangentDirection({half.name: float(size)}, push={u: acts - d.values},
+                                              one_sided=True, scales=False))
             return found
 
         found.append(_input(site, u, "hysteresis", "backlash of the input", (half,),
-                            f"{u} behind a play of ±{half.name}", signs, variant="backlash",
+                            f"{u} behind a play of ±{half.name}", directions, variant="backlash",
                             backlash=half.name))
     return found
 
@@ -207,13 +209,13 @@ def input_hold(site: Site) -> list[Candidate]:
         other = "first" if now == "zero" else "zero"
         sense = 0.5 if now == "zero" else -0.5
 
-        def signs(view: View, u: str = u, sense: float = sense) -> list[Sign]:
+        def directions(view: View, u: str = u, sense: float = sense) -> list[TangentDirection]:
             change = np.zeros(len(view.t))
             change[:-1] = sense * np.diff(view.u[u])
-            return [Sign({}, push={u: change}, one_sided=True, scales=False)]
+            return [TangentDirection({}, push={u: change}, one_sided=True, scales=False)]
 
         words = "straight lines" if other == "first" else "steps"
         found.append(_input(site, u, "input_hold", f"the input runs in {words} between samples",
                             (), f"{u} held to order {'one' if other == 'first' else 'zero'}",
-                            signs, hold=other))
+                            directions, hold=other))
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Input, Parameter
@@ -38,12 +38,12 @@ def cross_axis(site: Site) -> list[Candidate]:
             return added(model, c).replace(
                 equations={**model.equations, site.v: rate.subs(symbol(goal), along)})
 
-        def signs(view: View, c: str = c, k: Parameter = k) -> list[Sign]:
+        def directions(view: View, c: str = c, k: Parameter = k) -> list[TangentDirection]:
             if site.inputs:
-                return [Sign({k.name: 1.0}, push={goal: view.extra[c]})]
-            return [Sign({k.name: 1.0}, force=view.extra[c])]
+                return [TangentDirection({k.name: 1.0}, push={goal: view.extra[c]})]
+            return [TangentDirection({k.name: 1.0}, force=view.extra[c])]
 
         found.append(Candidate(("cross_axis",), f"{c} acts as well", f"{k.name}*{c}", "dynamics",
-                               site, (k,), extend, signs, variant=c,
+                               site, (k,), extend, directions, variant=c,
                                other=directly if site.inputs else None))
     return found

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.forces import INF, STICKING, sense, term, wall_impact
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -71,7 +71,7 @@ def one_way_friction(site: Site) -> list[Candidate]:
             site, "one_way_friction", "friction in one direction",
             f"-{c.name}*(sign({site.v}) + {sign})/2", c,
             _half_sign(site.v, sign), one_sided=True,
-            variant="forth" if sign > 0 else "back", known=False, hills=STICKING))
+            variant="forth" if sign > 0 else "back", known=False, other_minima=STICKING))
     return found
 
 
@@ -82,15 +82,15 @@ def stribeck_friction(site: Site) -> list[Candidate]:
     slow = Parameter(site.name("v_s"), 0.2, f"{site.unit}/s", (0.01, INF))
     text = f"-{c.name}*(1 + {rise.name}*exp(-({site.v}/{slow.name})**2))*sign({site.v})"
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         v = view.x[site.v]
-        return [Sign({c.name: 1.0, rise.name: 1.0, slow.name: s},
-                     force=-sense(view, site.v) * (1 + np.exp(-(v / s) ** 2)),
-                     one_sided=True)
+        return [TangentDirection({c.name: 1.0, rise.name: 1.0, slow.name: s},
+                                 force=-sense(view, site.v) * (1 + np.exp(-(v / s) ** 2)),
+                                 one_sided=True)
                 for s in (0.05, 0.15, 0.5)]
 
     return [Candidate(("stribeck_friction",), "friction that rises at low speed", text, "dynamics",
-                      site, (c, rise, slow), lambda m: m.with_term(site.v, text), signs,
+                      site, (c, rise, slow), lambda m: m.with_term(site.v, text), directions,
                       known=False, covers=("coulomb_friction",))]
 
 
@@ -102,14 +102,14 @@ def dissipating_wall(site: Site) -> list[Candidate]:
     """
     found = []
     # with more, it would hold fast what leaves it at full speed
-    most = 1.0 / max(site.swing * site.rate, 1e-3)
+    most = 1.0 / max(site.half_range * site.rate, 1e-3)
     for wall in wall_impact(site):
         a = Parameter(site.name("a_wall"), 0.3 * most, f"s/({site.unit})", (0.0, most))
         text = f"({wall.expression})*(1 {'-' if wall.variant else '+'} {a.name}*{site.v})"
         found.append(Candidate(
             ("dissipating_wall",), "impact on a wall that takes energy out", text, "dynamics",
             site, (*wall.parameters, a), _with_term(site.v, text), lambda view: [], wall.variant,
-            known=False, hills=wall.hills, levels=wall.levels, covers=(wall.key,)))
+            known=False, other_minima=wall.other_minima, levels=wall.levels, covers=(wall.key,)))
     return found
 
 
@@ -136,14 +136,14 @@ def soft_saturation(site: Site) -> list[Candidate]:
         k = Parameter(site.name("k_soft"), 0.0, unit, (0.0, INF))
         text = f"tanh({k.name}*{u} + 1e-9*{u})/({k.name} + 1e-9)"
 
-        def signs(view: View, u: str = u, k: Parameter = k) -> list[Sign]:
+        def directions(view: View, u: str = u, k: Parameter = k) -> list[TangentDirection]:
             top = float(np.abs(view.u[u]).max())
-            return [Sign({k.name: s / top}, push={u: np.tanh(s * view.u[u] / top) * top / s
-                                                 - view.u[u]},
-                         one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)] if top else []
+            return [TangentDirection(
+                {k.name: s / top}, push={u: np.tanh(s * view.u[u] / top) * top / s - view.u[u]},
+                one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)] if top else []
 
         found.append(Candidate(("soft_saturation",), "an input limited softly", text, "input", site,
-                               (k,), _through(u, text), signs, known=False))
+                               (k,), _through(u, text), directions, known=False))
     return found
 
 
@@ -153,7 +153,8 @@ def clock_error(site: Site) -> list[Candidate]:
     o = site.output.name
     return [Candidate(("clock_error",), "a clock that runs wrongly", f"{o}((1 + {e.name})*t)",
                       "sensor", site, (e,), lambda m: m,
-                      lambda w: [Sign({e.name: 1.0}, seen=w.t * w.y_rate[o])], known=False,
+                      lambda w: [TangentDirection({e.name: 1.0}, seen=w.t * w.y_rate[o])],
+                      known=False,
                       fits=False)]
 
 
@@ -165,8 +166,8 @@ def wobble(site: Site) -> list[Candidate]:
     rates = site.rate * np.array([0.1, 0.15, 0.22, 0.32, 0.45, 0.63, 0.8])
 
     def swinging(shape: Shape, rates: np.ndarray
-                 ) -> Callable[[View], list[Sign]]:
-        return lambda w: [Sign({}, force=shape(w) * wave(r * w.t)) for r in rates
+                 ) -> Callable[[View], list[TangentDirection]]:
+        return lambda w: [TangentDirection({}, force=shape(w) * wave(r * w.t)) for r in rates
                           for wave in (np.sin, np.cos)]
 
     for p in site.free_in_force[:1]:
@@ -184,7 +185,7 @@ def rate_limit(site: Site) -> list[Candidate]:
         most = Parameter(site.name("rate"), 1e9, f"({site.model.input(u).unit or '1'})/s",
                          (1e-9, INF))
 
-        def signs(view: View, u: str = u, most: Parameter = most) -> list[Sign]:
+        def directions(view: View, u: str = u, most: Parameter = most) -> list[TangentDirection]:
             steps = np.diff(view.t)
             top = float(np.max(np.abs(np.diff(view.u[u])) / steps, initial=0.0))
             recorded = HeldInput(u, view.t, view.u[u], "zero")
@@ -195,14 +196,15 @@ def rate_limit(site: Site) -> list[Candidate]:
                 carrier, _, ramp = acting(recorded, rate=size)
                 at = inside.ravel()
                 mean = (carrier.at(at) + size * ramp.at(at)).reshape(inside.shape).mean(axis=1)
-                found.append(Sign({most.name: float(size)}, one_sided=True, scales=False,
-                                  push={u: np.append(mean, view.u[u][-1]) - view.u[u]}))
+                found.append(TangentDirection(
+                    {most.name: float(size)}, one_sided=True, scales=False,
+                    push={u: np.append(mean, view.u[u][-1]) - view.u[u]}))
             return found
 
         found.append(Candidate(
             ("rate_limited_input",), "an input of limited rate",
             f"{u} changing by at most {most.name}", "input", site, (most,),
-            _limited(u, most.name), signs, known=False))
+            _limited(u, most.name), directions, known=False))
     return found
 
 

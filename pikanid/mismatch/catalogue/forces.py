@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, State
@@ -21,14 +21,15 @@ STICKING = (0.6, 0.8, 1.25, 1.6)  # of the size of dry friction: a motion comes 
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
          shape: Callable[[View], np.ndarray], *, one_sided: bool, twin: str = "",
-         variant: str = "", known: bool = True, hills: tuple[float, ...] = ()) -> Candidate:
+         variant: str = "", known: bool = True, other_minima: tuple[float, ...] = ()) -> Candidate:
     """A force with one parameter: `shape` (L,) is what it adds to q'' at size 1."""
-    def signs(view: View) -> list[Sign]:
-        return [Sign({size.name: 1.0}, force=shape(view), one_sided=one_sided)]
+    def directions(view: View) -> list[TangentDirection]:
+        return [TangentDirection({size.name: 1.0}, force=shape(view), one_sided=one_sided)]
 
     return Candidate((identifier,), name, expression, "dynamics", site, (size,),
-                     lambda m: m.with_term(site.v, expression), signs, variant, twin, known=known,
-                     hills=hills)
+                     lambda m: m.with_term(site.v, expression), directions, variant, twin,
+                     known=known,
+                     other_minima=other_minima)
 
 
 def sense(view: View, v: str) -> np.ndarray:
@@ -42,7 +43,7 @@ def coulomb_friction(site: Site) -> list[Candidate]:
     """Dry friction: the same force at every speed, against the motion."""
     c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
     return [term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-                 lambda w: -sense(w, site.v), one_sided=True, hills=STICKING)]
+                 lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING)]
 
 
 def quadratic_drag(site: Site) -> list[Candidate]:
@@ -59,14 +60,15 @@ def power_drag(site: Site) -> list[Candidate]:
     n = Parameter(site.name("n"), 1.5, "", (0.2, 4.0))
     text = f"-{c.name}*signed_power({site.v}, {n.name})"
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         v = view.x[site.v]
-        return [Sign({c.name: 1.0, n.name: e}, force=-sense(view, site.v) * np.abs(v) ** e,
+        return [TangentDirection({c.name: 1.0, n.name: e},
+                                 force=-sense(view, site.v) * np.abs(v) ** e,
                      one_sided=True)
                 for e in (0.2, 0.35, 0.5, 0.7, 1.3, 1.5, 1.75, 2.3, 2.7, 3.2)]
 
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
-                      (c, n), lambda m: m.with_term(site.v, text), signs,
+                      (c, n), lambda m: m.with_term(site.v, text), directions,
                       covers=("coulomb_friction", "quadratic_drag"))]
 
 
@@ -111,12 +113,12 @@ def static_bias(site: Site) -> list[Candidate]:
         start = model.state(site.q).initial + newton
         return model.with_initial(**{site.q: start})
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         initial = {site.q: 1.0 / site.rate**2} if balanced else {}
-        return [Sign({b.name: 1.0}, force=np.ones(len(view.t)), initial=initial)]
+        return [TangentDirection({b.name: 1.0}, force=np.ones(len(view.t)), initial=initial)]
 
     return [Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site,
-                      (b,), extend, signs, twin="offset")]
+                      (b,), extend, directions, twin="offset")]
 
 
 def parameter_drift(site: Site) -> list[Candidate]:
@@ -128,7 +130,8 @@ def parameter_drift(site: Site) -> list[Candidate]:
             ("parameter_drift",), f"drift of {p}", f"{p} -> {text}", "dynamics", site, (r,),
             lambda m: m.replace(equations={**m.equations, site.v: m.equations[site.v].xreplace(
                 {symbol(p): m.formula(text, "drift")})}),
-            lambda w: [Sign({r.name: 1.0}, force=w.by_parameter[site.v, p] * w.t)], variant=p)
+            lambda w: [TangentDirection({r.name: 1.0}, force=w.by_parameter[site.v, p] * w.t)],
+            variant=p)
 
     return [one(p) for p in site.free_in_force]
 
@@ -137,7 +140,7 @@ def wall_impact(site: Site) -> list[Candidate]:
     """A stiff stop on one side that gives way elastically."""
     # a contact shorter than from one sample to the next looks the same, however short
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
-    walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.swing, np.array([0.03, 0.1, 0.3])
+    walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.half_range, np.array([0.03, 0.1, 0.3])
 
     def one(side: int) -> Candidate:
         w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
@@ -145,18 +148,18 @@ def wall_impact(site: Site) -> list[Candidate]:
         text = (f"-{k.name}*max({site.q} - {w.name}, 0)" if side > 0
                 else f"{k.name}*max(-{site.q} - {w.name}, 0)")
 
-        def signs(view: View) -> list[Sign]:
+        def directions(view: View) -> list[TangentDirection]:
             x = side * view.x[site.q]
             top = float(x.max(initial=0.0))
-            return [Sign({k.name: s, w.name: share * top},
-                         force=-side * np.maximum(x - share * top, 0.0), one_sided=True,
-                         scales=False)
+            return [TangentDirection({k.name: s, w.name: share * top},
+                                     force=-side * np.maximum(x - share * top, 0.0), one_sided=True,
+                                     scales=False)
                     for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5) for s in (1e4,)] if top else []
 
         return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
-                         lambda m: m.with_term(site.v, text), signs,
+                         lambda m: m.with_term(site.v, text), directions,
                          variant="" if side > 0 else SIDE,
-                         hills=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
+                         other_minima=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))
 
@@ -167,7 +170,7 @@ def hysteresis(site: Site) -> list[Candidate]:
     """A force with memory: Bouc-Wen."""
     b = Parameter(site.name("b_z"), 0.0, f"{site.unit}/s^2", (0.0, INF))
     # a loop narrower than that is dry friction, and as hard to simulate as a wall
-    least = max(0.01 * site.swing, 1e-4)
+    least = max(0.01 * site.half_range, 1e-4)
     d = Parameter(site.name("z_yield"), max(0.01, least), site.unit, (least, INF))
     z = site.name("z")
 
@@ -175,7 +178,7 @@ def hysteresis(site: Site) -> list[Candidate]:
         loop = f"({site.v} - (abs({site.v})*{z} + {site.v}*abs({z}))/2)/{d.name}"
         return model.with_state(State(z), loop).with_term(site.v, f"-{b.name}*{z}")
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         from pikanid.mismatch.catalogue.recurrences import bouc_wen
 
         v = view.x[site.v]
@@ -185,11 +188,12 @@ def hysteresis(site: Site) -> list[Candidate]:
         found = []
         for share in (0.02, 0.06, 0.15, 0.4):
             path = bouc_wen(view.x[site.q] / (share * top))
-            found.append(Sign({b.name: 1.0, d.name: share * top}, force=-path, one_sided=True))
+            found.append(TangentDirection(
+                {b.name: 1.0, d.name: share * top}, force=-path, one_sided=True))
         return found
 
     return [Candidate(("hysteresis",), "hysteresis (Bouc-Wen)", f"-{b.name}*{z}", "dynamics", site,
-                      (b, d), extend, signs, variant="bouc_wen")]
+                      (b, d), extend, directions, variant="bouc_wen")]
 
 
 def boundary_layer(site: Site) -> list[Candidate]:
@@ -204,12 +208,12 @@ def boundary_layer(site: Site) -> list[Candidate]:
         model, half = model.with_half_derivative(site.v, site.name("layer"), band, 6)
         return model.with_term(site.v, -symbol(b.name) * half)
 
-    def signs(view: View) -> list[Sign]:
-        return [Sign({b.name: 1.0}, force=-_half_derivative(view.t, view.x[site.v]),
-                     one_sided=True)]
+    def directions(view: View) -> list[TangentDirection]:
+        return [TangentDirection({b.name: 1.0}, force=-_half_derivative(view.t, view.x[site.v]),
+                                 one_sided=True)]
 
     return [Candidate(("boundary_layer",), "boundary layer at the wall",
-                      f"-{b.name}*D^(1/2) {site.v}", "dynamics", site, (b,), extend, signs)]
+                      f"-{b.name}*D^(1/2) {site.v}", "dynamics", site, (b,), extend, directions)]
 
 
 def _half_derivative(t: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -233,7 +237,7 @@ def disturbance(site: Site) -> list[Candidate]:
     w = Parameter(site.name("width"), 0.3, "s", (0.01, 10.0))
     text = f"{a.name}/2*(1 + cos(2*pi*clip((t - {at.name})/{w.name}, -0.5, 0.5)))"
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         span = view.t[-1] - view.t[0]
         found = []
         step = float(np.median(np.diff(view.t)))
@@ -247,12 +251,14 @@ def disturbance(site: Site) -> list[Candidate]:
                 centres = np.sort(np.concatenate([centres, centres + 0.5 * np.pi / site.rate]))
             centres = centres[centres < last]
             humps = _humps(view.t.tobytes(), centres.tobytes(), 2 * width)
-            found += [Sign({a.name: 1.0, at.name: float(centre), w.name: 2 * width}, force=hump)
+            found += [TangentDirection(
+                {a.name: 1.0, at.name: float(centre), w.name: 2 * width}, force=hump)
                       for centre, hump in zip(centres, humps, strict=True)]
         return found
 
     return [Candidate(("disturbance",), "a force local in time", text, "dynamics", site, (a, at, w),
-                      lambda m: m.with_term(site.v, text), signs, per_recording=True, absent=True)]
+                      lambda m: m.with_term(site.v, text), directions, per_recording=True,
+                      absent=True)]
 
 
 # every hypothesis is tested along the same times
@@ -277,11 +283,11 @@ def initial_state(site: Site) -> list[Candidate]:
             site.q: model.state(site.q).initial + symbol(q.name),
             site.v: model.state(site.v).initial + symbol(v.name)})
 
-    def signs(view: View) -> Sequence[Sign]:
+    def directions(view: View) -> Sequence[TangentDirection]:
         still = np.zeros(len(view.t))
-        return [Sign({q.name: 1.0}, force=still, initial={site.q: 1.0}),
-                Sign({v.name: 1.0}, force=still, initial={site.v: 1.0})]
+        return [TangentDirection({q.name: 1.0}, force=still, initial={site.q: 1.0}),
+                TangentDirection({v.name: 1.0}, force=still, initial={site.v: 1.0})]
 
     return [Candidate(("initial_state",), "another initial state",
                       f"{site.q}(0) + {q.name}, {site.v}(0) + {v.name}", "dynamics", site, (q, v),
-                      extend, signs, per_recording=True)]
+                      extend, directions, per_recording=True)]

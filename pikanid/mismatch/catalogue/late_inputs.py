@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model.parts import Parameter
 
@@ -23,15 +23,15 @@ def input_delay(site: Site) -> list[Candidate]:
     for u in site.inputs:
         tau = Parameter(site.name("tau_in"), 0.0, "s", (0.0, float("inf")))
 
-        def signs(view: View, u: str = u, tau: Parameter = tau) -> Sequence[Sign]:
+        def directions(view: View, u: str = u, tau: Parameter = tau) -> Sequence[TangentDirection]:
             step = float(np.median(np.diff(view.t)))
-            return [Sign({tau.name: shift * step}, one_sided=True, push={
+            return [TangentDirection({tau.name: shift * step}, one_sided=True, push={
                 u: np.interp(view.t - shift * step, view.t, view.u[u]) - view.u[u]})
                 for shift in SHIFTS]
 
         found.append(Candidate(
             ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
             lambda m, u=u, tau=tau: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # defaults
-            signs, variant=u, twin="delay",
+            directions, variant=u, twin="delay",
             beside=() if len(site.inputs) > 1 else ("cross_axis",)))
     return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from pikanid.formula import units
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, State
@@ -36,16 +36,16 @@ def second_mode(site: Site) -> list[Candidate]:
             r, f"{a.name}*{u} - 2*{z2.name}*{w2.name}*{r} - {w2.name}**2*{q}")
         return model.map_output(o.name, function=f"{o.name} + {q}")
 
-    def signs(view: View) -> list[Sign]:
+    def directions(view: View) -> list[TangentDirection]:
         rates = site.rate * np.concatenate([np.geomspace(0.5, 0.85, 4), np.geomspace(1.15, 6, 26)])
         rates = rates[rates < 0.8 * np.pi / np.median(np.diff(view.t))]
-        return [Sign({a.name: 1.0, w2.name: float(w), z2.name: 0.02},
-                     seen=y) for w, y in zip(rates, _oscillators(
+        return [TangentDirection({a.name: 1.0, w2.name: float(w), z2.name: 0.02},
+                                 seen=y) for w, y in zip(rates, _oscillators(
                          view.t.tobytes(), view.u[u].tobytes(), rates.tobytes()), strict=True)]
 
     return [Candidate(("second_mode",), "a second mode",
                       f"{q}'' + 2*{z2.name}*{w2.name}*{q}' + {w2.name}^2*{q} = {a.name}*{u}",
-                      "dynamics", site, (a, w2, z2), extend, signs)]
+                      "dynamics", site, (a, w2, z2), extend, directions)]
 
 
 @functools.lru_cache(maxsize=8)

@@ -27,7 +27,7 @@ class Site:
         rate: Natural frequency at the guesses [rad/s]; 0 without a restoring force.
         rest: Whether the model starts in equilibrium.
         span: First and last time [s] of the first recording.
-        swing: Half the range of the output there, in its unit.
+        half_range: Half the range of the output there, in its unit.
         interval: Between its samples, as a rule [s].
         suffix: Distinguishes names where a model has several coordinates.
     """
@@ -41,7 +41,7 @@ class Site:
     rate: float
     rest: bool
     span: tuple[float, float]
-    swing: float
+    half_range: float
     interval: float
     suffix: str = ""
 

@@ -21,7 +21,7 @@ LONG = 4000  # samples below which none are put together
 FINE = 30  # samples a period that are kept
 ASIDE = 0.3  # of a recording that is set aside where there is no held-out one
 MOST = 25_000  # samples, put together where they may be, that a minute's diagnosis has time for
-EXACT = 1e-6  # of an output's swing: no simulation is compared with less noise
+EXACT = 1e-6  # of an output's half range: no simulation is compared with less noise
 FREEDOM = 20  # samples beyond the free parameters: a noise level read off them is 16 % uncertain
 LEAST = 300  # samples of an output that must be there for that
 
@@ -62,7 +62,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
             found[output.name] = loud_enough(level, own)
             if found[output.name] is not level:
                 notes.append(f"Recording '{recording.name}': noise of '{output.name}' below "
-                             f"{EXACT:.0e} of its swing counts as that.")
+                             f"{EXACT:.0e} of its half range counts as that.")
         done.append(recording)
         every.append(found)
     return Records(tuple(done), tuple(every))

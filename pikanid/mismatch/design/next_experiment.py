@@ -25,7 +25,13 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.design.profiles import Bounds, profiles, scaled
-from pikanid.mismatch.design.response import Seen, Sigma, Watch, joined, natural_frequency
+from pikanid.mismatch.design.response import (
+    Sigma,
+    Watch,
+    WhitenedResponse,
+    joined,
+    natural_frequency,
+)
 from pikanid.mismatch.design.separation import distance, mean_precision, refitted_within
 from pikanid.model import Model
 from pikanid.problem.arguments import a_model, several
@@ -36,7 +42,7 @@ from pikanid.uncertainty.information import covariance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Score = Callable[[Mapping[str, list[Seen]], Sequence[Recording]], float]
+Score = Callable[[Mapping[str, list[WhitenedResponse]], Sequence[Recording]], float]
 FINALISTS = 5  # candidates that are judged again after refitting simulations
 TELLS_APART = 4.0  # [σ] between a hypothesis and its best rival
 
@@ -150,13 +156,13 @@ def next_experiment(
     past = [] if isinstance(recorded, Sequence) and not recorded else list(several(recorded))
     models = {str(name): a_model(model) for name, model in hypotheses.items()}
     watch = Watch(models, sigma, workers)
-    known = watch.seen(past)
+    known = watch.responses(past)
 
-    def worst(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
+    def worst(new: Mapping[str, list[WhitenedResponse]], profiles: Sequence[Recording]) -> float:
         return min(distance([*known[a], *new[a]], [*known[b], *new[b]])
                    for a, b in permutations(models, 2))
 
-    def refit(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
+    def refit(new: Mapping[str, list[WhitenedResponse]], profiles: Sequence[Recording]) -> float:
         def nearest(b: str) -> float:
             watched = [watch.of(b, e) for e in (*past, *profiles)]
             return min(refitted_within([*known[a], *new[a]], watched) for a in models if a != b)
@@ -190,9 +196,10 @@ def d_optimal(
     past = [] if isinstance(recorded, Sequence) and not recorded else list(several(recorded))
     models = {model.name: model}
     watch = Watch(models, sigma)
-    known = watch.seen(past)
+    known = watch.responses(past)
 
-    def precision(new: Mapping[str, list[Seen]], profiles: Sequence[Recording]) -> float:
+    def precision(new: Mapping[str, list[WhitenedResponse]], profiles: Sequence[Recording]
+                  ) -> float:
         every = [*known[model.name], *new[model.name]]
         return mean_precision(joined(every).jacobian) if every else 0.0
 
@@ -203,7 +210,7 @@ def d_optimal(
 
 def _chosen(
     watch: Watch, purpose: Literal["separate", "parameters"], quick: Score,
-    full: Score, known: Mapping[str, list[Seen]], past: Sequence[Recording],
+    full: Score, known: Mapping[str, list[WhitenedResponse]], past: Sequence[Recording],
     candidates: Sequence[Recording], limits: Mapping[str, float],
 ) -> NextExperiment:
     """The best candidate, ready to run: all are ranked by `quick`, the first of them by `full`."""
@@ -227,7 +234,7 @@ def _chosen(
     else:
         _, usual, responses_to_it = tried[len(tried) // 2]
         repeated = full(responses_to_it, [usual])
-    nothing: dict[str, list[Seen]] = {name: [] for name in watch.models}
+    nothing: dict[str, list[WhitenedResponse]] = {name: [] for name in watch.models}
     before = full(nothing, []) if past else 0.0
     model = next(iter(watch.models.values()))
     std = _foretold(model, known, new) if purpose == "parameters" else {}
@@ -237,8 +244,8 @@ def _chosen(
         {name: responses[0].outputs for name, responses in new.items()}, std)
 
 
-def _foretold(model: Model, known: Mapping[str, list[Seen]],
-              new: Mapping[str, list[Seen]]) -> dict[str, float]:
+def _foretold(model: Model, known: Mapping[str, list[WhitenedResponse]],
+              new: Mapping[str, list[WhitenedResponse]]) -> dict[str, float]:
     """Standard errors of the shared free parameters after the experiment."""
     every = joined([*known[model.name], *new[model.name]])
     spread = np.sqrt(np.diag(covariance(every.jacobian, np.ones(len(every.low), bool))))
@@ -247,11 +254,11 @@ def _foretold(model: Model, known: Mapping[str, list[Seen]],
 
 
 def _within(watch: Watch, profile: Recording, limits: Mapping[str, float]
-            ) -> tuple[Recording, dict[str, Seen]]:
+            ) -> tuple[Recording, dict[str, WhitenedResponse]]:
     """The profile, made smaller until every model keeps to the limits, and the responses to it."""
     for _ in range(8):
         try:
-            responses = {name: found[0] for name, found in watch.seen([profile]).items()}
+            responses = {name: found[0] for name, found in watch.responses([profile]).items()}
         except errors.SimulationFailed:
             if not limits:
                 raise

@@ -25,7 +25,7 @@ COARSE = 16.0  # sub-steps of a sample beyond which a motion is too wild to plan
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class WhitenedResponse:
     """A model's response to one excitation, at its own parameter values.
 
     Attributes:
@@ -74,14 +74,14 @@ class Watched:
         self.simulator = Translated(model, self.problem.experiments[0])
         self.spread = np.concatenate([np.asarray(s.sigma, float) for s in self.samples])
         self.steps: Steps | None = None
-        self.kept: dict[bytes, Seen] = {}  # at the model's own values, and the last one
+        self.kept: dict[bytes, WhitenedResponse] = {}  # at the model's own values, and the last one
 
     @property
     def samples(self) -> tuple[Samples, ...]:
         """Where and how well each output is seen."""
         return self.problem.experiments[0].samples
 
-    def at(self, theta: Array) -> Seen:
+    def at(self, theta: Array) -> WhitenedResponse:
         """The response at free parameters θ (p,).
 
         Raises:
@@ -93,7 +93,7 @@ class Watched:
             self.kept = {k: s for k, s in self.kept.items() if k == own} | {key: found}
         return self.kept[key]
 
-    def _simulated(self, theta: Array) -> Seen:
+    def _simulated(self, theta: Array) -> WhitenedResponse:
         p = self.problem.parameters(theta, 0)
         inside, order = self.problem.columns(0)
         self.steps = self.steps or self._chosen_steps(p)
@@ -106,7 +106,7 @@ class Watched:
         outputs = {self.model.outputs[s.output].name: (s.t, values) for s, values in zip(
             self.samples, np.split(response.y, ends), strict=True)}
         own = np.array([f.recording is not None for f in self.problem.free], bool)
-        return Seen(response.y / self.spread, jacobian, self.problem.lower - theta,
+        return WhitenedResponse(response.y / self.spread, jacobian, self.problem.lower - theta,
                     self.problem.upper - theta, own, outputs)
 
     def _chosen_steps(self, p: Array) -> Steps:
@@ -117,13 +117,13 @@ class Watched:
         return steps
 
 
-def seen(model: Model, excitation: Recording, sigma: Sigma = None) -> Seen:
+def response(model: Model, excitation: Recording, sigma: Sigma = None) -> WhitenedResponse:
     """The response of a model at its own values; arguments and errors as for `Watched`.
 
     >>> from pikanid.recording import excitation
     >>> from pikanid.model import systems
-    >>> response = seen(systems.sloshing(), excitation.two_pulse(), sigma=0.1*np.pi/180)
-    >>> response.y.shape, response.jacobian.shape, round(response.reached("theta"), 3)
+    >>> found = response(systems.sloshing(), excitation.two_pulse(), sigma=0.1*np.pi/180)
+    >>> found.y.shape, found.jacobian.shape, round(found.reached("theta"), 3)
     ((501,), (501, 2), 0.198)
     """
     watched = Watched(model, excitation, sigma)
@@ -150,7 +150,7 @@ class Watch:
             self.kept[key] = excitation, Watched(self.models[name], excitation, self.sigma)
         return self.kept[key][1]
 
-    def seen(self, excitations: Sequence[Recording]) -> dict[str, list[Seen]]:
+    def responses(self, excitations: Sequence[Recording]) -> dict[str, list[WhitenedResponse]]:
         """Name of a model -> its responses at its own values."""
         return self.of_each(lambda name: [w.at(w.problem.guess) for w in (
             self.of(name, e) for e in excitations)])
@@ -161,7 +161,7 @@ class Watch:
         return dict(zip(names, side_by_side(names, work, self.workers), strict=True))
 
 
-def joined(responses: Sequence[Seen]) -> Seen:
+def joined(responses: Sequence[WhitenedResponse]) -> WhitenedResponse:
     """Responses of one model to several excitations, as one: shared parameters share a column."""
     first = responses[0]
     shared = ~first.own
@@ -179,8 +179,8 @@ def joined(responses: Sequence[Seen]) -> Seen:
 
     own = np.concatenate([np.zeros(shared.sum(), bool),
                           np.ones(int(first.own.sum()) * len(responses), bool)])
-    return Seen(np.concatenate([r.y for r in responses]), np.vstack(blocks), repeated("low"),
-                repeated("high"), own, {})
+    return WhitenedResponse(np.concatenate([r.y for r in responses]), np.vstack(blocks),
+                            repeated("low"), repeated("high"), own, {})
 
 
 def natural_frequency(model: Model) -> float | None:

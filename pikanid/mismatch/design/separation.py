@@ -15,13 +15,13 @@ import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
 from pikanid import errors
-from pikanid.mismatch.design.response import Seen, Sigma, Watched, joined
+from pikanid.mismatch.design.response import Sigma, Watched, WhitenedResponse, joined
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 
 
-def distance(true: Sequence[Seen], rival: Sequence[Seen]) -> float:
+def distance(true: Sequence[WhitenedResponse], rival: Sequence[WhitenedResponse]) -> float:
     """D [σ] of a rival from the truth over the same excitations; 0 without any."""
     if not rival:
         return 0.0
@@ -30,7 +30,7 @@ def distance(true: Sequence[Seen], rival: Sequence[Seen]) -> float:
     return float(np.linalg.norm(unexplained(r, other.jacobian, other.low, other.high)))
 
 
-def refitted(true: Sequence[Seen], model: Model, excitations: Sequence[Recording],
+def refitted(true: Sequence[WhitenedResponse], model: Model, excitations: Sequence[Recording],
              sigma: Sigma = None, evaluations: int = 12) -> float:
     """D [σ] of a rival from the truth over excitations, after refitting its simulation.
 
@@ -42,8 +42,8 @@ def refitted(true: Sequence[Seen], model: Model, excitations: Sequence[Recording
     return refitted_within(true, [Watched(model, e, sigma) for e in excitations], evaluations)
 
 
-def refitted_within(true: Sequence[Seen], watched: Sequence[Watched], evaluations: int = 12
-                    ) -> float:
+def refitted_within(true: Sequence[WhitenedResponse], watched: Sequence[Watched],
+                    evaluations: int = 12) -> float:
     """As `refitted`, with the rival in every experiment; these may be used again."""
     target = np.concatenate([a.y for a in true])
     start = watched[0].problem.guess

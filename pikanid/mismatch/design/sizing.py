@@ -95,7 +95,7 @@ def sized(candidate: Candidate, screen: Screen, own: np.ndarray, wanted: float, 
     Returns:
         The closest size that was found, or None where none can be simulated.
     """
-    signs, lengths = screen.found.signs, screen.lengths
+    signs, lengths = screen.found.directions, screen.lengths
     own = own[lengths[own] > 0]
     scaling = signs[own[0]].scales
     name = _size_of(candidate, [signs[k].start for k in own], scaling)

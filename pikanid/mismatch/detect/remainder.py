@@ -1,4 +1,4 @@
-"""Tests of what a fit leaves, against everything that the catalogue and its guards would show."""
+"""Tests of what a fit leaves, against everything that the catalogue and its decoys would show."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_ROWS = 6000  # of a residual that is tested as it is
 
 def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
                    candidates: tuple[Candidate, ...], rate: float, seed: int = 0) -> Detection:
-    """Test the residual of a fit against everything that the catalogue and its guards would show.
+    """Test the residual of a fit against everything that the catalogue and its decoys would show.
 
     r and J may have more rows than there are samples: those of a prior.
     """

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.model import Model
 from pikanid.problem.evaluated import paths
@@ -35,12 +35,12 @@ class Directions:
     D: np.ndarray
     candidates: tuple[Candidate, ...]
     owner: np.ndarray
-    signs: tuple[Sign, ...]
+    directions: tuple[TangentDirection, ...]
 
     @property
     def one_sided(self) -> np.ndarray:
         """(m,) whether only positive amplitudes make sense."""
-        return np.array([s.one_sided for s in self.signs], bool)
+        return np.array([s.one_sided for s in self.directions], bool)
 
 
 def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candidate]
@@ -51,14 +51,14 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
     """
     blocks: list[np.ndarray] = []
     places: list[list[tuple[int, int]]] = []
-    known: dict[tuple[int, int], Sign] = {}
+    known: dict[tuple[int, int], TangentDirection] = {}
     several = len(whitened.simulators) > 1
     chosen = [c for c in candidates if not (several and c.per_recording)]
     for r, response in enumerate(whitened.responses(theta, states=True)):
         line = Tangent(whitened, theta, r, response.states)
         with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
             listed = {(k, n): s for k, c in enumerate(chosen) for n, s in enumerate(
-                c.signs(line.view))}
+                c.directions(line.view))}
             blocks.append(whitened.whiten(r, line.columns(
                 [(chosen[k], s) for (k, _), s in listed.items()])))
         places.append(list(listed))
@@ -148,13 +148,13 @@ class Tangent:
                     {o.name: y[:, i] for i, o in enumerate(self.model.outputs)},
                     {o.name: rate[:, i] for i, o in enumerate(self.model.outputs)}, force)
 
-    def columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
+    def columns(self, listed: Sequence[tuple[Candidate, TangentDirection]]) -> np.ndarray:
         """δy (rows, m) of every sign; a few at a time, to keep long recordings in memory."""
         together = min(TOGETHER, max(CELLS // len(self.t), 1))
         parts = [self._columns(listed[k:k + together]) for k in range(0, len(listed), together)]
         return np.concatenate(parts, axis=1) if parts else np.empty((len(self.stop), 0))
 
-    def _columns(self, listed: Sequence[tuple[Candidate, Sign]]) -> np.ndarray:
+    def _columns(self, listed: Sequence[tuple[Candidate, TangentDirection]]) -> np.ndarray:
         L, n, m = len(self.t), self.x.shape[1], len(listed)
         force, start = np.zeros((L, n, m)), np.zeros((n, m))
         seen = np.zeros((L, len(self.model.outputs), m))

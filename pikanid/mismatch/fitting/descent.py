@@ -10,14 +10,14 @@ from operator import lt
 
 import numpy as np
 
-from pikanid.mismatch.catalogue.candidate import Candidate, Sign
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.data.whitened import GROSS, Whitened, allowance
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.least_squares import Minimum, minimise
 
 WILD = 1000.0  # times the closest χ², and that of the noise: starts above both are given up
 GLANCE = 1e4  # χ² per row that is good enough to see that
-HILLS = 4  # times that a minimum is left over a hill, if that leads lower
+HOPS = 4  # times that a minimum is left over a hill, if that leads lower
 RENEWED = 3  # times that a fit goes on with finer steps
 TOLERATED = 2.0  # times the error that steps are chosen for, before they are chosen again
 COARSE = 5  # iterations that each of several starts gets before the best one goes on
@@ -33,7 +33,7 @@ class Start:
     origin: Mapping[str, float]
 
 
-def start_from(candidate: Candidate, sign: Sign, amplitude: float,
+def start_from(candidate: Candidate, sign: TangentDirection, amplitude: float,
                values: Mapping[str, float]) -> Start:
     """Where a fit with one more effect begins; `values` are those of the other parameters."""
     start = {**values, **sign.start}
@@ -111,17 +111,17 @@ def _fine(error: float, misfit: Callable[[float], float], chi2: float) -> bool:
     return error <= TOLERATED * allowance(misfit(chi2))
 
 
-def over_hills(whitened: Whitened, best: Minimum, effect: Candidate, limit: int) -> Minimum:
+def basin_hopping(whitened: Whitened, best: Minimum, effect: Candidate, limit: int) -> Minimum:
     """The lowest of the minima that steps in one parameter lead to, from the lowest so far; what
     acts once rings alike half a period earlier or later, the other way round.
     """
     problem = whitened.problem
     first, *more = ([k for k, f in enumerate(problem.free) if f.name == p.name]
                     for p in effect.parameters)
-    steps = [(share, 0.0) for share in effect.hills]
+    steps = [(share, 0.0) for share in effect.other_minima]
     if effect.absent and effect.site.rate:
         steps += [(-1.0, side * np.pi / effect.site.rate) for side in (-1, 1)]
-    for _ in range(HILLS):
+    for _ in range(HOPS):
         found = []
         for share, later in steps:
             theta = best.theta.copy()

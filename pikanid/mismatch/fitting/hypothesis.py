@@ -11,9 +11,16 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.data.whitened import CERTAIN, GROSS, Records, Whitened
 from pikanid.mismatch.fitting.closest import Closest
-from pikanid.mismatch.fitting.descent import Start, descended, over_hills, per_row, place, renewed
+from pikanid.mismatch.fitting.descent import (
+    Start,
+    basin_hopping,
+    descended,
+    per_row,
+    place,
+    renewed,
+)
 from pikanid.mismatch.fitting.least_squares import Minimum
-from pikanid.mismatch.fitting.progressive_horizon import grown, hits, lost
+from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
 from pikanid.model import Model
 
 LIMIT = 30  # iterations of a fit
@@ -150,16 +157,17 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         return closest.ask(lambda chi2: size > FAR * (chi2 + rows))
 
     best = descended(whitened, starts, closest, limit, beyond)
-    hilly = [e for e in effects if (e.hills or e.absent) and e.key not in settled]
-    astray = hits(hilly) and bool(starts) and (
+    hilly = [e for e in effects if (e.other_minima or e.absent) and e.key not in settled]
+    failed_search = hits(hilly) and bool(starts) and (
         best is None or (lost(best.chi2, rows) and (
             len(effects) == 1 or not beyond(best.chi2))))
-    whole = grown(whitened, hilly, place(whitened, starts[0])) if astray else None
+    whole = progressive_horizon(
+        whitened, hilly, place(whitened, starts[0])) if failed_search else None
     if whole is not None and (best is None or whole.chi2 < best.chi2):
         best = whole
     elif best is not None and not beyond(best.chi2):
         for effect in hilly:
-            best = over_hills(whitened, best, effect, limit)
+            best = basin_hopping(whitened, best, effect, limit)
     if hilly:
         best = renewed(whitened, best, closest, limit, beyond)
     if best is None:

@@ -49,7 +49,7 @@ def side_by_side(jobs: Sequence[Job], work: Callable[[Job], Result], workers: in
         return list(pool.map(work, jobs))
 
 
-def in_turn(
+def ordered_parallel_map(
         jobs: Sequence[Job], state: Callable[[], State], work: Callable[[Job, State], Result],
         take: Callable[[Job, Result], None], go_on: Callable[[], bool], workers: int,
         stands: Callable[[Result, State], bool] = lambda result, state: False) -> None:
@@ -69,7 +69,7 @@ def in_turn(
         stands: Whether a result is what the job would give in another state, too.
 
     >>> best = [9]
-    >>> in_turn([5, 7, 2], lambda: best[0], lambda job, least: min(job, least),
+    >>> ordered_parallel_map([5, 7, 2], lambda: best[0], lambda job, least: min(job, least),
     ...         lambda job, result: best.__setitem__(0, result), lambda: True, 2)
     >>> best
     [2]

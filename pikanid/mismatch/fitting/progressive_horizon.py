@@ -55,7 +55,7 @@ def besides(whitened: Whitened, known: Known) -> Evaluate:
     return evaluate
 
 
-def grown(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
+def progressive_horizon(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
           known: Known = nothing) -> Minimum | None:
     """Minimise χ² of longer and longer beginnings, and of the whole in the end.
 
@@ -102,7 +102,7 @@ def _fitted(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray, kno
             found is not None and found.chi2 > HOPELESS * part.rows):
         return found
     for effect in effects:
-        for factor in effect.hills:
+        for factor in effect.other_minima:
             beside = theta.copy()
             beside[_place(part, effect.parameters[0].name)] *= factor
             if explained(beside, HURRIED):

@@ -23,7 +23,7 @@ from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 
 DRIVEN_ALIKE = 0.01  # of an input's r.m.s.: larger differences drive another experiment
-MOVED_ALIKE = 0.2  # of an output's swing: beyond it the same missing law leaves something else
+MOVED_ALIKE = 0.2  # of an output's half range: beyond it the same missing law leaves something else
 COVERED = 0.8  # of the longest repeat that the shortest has to last
 MODES = 800  # of a residual that are told apart
 WIDER = 1.25  # ratio of the frequencies between which a spectrum counts as flat

@@ -73,7 +73,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             if o is None:
                 continue
             a, b = predict(h), predict(o)
-            later = 0.0 if a is None or b is None else max(b.evidence - a.evidence, 0.0)
+            later = 0.0 if a is None or b is None else max(b.deviance - a.deviance, 0.0)
             first = (o.minimum.chi2 - h.minimum.chi2) / scale
             if below(first, FOUND):
                 return f"the recording itself hardly shows {e.name}"
@@ -93,7 +93,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
 def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float = 0.0) -> bool:
     """Whether held-out recordings speak for one hypothesis rather than another, by a `margin`."""
     a, b = predict(one), predict(other)
-    return a is not None and b is not None and below(a.evidence, b.evidence - margin)
+    return a is not None and b is not None and below(a.deviance, b.deviance - margin)
 
 
 def _worth(effect: Candidate, with_it: HeldOut | None, without: HeldOut | None) -> float:

@@ -15,7 +15,7 @@ from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, extended
 from pikanid.mismatch.fitting.least_squares import Minimum, held, minimise
-from pikanid.mismatch.fitting.progressive_horizon import besides, grown, rough
+from pikanid.mismatch.fitting.progressive_horizon import besides, progressive_horizon, rough
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit, room
 from pikanid.model import Model
@@ -34,7 +34,7 @@ class HeldOut:
         misfit: Root mean square of the residual of all outputs, in units of their noise.
         tested, tested_together: Make `detection` and `together`.
         chi2: Of the residual with that forgiveness.
-        evidence: -2 ln of the probability density of the recording, given the fit (up to a
+        deviance: -2 ln of the probability density of the recording, given the fit (up to a
             constant that all hypotheses share).
         predicted, measured, t: First output.
         moved, rmse_moved: The same prediction, and the RMSE of each output, with the parameters
@@ -51,7 +51,7 @@ class HeldOut:
     tested: Callable[[], Detection]
     tested_together: Callable[[], Detection | None]
     chi2: float
-    evidence: float
+    deviance: float
     t: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
@@ -155,7 +155,7 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
     found = suited(prior, guess)
     suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects)
     if suits and found is not None and rough(found.chi2, whitened.rows, effects):
-        whole = grown(whitened, effects, guess, functools.partial(known, prior))
+        whole = progressive_horizon(whitened, effects, guess, functools.partial(known, prior))
         found = min(found, whole or found, key=lambda m: m.chi2)
     for _ in range(AGAIN):
         if found is None or prior.distance(found.theta[shared]) < NEAR:
@@ -284,7 +284,7 @@ def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> 
         for chi2 in sorted(seen)[:AGAIN]:
             theta, name = seen[chi2], effect.parameters[0].name
             size = next(v for f, v in zip(problem.free, theta, strict=True) if f.name == name)
-            beside = [at(theta, {name: share * size}) for share in (1.0, *effect.hills)]
+            beside = [at(theta, {name: share * size}) for share in (1.0, *effect.other_minima)]
             theta = min(beside, key=whitened.chi2)
             if whitened.choose_steps(theta):
                 other = minimise(whitened.residual, theta, problem.lower, problem.upper, 25)

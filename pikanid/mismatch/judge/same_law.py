@@ -11,7 +11,7 @@ from pikanid.mismatch.search.screen import EXPONENTS
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
 WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
 OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
-NARROW = 0.03  # of the swing: a loop no wider is dry friction that gives a little before it slips
+NARROW = 0.03  # of the half range: a loop no wider is dry friction that gives before it slips
 
 
 def integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
@@ -82,6 +82,6 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
                 table[e.key] += ("power_drag",)
                 absorbed.add(power.key)
             if leader is h and e.ids[0] == "hysteresis" and e.channel == "dynamics" and (
-                    h.values[e.parameters[1].name] < NARROW * e.site.swing):
+                    h.values[e.parameters[1].name] < NARROW * e.site.half_range):
                 table[e.key] += ("coulomb_friction",)
     return [h for h in first.values() if h.key not in absorbed], twins

@@ -191,7 +191,7 @@ def _handicapped(h: Hypothesis, scale: float) -> float:
 
 def criterion(h: Hypothesis, predicted: HeldOut | None, scale: float) -> float:
     """The criterion over the recording and the held-out one, where there is one."""
-    return _handicapped(h, scale) + (0.0 if predicted is None else predicted.evidence / scale)
+    return _handicapped(h, scale) + (0.0 if predicted is None else predicted.deviance / scale)
 
 
 def _most_probable_first(given: Sequence[Hypothesis], predict: Predict, scale: float

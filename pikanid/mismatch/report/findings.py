@@ -44,10 +44,10 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Explanation:
-    """A hypothesis: effects, probability among those considered, model, tests."""
+    """A hypothesis: effects, weight among those considered, model, tests."""
 
     effects: tuple[NamedEffect, ...]
-    probability: float
+    relative_weight: float
     model: Model
     score: float
     p_train: float | None

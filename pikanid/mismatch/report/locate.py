@@ -80,7 +80,7 @@ def smallest(base: Hypothesis, candidates: Sequence[Candidate]) -> dict[str, Val
     found = directions(base.whitened, base.minimum.theta, [c for c in candidates if c.known])
     _, lengths = unit_columns(found.D, base.minimum.J)
     sizes: dict[str, Value] = {}
-    for owner, sign, length in zip(found.owner, found.signs, lengths, strict=True):
+    for owner, sign, length in zip(found.owner, found.directions, lengths, strict=True):
         candidate = found.candidates[owner]
         if length > 0 and sign.scales and candidate.parameters and sign.start:
             name = next(iter(sign.start))

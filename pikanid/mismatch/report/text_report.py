@@ -14,7 +14,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
         spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time[:6])
         lines.append(f"Where: {place}" + (f"; in time at {spans}" if spans else ""))
     for h in dx.hypotheses:
-        lines.append(f"What: {h.title} (probability {h.probability:.2f})")
+        lines.append(f"What: {h.title} (relative weight {h.relative_weight:.2f})")
         for e in h.effects:
             lines.append(f"  {e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():

@@ -9,7 +9,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.least_squares import repeated
 
 
-def what_counts(fits: Iterable[Hypothesis]) -> float:
+def overdispersion(fits: Iterable[Hypothesis]) -> float:
     """That of the closest fit per degree of freedom, at least one.
 
     What a misfit leaves is no white noise: neighbouring rows say the same, and an effect that

@@ -150,14 +150,14 @@ class Screen:
             if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < FAINT and listed):
                 break
             candidate = self.found.candidates[k]
-            signs = several[k] if len(candidate.parameters) > 1 or not self.found.signs[
+            signs = several[k] if len(candidate.parameters) > 1 or not self.found.directions[
                 several[k][0]].scales else several[k][:1]
             starts: list[Start | Mapping[str, float]] = [
                 self._start(candidate, s, self.z[s]) for s in signs]
             if law(candidate):
                 starts += self._instead(signs[0])
             listed.append((candidate, starts))
-        # guards beside the entries, not in their place
+        # decoys beside the entries, not in their place
         known = [one for one in listed if one[0].known][:count]
         # where no start is better than another, each has to be followed to its end
         known += [(c, [start]) for k, c in enumerate(self.found.candidates)
@@ -172,7 +172,7 @@ class Screen:
             points = [self.about.point, *([{**self.about.point, **self.guess}] * bool(self.guess))]
             return [best_level(self.about, c, point) for point in points]
         own = np.flatnonzero((self.found.owner == candidate) & (self.lengths > 0))
-        levels = [int(k) for k in own if not self.found.signs[k].scales]
+        levels = [int(k) for k in own if not self.found.directions[k].scales]
         some = levels[::-2][:3] if len(levels) > 3 else levels
         if some:
             return [self._start(c, k, 0.0) for k in some]
@@ -181,8 +181,8 @@ class Screen:
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
         size = float(amplitude / self.lengths[sign])
-        start = start_from(candidate, self.found.signs[sign], size, self.about.point)
-        if not self.found.signs[sign].scales:
+        start = start_from(candidate, self.found.directions[sign], size, self.about.point)
+        if not self.found.directions[sign].scales:
             return start
         moved = {n: self.about.point[n] - size * float(d)
                  for n, d in zip(self.names, self.taken[:, sign], strict=True)}
@@ -201,7 +201,7 @@ class Screen:
             size = MOSTLY * float(np.min(np.abs(here / moves), initial=np.inf, where=moves != 0))
         if not np.isfinite(size):
             return []
-        name = next(iter(self.found.signs[sign].start))
+        name = next(iter(self.found.directions[sign].start))
         return [{**self.about.point, name: size,
                  **dict(zip(self.names, (here - size * moves).tolist(), strict=True))}]
 

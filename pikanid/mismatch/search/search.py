@@ -15,7 +15,7 @@ from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below, in_order
 from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import FAR, Hypothesis, fitted
-from pikanid.mismatch.fitting.parallel import in_turn
+from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
 from pikanid.mismatch.search.neighbours import (
     Job,
@@ -30,7 +30,7 @@ from pikanid.mismatch.search.neighbours import (
     with_wider,
     without_one,
 )
-from pikanid.mismatch.search.overdispersion import what_counts
+from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, law, nothing
 from pikanid.model import Model
 
@@ -58,13 +58,13 @@ class Search:
     Attributes:
         nominal: Model, at its refitted parameters.
         records: To explain.
-        candidates: Entries of the catalogue and guards.
+        candidates: Entries of the catalogue and decoys.
         tell: Called with what is being done.
         predicts: Whether the second hypothesis is worth its effects beyond the first one, as far as
             other recordings say.
         fits: The closest fit of each set of effects.
         begun: Where fits have begun.
-        astray: Effects that were looked for beyond all hills, and explained nothing.
+        failed_searches: Effects that were looked for beyond all hills, and explained nothing.
         guess: Parameters that the nominal model was given with.
         workers: Threads that fit side by side; the results do not depend on their number.
     """
@@ -77,12 +77,12 @@ class Search:
     guess: Mapping[str, float] = field(default_factory=dict)
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     begun: set[object] = field(default_factory=set)
-    astray: set[frozenset[str]] = field(default_factory=set)
+    failed_searches: set[frozenset[str]] = field(default_factory=set)
     spent: float = 0.0
     workers: int = 1
 
     @property
-    def tired(self) -> bool:
+    def budget_exhausted(self) -> bool:
         """Whether so much has been simulated that what has been found must do."""
         return self.spent > EFFORT
 
@@ -126,7 +126,7 @@ class Search:
         for count in range(1, MOST):
             if not adequate(best := self.ranked()[0]):
                 self._fit_all([*afresh(best)], again=True)
-            if adequate(best := self.ranked()[0]) or self.tired:
+            if adequate(best := self.ranked()[0]) or self.budget_exhausted:
                 break
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
@@ -148,7 +148,7 @@ class Search:
                 self._fit_all([job for job in with_wider(h, self.candidates)
                                if all(e.known for e in job[0])], always=True)
         best = self.ranked()[0]
-        if any(e.hills for e in best.effects) and not adequate(best):
+        if any(e.other_minima for e in best.effects) and not adequate(best):
             best = self._fit(best.effects, [best.point], again=True)  # hills left for later
         if adequate(best):
             # what a test of everything misses may still be worth its penalty, or nearly
@@ -158,11 +158,12 @@ class Search:
                 self._exchange(h)
             for h in self.ranked()[:NEAR]:
                 # fewer effects that explain almost as much may do with another one
-                if 0 < len(h.effects) < len(best.effects) and not self.tired and not adequate(h) \
+                if 0 < len(h.effects) < len(best.effects) and not self.budget_exhausted and not \
+                        adequate(h) \
                         and below(h.score(self.scale()), best.score(self.scale()) + 2 * CLOSE):
                     self._extend(h, MORE)
             self._simplify()
-        # however tired, no name without the laws that keep wrong ones away, of its parts as well
+        # even without budget, no name without the laws that keep wrong ones away, of parts as well
         parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
         for h in (*parts, *self._contenders()):
             for job in with_wider(h, self.candidates):
@@ -173,7 +174,7 @@ class Search:
         """The hypotheses that score about as well as the best."""
         scale, ranked = self.scale(), self.ranked()
         for h in ranked[:NEAR]:
-            if below(h.score(scale), ranked[0].score(scale) + CLOSE) and not self.tired:
+            if below(h.score(scale), ranked[0].score(scale) + CLOSE) and not self.budget_exhausted:
                 yield h
 
     def _simplify(self) -> None:
@@ -187,7 +188,7 @@ class Search:
         for _ in range(MOST):
             best = self.ranked()[0]
             self._fit_all([*without_one(best), *with_simpler(best, self.candidates)], again=True,
-                          always=True, settled=best.key if self.tired else frozenset())
+                          always=True, settled=best.key if self.budget_exhausted else frozenset())
             if self.ranked()[0] is best:
                 break
 
@@ -221,7 +222,8 @@ class Search:
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
-        new = replace(self, records=records, fits={}, begun=set(), astray=set(self.astray))
+        new = replace(self, records=records, fits={}, begun=set(),
+                      failed_searches=set(self.failed_searches))
         new.base()
         ranked = self.ranked()
         near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
@@ -237,7 +239,7 @@ class Search:
 
     def scale(self) -> float:
         """What χ² counts for."""
-        return what_counts(self.fits.values())
+        return overdispersion(self.fits.values())
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
@@ -262,19 +264,19 @@ class Search:
     def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False,
                  reach: float = 0.0, settled: frozenset[str] = frozenset()) -> None:
         """Fit these effects from these starts, one after the other, and keep what is better; what
-        is known is fitted `again` only, and nothing once the search is tired, except `always`.
+        is known is fitted `again` only, and nothing once the budget is exhausted, except `always`.
         Fits far above the closest one, and above `reach` [χ²], are given up; effects that are
         `settled` are not looked for beyond hills.
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
-        astray = frozenset(self.astray)
+        failed = frozenset(self.failed_searches)
 
         def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
             (effects, starts), closest = job, Closest(chi2)
             effects = sorted(effects, key=lambda e: order[e.key])
             key = frozenset(e.key for e in effects)
             return fitted(self.nominal, effects, self.records, starts, self.choices, closest,
-                          key if key in astray else settled), closest
+                          key if key in failed else settled), closest
 
         def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
             found, _ = result
@@ -282,7 +284,7 @@ class Search:
             key = frozenset(e.key for e in job[0])
             self.begun.add(signature(job))
             if found and hits(found.effects) and lost(found.minimum.chi2, found.whitened.rows):
-                self.astray.add(key)
+                self.failed_searches.add(key)
             if found and (key not in self.fits
                           or below(found.minimum.chi2, self.fits[key].minimum.chi2 - EQUAL)):
                 self.fits[key] = found
@@ -290,8 +292,8 @@ class Search:
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])
                 and (again or frozenset(e.key for e in job[0]) not in self.fits)
                 and signature(job) not in self.begun]  # from there it would end there again
-        in_turn(jobs, lambda: max(self._closest_chi2(), reach), work, take,
-                lambda: always or not self.tired, self.workers,
+        ordered_parallel_map(jobs, lambda: max(self._closest_chi2(), reach), work, take,
+                lambda: always or not self.budget_exhausted, self.workers,
                 lambda result, chi2: result[1].stands(chi2))
 
     def _closest_chi2(self) -> float:

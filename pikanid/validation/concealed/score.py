@@ -61,7 +61,7 @@ class Score:
             method could know), `part` of the truth, `extra` effects besides it, `near` (the entry
             that the hidden law resembles), `nothing` is hidden, or `other`.
         hypotheses: How many were given.
-        probability: Of the most probable one; None where nothing is answered.
+        relative_weight: Of the most probable one; None where nothing is answered.
         first_is_truth: Whether that one is the truth, its visible part, or a formula of its kind.
         within: Whether each base parameter lies within 3 standard errors of the truth; None where
             none is compared.
@@ -77,7 +77,7 @@ class Score:
     outcome: Outcome
     reason: str
     hypotheses: int
-    probability: float | None
+    relative_weight: float | None
     first_is_truth: bool
     within: bool | None
     held_out: float | None
@@ -137,7 +137,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
     ...          "visibility": {"nominal": 40.0, "effects": [40.0],
     ...                         "best_rival": [], "best_rival_distance": 9.0}}
     >>> answer = {"verdict": "named", "mismatch": True, "hypotheses": [
-    ...     {"effects": [{"ids": ["sensor_delay"]}], "probability": 0.97}]}
+    ...     {"effects": [{"ids": ["sensor_delay"]}], "relative_weight": 0.97}]}
     >>> judge(truth, answer).outcome
     'right'
     """
@@ -192,11 +192,12 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
 def reliability(scores: Iterable[Score],
                 edges: Sequence[float] = (0.0, 0.5, 0.7, 0.9, 0.97, 1.0),
                 ) -> list[tuple[float, Share]]:
-    """For each interval of stated probability that occurs: its mean, and how often it was true.
+    """For each interval of stated weight that occurs: its mean, and how often it was true.
 
     Only the most probable hypothesis of each answer counts.
     """
-    stated = [(s.probability, s.first_is_truth) for s in scores if s.probability is not None]
+    stated = [(s.relative_weight, s.first_is_truth) for s in scores
+              if s.relative_weight is not None]
     rows = []
     for low, high in pairwise(edges):
         inside = [(p, hit) for p, hit in stated
