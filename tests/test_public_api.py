@@ -14,9 +14,9 @@ import pytest
 import pikanid as pk
 
 PACKAGE = Path(pk.__file__).parent
-# Pieces of generated modules are no modules; a function of errors.py is its own sentence.
+# Pieces of generated modules are no modules; a function of errors/ is its own sentence.
 FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent.name != "kernels"]
-SENTENCES = PACKAGE / "errors.py"
+SENTENCES = PACKAGE / "errors"
 
 # Methods that another library calls by these names and documents.
 PROTOCOL = {"eval", "fdiff"}
@@ -75,7 +75,7 @@ def test_every_public_symbol_has_a_docstring(path: Path) -> None:
         for node in _public(tree.body)
         if not ast.get_docstring(node)
         and node.name not in PROTOCOL
-        and not (path == SENTENCES and isinstance(node, ast.FunctionDef))
+        and not (path.parent == SENTENCES and isinstance(node, ast.FunctionDef))
     ]
     if not ast.get_docstring(tree) and tree.body:
         bare.insert(0, f"{path.name} itself")

@@ -1,0 +1,29 @@
+"""What can be wrong with an estimate."""
+
+from __future__ import annotations
+
+
+def undetermined(name: str, value: float, std: float) -> str:
+    return (
+        f"The recording does not determine '{name}': its standard error ({std:.2g}) is far larger "
+        f"than its value ({value:.3g}).  Fix it, or excite what depends on it."
+    )
+
+
+def estimate_file(path: str, detail: str) -> str:
+    return f"The estimate file '{path}' cannot be read: {detail}."
+
+
+def sigma_unknown(output: str) -> str:
+    return f"The noise of output '{output}' is not known: pass sigma, in the output's unit."
+
+
+def no_influence(name: str) -> str:
+    return f"'{name}' has no influence on what was measured: fix it, or measure something else."
+
+
+def unidentifiable(combination: str, condition: float) -> str:
+    return (
+        f"The data do not determine the combination {combination} (condition {condition:.1g}): "
+        "fix one of these parameters or excite the system differently."
+    )

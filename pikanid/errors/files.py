@@ -1,0 +1,171 @@
+"""What can be wrong with a file, and with what one holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pikanid.errors.wording import listed, short
+
+
+def detail_no_path(kind: str) -> str:
+    return f"the path of a file is needed, not a {kind}"
+
+
+def no_path(kind: str) -> str:
+    return f"The path of a file is needed, not a {kind}."
+
+
+def no_file(path: str) -> str:
+    return f"There is no file '{short(path, 200)}'."
+
+
+def is_folder(path: str) -> str:
+    return f"'{path}' is a folder; give one of the files in it."
+
+
+def cannot_open(where: str, reason: str) -> str:
+    return f"'{where}' cannot be opened: {reason or 'the system refuses'}."
+
+
+def cannot_write(path: str, reason: str) -> str:
+    return f"'{path}' cannot be written: {reason or 'the system refuses'}."
+
+
+def empty_file(where: str) -> str:
+    return f"'{where}' is empty."
+
+
+def unknown_ending(where: str, known: Iterable[str]) -> str:
+    return f"'{where}': the ending of the name tells no known format (known: {listed(known)})."
+
+
+def wrong_ending(where: str, actual: str, wanted: str) -> str:
+    return f"'{where}' is {actual}, not {wanted} as its name says: rename it."
+
+
+def damaged(where: str, kind: str) -> str:
+    return f"'{where}' cannot be read as {kind}: it is damaged or cut off."
+
+
+def cannot_unpack(where: str, reason: str) -> str:
+    return f"'{where}' cannot be unpacked: {reason}."
+
+
+def binary_junk(where: str) -> str:
+    return f"'{where}' is not text: it holds binary data, so it is no CSV."
+
+
+def extra_missing(what: str, module: str, extra: str) -> str:
+    return f"Reading {what} needs {module}, which is missing: pip install 'pikanid[{extra}]'."
+
+
+def no_rows(where: str) -> str:
+    return f"'{where}' holds no rows of data."
+
+
+def no_vectors(where: str) -> str:
+    return f"'{where}' holds no numeric vector of two or more values."
+
+
+def too_many_cells(where: str, most: int) -> str:
+    return f"'{where}' holds more than {most} cells: save what you need as CSV or Parquet."
+
+
+def no_sheet(where: str, sheet: str, known: Iterable[str]) -> str:
+    return f"'{where}' has no sheet '{sheet}' (sheets: {listed(known)})."
+
+
+def ragged_row(where: str, row: int, cells: int, wanted: int) -> str:
+    return (
+        f"'{where}', row {row}: {cells} cell(s) where the header has {wanted}; the file may be cut "
+        "off, or its delimiter be another (delimiter=)."
+    )
+
+
+def not_a_number(where: str, row: int, header: str, cell: str) -> str:
+    return f"'{where}', row {row}, column '{header}': '{short(cell, 40)}' is not a number."
+
+
+def header_twice(where: str, header: str) -> str:
+    return f"'{where}' has two columns called '{header}': rename one of them."
+
+
+def no_time(where: str, known: Iterable[str]) -> str:
+    return (
+        f"'{where}' has no time column among: {listed(known)}. Name it "
+        "(--column t=COLUMN, in Python columns={'t': 'its header'}) or give the sampling rate "
+        "in Hz (--rate, in Python rate=)."
+    )
+
+
+def time_length(where: str, name: str, n: int, wanted: int) -> str:
+    return f"'{where}': '{name}' has {n} values but its time column has {wanted}."
+
+
+def bad_rate(rate: float) -> str:
+    return f"A sampling rate of {rate:g} Hz cannot be: it must be positive and finite."
+
+
+def rate_disagrees(where: str, rate: float, name: str, actual: float) -> str:
+    return (
+        f"'{where}' has the time column '{name}' sampled at {actual:.6g} Hz, not at {rate:g} Hz: "
+        "leave out the rate, or map another column to 't'."
+    )
+
+
+def bad_delimiter(text: str) -> str:
+    return f"{text!r} cannot delimit cells: give one character, such as ';'."
+
+
+def bad_decimal(text: str) -> str:
+    return f"{text!r} cannot be the decimal sign here: it must be '.' or ',', not the delimiter."
+
+
+def dataset_missing(local: str, url: str, variable: str) -> str:
+    return (
+        f"The recording '{local}' is not on this machine and cannot be downloaded: connect to the "
+        f"network, or fetch {url} yourself and set {variable} to the folder that holds '{local}'."
+    )
+
+
+def dataset_altered(path: str, url: str) -> str:
+    return f"'{path}' is not the original file (its checksum differs): fetch it again from {url}."
+
+
+def no_such_data(what: str, given: str, known: Iterable[str]) -> str:
+    return f"There is no {what} '{given}' (known: {listed(known)})."
+
+
+def detail_too_large(given: int, most: int) -> str:
+    return f"it holds {given / 2**20:.4g} MiB, more than the {most / 2**20:.4g} that are read"
+
+
+def detail_unpacks(most: int) -> str:
+    return (
+        f"it would unpack to more than {most / 2**20:.4g} MiB of memory; unpack it yourself if "
+        "you trust it"
+    )
+
+
+def detail_memory(most: int) -> str:
+    return f"what it holds would take more than {most / 2**20:.4g} MiB of memory"
+
+
+def too_many_entries(where: str, given: int, most: int) -> str:
+    return f"{where} has {given} entries; more than {most} are not read."
+
+
+def entry_lacks(where: str, missing: Sequence[str]) -> str:
+    return f"{where} lacks {listed(missing)}."
+
+
+def entry_extra(where: str, extra: Sequence[str], known: Sequence[str]) -> str:
+    return f"{where} holds {listed(extra)}, which is unknown (known: {listed(known)})."
+
+
+def entry_negative(where: str) -> str:
+    return f"{where[:1].upper()}{where[1:]} holds negative numbers."
+
+
+def entry_too_deep(where: str) -> str:
+    return f"{where} is nested too deeply: nothing of ours writes that."

@@ -1,0 +1,95 @@
+"""What can stop a diagnosis or the plan of an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pikanid.errors.wording import listed, short
+
+
+def rounded_repeats(where: str, name: str, count: int) -> str:
+    return (
+        f"Recording '{where}': '{name}' is rounded and often does not change; {count} samples "
+        "that repeat their neighbours are left out."
+    )
+
+
+def too_few_to_diagnose(samples: int, parameters: int, needed: int) -> str:
+    return (
+        f"There are {samples} usable samples for {parameters} free parameters, and a diagnosis "
+        f"needs at least {needed}: record more, or fix parameters."
+    )
+
+
+def too_rough_to_diagnose(model: str) -> str:
+    return (
+        f"Model '{model}' cannot be simulated as exactly as the recording's noise asks: check its "
+        "units, its initial values and the given sigma."
+    )
+
+
+def bad_drive_bound(name: str, given: float) -> str:
+    return f"The bound of {name} is {given:g}; give a positive number, inf for none."
+
+
+def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: float) -> str:
+    return (
+        f"No profile fits into {duration:g} s with {quiet:g} s of rest and samples every {dt:g} s "
+        f"for a model that rings at {frequency:.3g} Hz: leave two periods of motion, and ten "
+        "samples a period."
+    )
+
+
+def not_in_catalogue(effect: str, known: Iterable[str]) -> str:
+    return f"The experiment could not show an effect '{short(effect)}' (known: {listed(known)})."
+
+
+def too_few_hypotheses(given: int) -> str:
+    return f"There are {given} hypotheses; an experiment can separate two or more."
+
+
+def nothing_to_learn(model: str) -> str:
+    return f"Model '{short(model)}' has no free parameter that an experiment could determine."
+
+
+def nothing_to_drive(models: str) -> str:
+    return f"{short(models, 200)}: no input that an experiment could drive."
+
+
+def too_rough_to_plan(model: str, excitation: str) -> str:
+    return (
+        f"'{short(model)}' moves too wildly under '{short(excitation)}' to be planned with: make "
+        "the excitation smaller, or its samples denser."
+    )
+
+
+def no_profile_simulated(candidates: int) -> str:
+    return (
+        f"None of {candidates} profiles can be simulated with every hypothesis within the limits: "
+        "offer smaller ones."
+    )
+
+
+def limits_not_kept(profile: str) -> str:
+    return f"Profile '{short(profile)}' exceeds the limits however small it is made."
+
+
+def no_coordinate(model: str) -> str:
+    return (
+        f"'{model}' has no second-order coordinate that an output shows: a diagnosis needs a state "
+        "whose derivative is another state, such as theta' = theta_dot."
+    )
+
+
+def held_out_channels(name: str, missing: Sequence[str]) -> str:
+    return (
+        f"The held-out recording '{short(name)}' lacks {listed(missing)}, which the recording to "
+        "explain has: give one with the same columns."
+    )
+
+
+def held_out_same(train: str, name: str) -> str:
+    return (
+        f"'{short(name)}' holds the same data as '{short(train)}': nothing can be proved on what "
+        "was fitted; give another recording."
+    )

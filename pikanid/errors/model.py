@@ -1,0 +1,108 @@
+"""What can be wrong with a model, and where it is bound to recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pikanid.errors.wording import did_you_mean, listed
+
+
+def no_model(kind: str) -> str:
+    return (
+        f"A model is needed, not a {kind}: give a Model (Model.load(path), Model.from_dict(...), "
+        "pikanid.model.systems); the model comes before the recordings."
+    )
+
+
+def duplicate_name(name: str, first: str, second: str) -> str:
+    return f"'{name}' names both a {first} and a {second}; every name may be used once."
+
+
+def missing_equation(state: str) -> str:
+    return f"State '{state}' has no equation: add '{state} = \"...\"' under [equations]."
+
+
+def stray_equation(name: str, states: Sequence[str]) -> str:
+    return f"There is an equation for '{name}', which is not a state (states: {listed(states)})."
+
+
+def not_in_model(what: str, name: str, known: Sequence[str], close: Sequence[str] = ()) -> str:
+    return f"The model has no {what} '{name}' (it has: {listed(known)}).{did_you_mean(close)}"
+
+
+def foreign_symbols(names: Sequence[str], where: str) -> str:
+    return (
+        f"{where} uses {listed(names)}, unknown to the model: declare it as a parameter "
+        "(pass parameters=[...]) or mend the name."
+    )
+
+
+def spline_at_start(state: str, spline: str) -> str:
+    return (
+        f"The initial value of '{state}' uses {spline}: a spline function belongs in an equation "
+        "or an output; write the initial value as a formula of parameters and inputs."
+    )
+
+
+def no_states() -> str:
+    return "The model has no states: list at least one under [states]."
+
+
+def no_outputs() -> str:
+    return "The model has no outputs: list what was measured under [outputs]."
+
+
+def bad_bounds(name: str, value: float, bounds: Sequence[float]) -> str:
+    return (
+        f"Parameter '{name}': its guess {value:g} must lie inside its bounds "
+        f"[{bounds[0]:g}, {bounds[1]:g}], and the lower bound below the upper one."
+    )
+
+
+def bad_value(what: str, value: object, wanted: str) -> str:
+    return f"{what} is {value!r}; it must be {wanted}."
+
+
+def model_file_unreadable(path: str, detail: str) -> str:
+    return f"The model file '{path}' cannot be read: {detail}."
+
+
+def model_file_key(path: str, where: str, key: str, known: Sequence[str]) -> str:
+    return f"'{path}': {where} has the unknown key '{key}' (known: {listed(known)})."
+
+
+def model_file_missing(path: str, where: str, wanted: str) -> str:
+    return f"'{path}': {where} lacks {wanted}."
+
+
+def unknown_system(name: str, known: Sequence[str], close: Sequence[str]) -> str:
+    return (
+        f"'{name}' is neither a ready-made model ({listed(known)}) nor a .toml file that exists."
+        f"{did_you_mean(close)}"
+    )
+
+
+def path_twice(name: str, what: str) -> str:
+    return (
+        f"Input '{name}' has a {what} already: change the parameter that it names instead of "
+        "adding a second one."
+    )
+
+
+def no_recordings() -> str:
+    return "No recording was given: pass at least one."
+
+
+def too_few_samples(samples: int, parameters: int) -> str:
+    return (
+        f"There are {samples} usable samples for {parameters} free parameters; a fit needs "
+        f"{parameters + 1} or more, since any model explains fewer: record more, or fix parameters."
+    )
+
+
+def too_few_of_its_own(where: str, samples: int, parameters: Sequence[str]) -> str:
+    return (
+        f"Recording '{where}' has {samples} usable samples for {len(parameters)} parameters of "
+        f"its own ({listed(parameters)}); at least {len(parameters)} are needed: record more, or "
+        "share or fix them."
+    )

@@ -1,0 +1,65 @@
+"""What can be wrong with a set of concealed effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pikanid.errors.wording import listed, short
+
+
+def conceal_diverged() -> str:
+    return "The reference rig leaves the finite numbers: the effect is too strong for this drive."
+
+
+def conceal_cases(given: int, limit: int) -> str:
+    return f"--cases is {given}; give 1 to {limit}."
+
+
+def conceal_excitation(given: str, known: Iterable[str]) -> str:
+    return f"'{short(given)}' is no excitation of concealed recordings (known: {listed(known)})."
+
+
+def conceal_mix(text: str, known: Iterable[str]) -> str:
+    return (
+        f"--mix '{short(text, 200)}' cannot be read: write shares that are not all zero, such as "
+        f"'single=0.6,nothing=0.4' (classes: {listed(known)})."
+    )
+
+
+def conceal_sigma(sigma: float) -> str:
+    return f"--sigma is {sigma:g} rad; noise on an angle must lie between 1e-6 and 0.2 rad."
+
+
+def conceal_truth_inside(truth: str, folder: str) -> str:
+    return (
+        f"The truth '{short(truth, 200)}' would lie inside '{short(folder, 200)}', which is to "
+        "be given away: choose a place outside."
+    )
+
+
+def conceal_taken(place: str) -> str:
+    return (
+        f"'{short(place, 200)}' already holds something else: choose another name, or remove it."
+    )
+
+
+def conceal_other_settings(place: str) -> str:
+    return (
+        f"'{short(place, 200)}' belongs to an unfinished set made with other settings: repeat "
+        "those to finish it, or remove it."
+    )
+
+
+def truth_unreadable(path: str, detail: str) -> str:
+    return f"The truth file '{short(path, 200)}' cannot be read: {detail}."
+
+
+def truth_case(detail: str) -> str:
+    return f"A case of the truth file cannot be compared with: {detail}."
+
+
+def diagnosis_unreadable(case: str, detail: object) -> str:
+    return (
+        f"The diagnosis of case '{short(case)}' cannot be scored: {short(str(detail))} (wanted: "
+        "verdict, mismatch, and hypotheses with effects' ids and a relative_weight)."
+    )
