@@ -31,6 +31,7 @@ from pikanid.mismatch import case
 from pikanid.mismatch import diagnose as api
 from pikanid.mismatch.beyond import formulas as symbols
 from pikanid.mismatch.search import search
+from pikanid.mismatch.steps import reporting
 from pikanid.noise import level as noise
 from pikanid.storage.outputs import atomically
 from pikanid.strategies.nls import NLS
@@ -42,13 +43,14 @@ FOLDER = Path(api.__file__).parent
 PACKAGE = api.__package__
 MODULES = {path.stem: path for path in sorted(FOLDER.rglob("*.py")) if path.stem != "__init__"}
 # a threshold that is looked up nowhere else changes no result of what is remembered
-OUTSIDE = {"diagnose", "case", "doubt", "noise_level", "outliers", "preparation", "screen",
-           "search", "formulas", "verdict"}
+OUTSIDE = {"case", "confirming", "doubt", "noise_level", "outliers", "preparation", "screen",
+           "search", "searching", "formulas", "verdict"}
 REMEMBERED = ((noise, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
               (symbols, "name_curve"), (case, "residual_tests"), (case, "held_out"),
               (api, "force_shape"))
 # takes time and says nothing about the verdict
-SKIPPED: Mapping[str, Any] = {"advice": "", "force_over_time": None, "patch": None, "smallest": {}}
+SKIPPED: Mapping[Any, Mapping[str, Any]] = {
+    api: {"patch": None}, reporting: {"advice": "", "force_over_time": None, "smallest": {}}}
 AFTERWARDS = "says where, how large or what next once the verdict stands"
 BEFOREHAND = "plans experiments, diagnoses none"
 LONGER = "acts on longer recordings only"
@@ -61,7 +63,8 @@ LEFT_OUT: Mapping[str, Mapping[str, str]] = {
                  "response": "*", "sizing": "*"},
     LONGER: {"case": "SEARCHED", "preparation": "LONG FINE MOST", "remainder": "MOST_ROWS"},
     REPEATED: {"repeats": "*"},
-    STEPS: {"diagnose": "RELEVELLED ASKED", "case": "AGAIN", "descent": "HOPS COARSE RENEWED",
+    STEPS: {"searching": "RELEVELLED", "confirming": "ASKED", "case": "AGAIN",
+            "descent": "HOPS COARSE RENEWED",
             "progressive_horizon": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED",
             "prediction": "AGAIN", "least_squares": "PATIENCE", "tangent": "*",
             "whitened": "FINEST"},
@@ -170,8 +173,9 @@ def diagnosed(train: pk.Recording, other: pk.Recording, memory: Memory) -> dict[
     with contextlib.ExitStack() as stack:
         for where, name in REMEMBERED:
             stack.enter_context(patch.object(where, name, memory.of(getattr(where, name))))
-        for name, nothing in SKIPPED.items():
-            stack.enter_context(patch.object(api, name, return_value=nothing))
+        for where, names in SKIPPED.items():
+            for name, nothing in names.items():
+                stack.enter_context(patch.object(where, name, return_value=nothing))
         try:
             dx = pk.diagnose(pk.systems.sloshing(), train, other, workers=1)
         except PikanidError as failure:

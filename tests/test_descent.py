@@ -10,14 +10,14 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.diagnose import _opened
 from pikanid.mismatch.fitting.hypothesis import extended, fitted, read_otherwise, turned
 from pikanid.mismatch.search.screen import Screen, law
+from pikanid.mismatch.steps.opening import open_case
 
 
 def opened(truth: pk.Model, train: pk.Recording, sigma: float) -> Case:
     recording = pk.simulate(truth, train, sigma=sigma, seed=3)
-    return _opened(pk.systems.sloshing(), (recording,), None, None, lambda text: None)
+    return open_case(pk.systems.sloshing(), (recording,), None, None, lambda text: None)
 
 
 @pytest.mark.parametrize("stiff", [3000.0, 20000.0, 70000.0])

@@ -9,9 +9,9 @@ import pytest
 
 import pikanid as pk
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.diagnose import _opened
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.doubt import least_proof, why_not
+from pikanid.mismatch.steps.opening import open_case
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
@@ -21,7 +21,7 @@ SIGMA = 0.002
 @pytest.fixture(scope="module")
 def hypotheses() -> tuple[Case, list[Hypothesis]]:
     """A cubic spring, found in a recording; held out, the same system in another motion."""
-    case = _opened(pk.systems.sloshing(), (moved(1),), (moved(2),), None, lambda text: None)
+    case = open_case(pk.systems.sloshing(), (moved(1),), (moved(2),), None, lambda text: None)
     effect = next(c for c in case.candidates if c.key == "cubic_stiffness")
     found = fitted(case.model, [effect], case.records, [{"k3": 200.0}], 30)
     assert found is not None

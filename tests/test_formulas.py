@@ -9,8 +9,9 @@ from pikanid import simulate
 from pikanid.mismatch.beyond.force_shape import force_shape
 from pikanid.mismatch.beyond.formulas import symbolic_candidates
 from pikanid.mismatch.beyond.patch import patch
+from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
-from pikanid.mismatch.diagnose import Case, _opened
+from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import systems
 from pikanid.recording import excitation
 
@@ -26,7 +27,7 @@ def recorded(truth: pk.Model, seed: int, duration: float = 8.0) -> pk.Recording:
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    return _opened(systems.sloshing(), (recorded(EVEN, 1),), (recorded(EVEN, 2),), None,
+    return open_case(systems.sloshing(), (recorded(EVEN, 1),), (recorded(EVEN, 2),), None,
                    lambda text: None)
 
 
@@ -57,7 +58,7 @@ def bent(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def test_a_clean_recording_offers_no_patch() -> None:
-    opened = _opened(systems.sloshing(), (recorded(systems.sloshing(), 1),),
+    opened = open_case(systems.sloshing(), (recorded(systems.sloshing(), 1),),
                      (recorded(systems.sloshing(), 2),), None, lambda text: None)
     shape = force_shape(opened.base, opened.sites[0], opened.candidates)
     assert patch(opened.base, opened.model, shape, opened.sites[0], opened.records, opened.later,

@@ -10,12 +10,13 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import binom
 
 import pikanid as pk
-from pikanid.mismatch import diagnose as api
 from pikanid.mismatch.beyond.latent_force import ForceOverTime, _means, _Motion, force_over_time
 from pikanid.mismatch.beyond.penalised import critical_value
+from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.locate import locate
+from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import systems
 from pikanid.recording import Recording, excitation
 
@@ -38,8 +39,8 @@ def recorded(law: str, seed: int, sigma: float = SIGMA) -> Recording:
 
 
 @functools.cache
-def opened(law: str, seed: int) -> api.Case:
-    return api._opened(NOMINAL, (recorded(law, seed),), None, None, lambda text: None)
+def opened(law: str, seed: int) -> Case:
+    return open_case(NOMINAL, (recorded(law, seed),), None, None, lambda text: None)
 
 
 @functools.cache

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch import diagnose as api
 from pikanid.mismatch.beyond.force_shape import ForceShape, force_shape
+from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import Model, Parameter, systems
 from pikanid.recording import excitation
 
@@ -21,7 +21,7 @@ def recording(truth: Model, seed: int = 3) -> pk.Recording:
 
 
 def shape(truth: Model) -> ForceShape:
-    opened = api._opened(systems.sloshing(), (recording(truth),), None, None, lambda text: None)
+    opened = open_case(systems.sloshing(), (recording(truth),), None, None, lambda text: None)
     return force_shape(opened.base, opened.sites[0], opened.candidates)
 
 

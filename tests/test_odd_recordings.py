@@ -16,9 +16,10 @@ from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import condensed, lines, residual_tests
 from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.detect.tangent import CELLS, Tangent, directions
-from pikanid.mismatch.diagnose import _opened, diagnose
+from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.search.screen import best_level
+from pikanid.mismatch.steps.opening import open_case
 from pikanid.recording import Recording
 from pikanid.reporting import strict_json
 from pikanid.reporting.diagnosis_page import page
@@ -36,7 +37,7 @@ def swing(seed: int = 1, seconds: float = 4.0, sigma: float = 0.002, k3: float =
 
 
 def opened(train: Recording, later: Recording | None = None) -> Case:
-    return _opened(pk.systems.sloshing(), (train,), None if later is None else (later,), None,
+    return open_case(pk.systems.sloshing(), (train,), None if later is None else (later,), None,
                    lambda text: None)
 
 

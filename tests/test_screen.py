@@ -10,13 +10,13 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.diagnose import _opened
 from pikanid.mismatch.fitting.hypothesis import extended
 from pikanid.mismatch.search.screen import Screen, best_level, entry, law
+from pikanid.mismatch.steps.opening import open_case
 
 
 def opened(train: pk.Recording, later: pk.Recording) -> Case:
-    return _opened(pk.systems.sloshing(), (train,), (later,), None, lambda text: None)
+    return open_case(pk.systems.sloshing(), (train,), (later,), None, lambda text: None)
 
 
 @pytest.fixture(scope="module")

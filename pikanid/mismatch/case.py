@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,6 +121,11 @@ class Case:
     def adequate(self, h: Hypothesis) -> bool:
         """Whether nothing is left in the train recordings."""
         return not h.far and self.test(h).p_value > EXPLAINED
+
+    def detected(self) -> Detection:
+        """Whether the nominal model leaves anything; between repeats, what they differ by tells."""
+        found = self.test(self.base)
+        return found if self.repeats is None else replace(found, p_value=self.repeats.p_value)
 
     def test(self, h: Hypothesis) -> Detection:
         """What is left in the train recordings."""

@@ -7,46 +7,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from pikanid import errors
-from pikanid.mismatch.beyond.force_shape import ForceShape, force_shape
-from pikanid.mismatch.beyond.formulas import symbolic_candidates
-from pikanid.mismatch.beyond.latent_force import force_over_time
+from pikanid.mismatch.beyond.force_shape import force_shape
 from pikanid.mismatch.beyond.patch import patch
-from pikanid.mismatch.case import SEARCHED, Case, note_outliers
-from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
-from pikanid.mismatch.catalogue.site import Site, sites
-from pikanid.mismatch.data.preparation import (
-    beginnings,
-    check_freedom,
-    check_pair,
-    freedom,
-    held_as_recorded,
-    oversampling,
-    prepared,
-    set_aside,
-    with_refined_noise,
-    with_sigma,
-)
-from pikanid.mismatch.detect.residual_tests import Detection
-from pikanid.mismatch.fitting.as_estimate import as_estimate
-from pikanid.mismatch.fitting.decisions import below, smaller
-from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.parallel import blas_on_one_thread, threads
-from pikanid.mismatch.fitting.repeats import repeats
-from pikanid.mismatch.judge.doubt import least_proof
-from pikanid.mismatch.judge.verdict import Answer, settle, with_formulas
-from pikanid.mismatch.report.advice import advice
+from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.diagnosis import Diagnosis
-from pikanid.mismatch.report.explained import explanations
-from pikanid.mismatch.report.findings import OutputError, Proof
-from pikanid.mismatch.report.locate import affected, locate, smallest
-from pikanid.mismatch.search.search import Search
+from pikanid.mismatch.report.locate import affected
+from pikanid.mismatch.steps.confirming import confirmed, with_laws_outside
+from pikanid.mismatch.steps.opening import open_case
+from pikanid.mismatch.steps.reporting import reported
+from pikanid.mismatch.steps.searching import searched, with_noise_of_the_rest
 from pikanid.model import Model
 from pikanid.problem.arguments import a_model, several
 from pikanid.recording import Recording
-from pikanid.strategies.nls import NLS
-
-RELEVELLED = 3  # times that the noise is read from what the best explanation leaves, at most
-ASKED = 3  # times that rivals of what is given are looked for
 
 Recordings = Recording | Sequence[Recording]
 
@@ -109,154 +83,21 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
 def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
                alpha: float, quiet: tuple[float, float] | None, tell: Callable[[str], None],
                workers: int) -> Diagnosis:
-    case = _opened(model, train, later, quiet, tell)
-    case.search.workers = workers
+    case = open_case(model, train, later, quiet, tell, workers)
     tell("detection")
-    detection = case.test(case.base)
-    if case.repeats is not None:
-        detection = replace(detection, p_value=case.repeats.p_value)
+    detection = case.detected()
     if not smaller(detection.p_value, alpha):
-        answer = Answer("none", (), ())
-    else:
-        search = case.begin_search()
-        ranked = search.run(case.adequate)
-        if search.records is not case.records:
-            tell("whole recordings")
-            explained = not ranked[0].far
-            search = case.resumed(search)
-            # what nothing explained in part is not explained in whole
-            ranked = search.grow(case.adequate) if explained else search.ranked()
-        for _ in range(RELEVELLED):
-            if not case.relevelled(ranked[0], quiet):
-                break
-            # the level was read through the mismatch itself: now it is out of the way
-            tell("noise again")
-            search = case.search
-            ranked = search.grow(case.adequate)
-        tell("confirmation")
-        case.clear_later(ranked[0])
-        answer = _settled(case, ranked, alpha)
-        for _ in range(ASKED):
-            before = {h.fit for h in search.ranked()}
-            if not search.closer(answer.given):
-                break
-            # one that is better has rivals of its own
-            known = search.ranked()[0].fit in before
-            answer = _settled(case, search.ranked() if known else search.grow(case.adequate), alpha)
-    shape, site = None, case.sites[0]
-    if answer.verdict != "none":
-        site = affected(case.base, answer.given, case.sites, case.candidates)
-        shape = force_shape(case.base, site, case.candidates)
+        return reported(case, detection, Answer("none", (), ()), case.sites[0], None, alpha)
+    ranked = with_noise_of_the_rest(case, searched(case, tell), quiet, tell)
+    tell("confirmation")
+    answer = confirmed(case, ranked, alpha)
+    site = affected(case.base, answer.given, case.sites, case.candidates)
+    shape = force_shape(case.base, site, case.candidates)
+    mend = None
     if shape is not None and answer.verdict == "unnamed":
         tell("laws outside the catalogue")
-        search = case.search
-        search.offer(symbolic_candidates(shape, site))
-        answer = with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
-                               case.later is not None, case.proves, alpha)
-    mend = None
-    if shape is not None and answer.verdict == "unnamed" and case.later is not None:
-        mend = patch(case.base, case.model, shape, site, case.records, case.later,
-                     case.predicted)
-    return replace(_diagnosis(case, detection, answer, site, shape, alpha), patch=mend)
-
-
-def _settled(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
-    return settle(ranked, case.search.scale(), case.test, case.predicted, case.later is not None,
-                  case.proves, case.ahead, alpha)
-
-
-def _opened(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
-            quiet: tuple[float, float] | None, tell: Callable[[str], None]) -> Case:
-    notes: list[str] = []
-    proves = later is not None
-    if later is not None:
-        check_pair(train, later)
-        later = beginnings(model, later, "the held-out recording", notes)
-    train = beginnings(model, train, "the recording", notes)
-    if later is None:
-        train, later = set_aside(train, model, notes)
-    model = held_as_recorded(model, train)
-    sites(model, train)  # a model in which nothing can be looked for is refused before any fit
-    tell("nominal fit")
-    together = oversampling(model, train)
-    if together > 1:
-        notes.append(f"{together} neighbouring samples of the outputs count as one: nothing in "
-                     "them moves fast enough to need more.")
-    records = prepared(model, train, quiet, notes, together)
-    check_freedom(model, records)
-    short = records.beginning(SEARCHED)
-    before = NLS().fit(model, with_sigma(short, model))
-    if short is not records:
-        before = NLS(starts=1).fit(before.fitted_model, with_sigma(records, model))
-    nominal = before.fitted_model
-    rate = sites(nominal, records.recordings)[0].rate
-    records, count = with_refined_noise(records, before, rate, quiet)
-    note_outliers(count, "the recording", notes)
-    held, excuse = None, ""
-    if later is not None:
-        held = prepared(model, later, None, notes, together, records.levels[0])
-        count, _, needed = freedom(model, held)
-        if count < needed:
-            held, proves = None, False
-            excuse = (f"the held-out recording has {count} usable samples, and at least {needed} "
-                      "are needed to confirm anything")
-    again = repeats(nominal, records, held if proves else None)
-    if again is not None:
-        notes += again.notes
-        records = records.with_levels(again.levels)
-        held = None if held is None else held.with_levels(again.levels)
-    found = sites(nominal, records.recordings)
-    listed = catalogue_of(found)
-    search = Search(nominal, records, listed, tell,
-                    guess={n: model.parameter(n).value for n in model.free_names})
-    base = search.base()
-    alone = tuple(c for c in listed if c.suits())
-    case = Case(nominal, records, held, proves, found, alone, search, base, before, notes, {}, {},
-                again, excuse)
-    search.predicts = case.predicts
-    return case
-
-
-def _diagnosis(case: Case, detection: Detection, answer: Answer, site: Site,
-               shape: ForceShape | None, alpha: float) -> Diagnosis:
-    if case.excuse:
-        case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
-    best = answer.given[0] if answer.given else case.base
-    after = as_estimate(best, case.before) if answer.given else case.before
-    given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
-    proof = _proof(case, answer, best)
-    if answer.verdict == "none" and proof is not None and proof.p_value < alpha:
-        case.notes.append(
-            "Nothing is missing in the recording, but the model does not predict the held-out one "
-            f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
-    if case.proves and (base := case.predicted(case.base)) and below(
-            base.motion, least_proof(alpha)):
-        case.notes.append(
-            "The held-out recording is at rest, or too short: all that moves in it is worth "
-            f"{base.motion:.2g} of chi-squared, and {least_proof(alpha):.0f} are needed to confirm "
-            "anything.")
-    levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
-    force = None if answer.verdict == "none" else force_over_time(case.base, site)
-    return Diagnosis(
-        answer.verdict, detection.p_value, alpha,
-        locate(case.base, best, answer, site, shape, force, alpha),
-        given, rejected, case.before, after, proof, tuple(levels),
-        tuple(case.notes), smallest(case.base, case.candidates),
-        advice(answer.verdict, given, case.records, case.rate, case.proves,
-               case.search.workers, bool(answer.doubt)), shape=shape,
-        force_over_time=force,
-        doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""))
-
-
-def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
-    before, after = case.predicted(case.base), case.predicted(best)
-    if case.later is None or before is None or after is None:
-        return None
-    # all that a named model leaves is noise, not its highest frequencies alone
-    share = best.noise if answer.verdict in ("named", "set") else 1.0
-    outputs = {o.name: OutputError(before.rmse[o.name], after.rmse[o.name],
-                                   after.rmse_moved[o.name],
-                                   case.later.levels[0][o.name].sigma * share, o.unit)
-               for o in case.model.outputs}
-    return Proof(outputs, after.detection.p_value, after.t, after.measured, before.predicted,
-                 after.predicted, after.moved)
+        answer = with_laws_outside(case, answer, shape, site, alpha)
+        if answer.verdict == "unnamed" and case.later is not None:
+            mend = patch(case.base, case.model, shape, site, case.records, case.later,
+                         case.predicted)
+    return replace(reported(case, detection, answer, site, shape, alpha), patch=mend)

@@ -1,0 +1,43 @@
+"""From ranked hypotheses to an answer: what predicts recordings that nothing was fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pikanid.mismatch.beyond.force_shape import ForceShape
+from pikanid.mismatch.beyond.formulas import symbolic_candidates
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.verdict import Answer, settle, with_formulas
+
+ASKED = 3  # times that rivals of what is given are looked for
+
+
+def confirmed(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
+    """What the held-out recordings leave of the hypotheses, with rivals looked for again."""
+    case.clear_later(ranked[0])
+    search = case.search
+    answer = _settled(case, ranked, alpha)
+    for _ in range(ASKED):
+        before = {h.fit for h in search.ranked()}
+        if not search.closer(answer.given):
+            break
+        # one that is better has rivals of its own
+        known = search.ranked()[0].fit in before
+        answer = _settled(case, search.ranked() if known else search.grow(case.adequate), alpha)
+    return answer
+
+
+def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site, alpha: float
+                      ) -> Answer:
+    """The answer, once formulas read from the shape of the force have been offered as well."""
+    search = case.search
+    search.offer(symbolic_candidates(shape, site))
+    return with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
+                         case.later is not None, case.proves, alpha)
+
+
+def _settled(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
+    return settle(ranked, case.search.scale(), case.test, case.predicted, case.later is not None,
+                  case.proves, case.ahead, alpha)

@@ -1,0 +1,95 @@
+"""From a model and recordings to a case: prepare, fit the nominal model, read the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pikanid.mismatch.case import SEARCHED, Case, note_outliers
+from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.preparation import (
+    beginnings,
+    check_freedom,
+    check_pair,
+    freedom,
+    held_as_recorded,
+    oversampling,
+    prepared,
+    set_aside,
+    with_refined_noise,
+    with_sigma,
+)
+from pikanid.mismatch.fitting.repeats import repeats
+from pikanid.mismatch.search.search import Search
+from pikanid.model import Model
+from pikanid.recording import Recording
+from pikanid.strategies.nls import NLS
+
+
+def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
+              quiet: tuple[float, float] | None, tell: Callable[[str], None], workers: int = 1
+              ) -> Case:
+    """A case ready for tests: recordings prepared, noise known, nominal model fitted.
+
+    Args:
+        model: Nominal model.
+        train: Recordings to explain.
+        later: Held-out recordings, if there are any.
+        quiet: Start and stop [s] of a stretch known to show noise only.
+        tell: Called with what is being done.
+        workers: Threads of the search.
+
+    Raises:
+        BadModel: No coordinate is found.
+        BadRecording: A channel is missing or unusable; there are too few samples; train and
+            held-out are the same.
+        SimulationFailed: The model cannot be simulated, or not as exactly as the noise asks.
+    """
+    notes: list[str] = []
+    proves = later is not None
+    if later is not None:
+        check_pair(train, later)
+        later = beginnings(model, later, "the held-out recording", notes)
+    train = beginnings(model, train, "the recording", notes)
+    if later is None:
+        train, later = set_aside(train, model, notes)
+    model = held_as_recorded(model, train)
+    sites(model, train)  # a model in which nothing can be looked for is refused before any fit
+    tell("nominal fit")
+    together = oversampling(model, train)
+    if together > 1:
+        notes.append(f"{together} neighbouring samples of the outputs count as one: nothing in "
+                     "them moves fast enough to need more.")
+    records = prepared(model, train, quiet, notes, together)
+    check_freedom(model, records)
+    short = records.beginning(SEARCHED)
+    before = NLS().fit(model, with_sigma(short, model))
+    if short is not records:
+        before = NLS(starts=1).fit(before.fitted_model, with_sigma(records, model))
+    nominal = before.fitted_model
+    rate = sites(nominal, records.recordings)[0].rate
+    records, count = with_refined_noise(records, before, rate, quiet)
+    note_outliers(count, "the recording", notes)
+    held, excuse = None, ""
+    if later is not None:
+        held = prepared(model, later, None, notes, together, records.levels[0])
+        count, _, needed = freedom(model, held)
+        if count < needed:
+            held, proves = None, False
+            excuse = (f"the held-out recording has {count} usable samples, and at least {needed} "
+                      "are needed to confirm anything")
+    again = repeats(nominal, records, held if proves else None)
+    if again is not None:
+        notes += again.notes
+        records = records.with_levels(again.levels)
+        held = None if held is None else held.with_levels(again.levels)
+    found = sites(nominal, records.recordings)
+    listed = catalogue_of(found)
+    search = Search(nominal, records, listed, tell,
+                    guess={n: model.parameter(n).value for n in model.free_names})
+    base = search.base()
+    alone = tuple(c for c in listed if c.suits())
+    case = Case(nominal, records, held, proves, found, alone, search, base, before, notes, {}, {},
+                again, excuse)
+    search.predicts, search.workers = case.predicts, workers
+    return case

@@ -1,0 +1,65 @@
+"""From an answer to a diagnosis: proof, place, limits of detection, advice, notes."""
+
+from __future__ import annotations
+
+from pikanid.mismatch.beyond.force_shape import ForceShape
+from pikanid.mismatch.beyond.latent_force import force_over_time
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.detect.residual_tests import Detection
+from pikanid.mismatch.fitting.as_estimate import as_estimate
+from pikanid.mismatch.fitting.decisions import below
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.doubt import least_proof
+from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.report.advice import advice
+from pikanid.mismatch.report.diagnosis import Diagnosis
+from pikanid.mismatch.report.explained import explanations
+from pikanid.mismatch.report.findings import OutputError, Proof
+from pikanid.mismatch.report.locate import locate, smallest
+
+
+def reported(case: Case, detection: Detection, answer: Answer, site: Site,
+             shape: ForceShape | None, alpha: float) -> Diagnosis:
+    """The diagnosis of a case, with proof, place, advice and notes."""
+    if case.excuse:
+        case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
+    best = answer.given[0] if answer.given else case.base
+    after = as_estimate(best, case.before) if answer.given else case.before
+    given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
+    proof = _proof(case, answer, best)
+    if answer.verdict == "none" and proof is not None and proof.p_value < alpha:
+        case.notes.append(
+            "Nothing is missing in the recording, but the model does not predict the held-out one "
+            f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
+    if case.proves and (base := case.predicted(case.base)) and below(
+            base.motion, least_proof(alpha)):
+        case.notes.append(
+            "The held-out recording is at rest, or too short: all that moves in it is worth "
+            f"{base.motion:.2g} of chi-squared, and {least_proof(alpha):.0f} are needed to confirm "
+            "anything.")
+    levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
+    force = None if answer.verdict == "none" else force_over_time(case.base, site)
+    return Diagnosis(
+        answer.verdict, detection.p_value, alpha,
+        locate(case.base, best, answer, site, shape, force, alpha),
+        given, rejected, case.before, after, proof, tuple(levels),
+        tuple(case.notes), smallest(case.base, case.candidates),
+        advice(answer.verdict, given, case.records, case.rate, case.proves,
+               case.search.workers, bool(answer.doubt)), shape=shape,
+        force_over_time=force,
+        doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""))
+
+
+def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
+    before, after = case.predicted(case.base), case.predicted(best)
+    if case.later is None or before is None or after is None:
+        return None
+    # all that a named model leaves is noise, not its highest frequencies alone
+    share = best.noise if answer.verdict in ("named", "set") else 1.0
+    outputs = {o.name: OutputError(before.rmse[o.name], after.rmse[o.name],
+                                   after.rmse_moved[o.name],
+                                   case.later.levels[0][o.name].sigma * share, o.unit)
+               for o in case.model.outputs}
+    return Proof(outputs, after.detection.p_value, after.t, after.measured, before.predicted,
+                 after.predicted, after.moved)

@@ -1,0 +1,37 @@
+"""From a case to ranked hypotheses: on part of the recordings, on all, with the noise read anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+
+RELEVELLED = 3  # times that the noise is read from what the best explanation leaves, at most
+
+
+def searched(case: Case, tell: Callable[[str], None]) -> list[Hypothesis]:
+    """Hypotheses that explain the recordings best, the closest first."""
+    search = case.begin_search()
+    ranked = search.run(case.adequate)
+    if search.records is case.records:
+        return ranked
+    tell("whole recordings")
+    explained = not ranked[0].far
+    search = case.resumed(search)
+    # what nothing explained in part is not explained in whole
+    return search.grow(case.adequate) if explained else search.ranked()
+
+
+def with_noise_of_the_rest(case: Case, ranked: list[Hypothesis], quiet: tuple[float, float] | None,
+                           tell: Callable[[str], None]) -> list[Hypothesis]:
+    """The same, with the noise read from what the best one leaves.
+
+    The first reading was made through the mismatch itself, which is out of the way by now.
+    """
+    for _ in range(RELEVELLED):
+        if not case.relevelled(ranked[0], quiet):
+            break
+        tell("noise again")
+        ranked = case.search.grow(case.adequate)
+    return ranked
