@@ -235,3 +235,11 @@ def test_files_are_short() -> None:
         if lines > LONGEST:
             long[name] = lines
     assert long == {}, f"a file is one idea, at most {LONGEST} lines"
+
+
+def test_docstrings_have_one_style() -> None:
+    """Google's: `Args:`, `Returns:`, `Raises:`; underlined headings are another one."""
+    found = [f"{path.relative_to(PACKAGE)}:{number}" for path in PACKAGE.rglob("*.py")
+             for number, line in enumerate(path.read_text("utf-8").splitlines(), 1)
+             if re.fullmatch(r"\s+-{4,}", line)]
+    assert found == []

@@ -37,16 +37,15 @@ class MLP:
     Coefficients (n,): the initial jet (m,) where `anchored`, kink amplitudes, then weights and
     biases layer by layer.
 
-    Parameters
-    ----------
-    start, stop : interval [s] that the network's input scaling maps to [-1, 1]
-    order : m, the order of the differential equation: the highest derivative wanted
-    hidden : units of every hidden layer
-    offset, scale : of the output, in the unit of the state
-    rate : [1/s] how fast the state moves; sets the widths of the gate and of the kinks
-    anchored : whether x̂ and its m - 1 derivatives at `start` are coefficients of their own
-    kinks : times [s] at which the m-th derivative may jump
-    device : torch device
+    Args:
+        start, stop: Interval [s] that the network's input scaling maps to [-1, 1].
+        order: m, the order of the differential equation: the highest derivative wanted.
+        hidden: Units of every hidden layer.
+        offset, scale: Of the output, in the unit of the state.
+        rate: [1/s] how fast the state moves; sets the widths of the gate and of the kinks.
+        anchored: Whether x̂ and its m - 1 derivatives at `start` are coefficients of their own.
+        kinks: Times [s] at which the m-th derivative may jump.
+        device: Torch device.
 
     >>> net = MLP(0.0, 5.0, order=2, hidden=(8, 8))
     >>> c = net.initial(seed=0)

@@ -165,9 +165,8 @@ def gauss_nodes(breakpoints: Array, points: int) -> tuple[Array, Array]:
 
     Nodes lie strictly inside, so none straddles or touches a switch that is a breakpoint.
 
-    Returns
-    -------
-    times (E·points,) increasing, weights (E·points,) [s]
+    Returns:
+        Times (E·points,) increasing, weights (E·points,) [s].
 
     >>> times, weights = gauss_nodes(np.array([0.0, 2.0, 3.0]), 2)
     >>> bool(np.isclose((weights * times**3).sum(), 3**4 / 4))
@@ -191,9 +190,8 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
     At the first knot the leading m coefficients of a clamped spline alone decide its value and
     m - 1 derivatives, so that c[held] = matrix @ (chain states at the start, chain after chain).
 
-    Returns
-    -------
-    (held (k,), matrix (k, k)), or None where an approximator is not clamped there
+    Returns:
+        (held (k,), matrix (k, k)), or None where an approximator is not clamped there.
     """
     held, blocks, offset = [], [], 0
     at = np.array([start])

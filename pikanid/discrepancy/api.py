@@ -46,29 +46,28 @@ def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], e
     parameters are fitted by shooting with exact sensitivities.  Edges are reported gauge-fixed: as
     what the free parameters cannot do already.
 
-    Parameters
-    ----------
-    model : the nominal model
-    recordings : one or several, fitted jointly
-    equation : the state whose equation gets the edges, as "theta_dot"
-    arguments : formulas of states, inputs, parameters and t, one an edge: "theta",
-        "theta*theta_dot"
-    nominal : the NLS estimate of the nominal model from these recordings, where it is known already
-    method : "shooting", or "functional" for the relaxation of Eq. (2) on the coarsest grid, without
-        steps
-    grid : intervals of the edges' grids, refined one after the other until the evidence no longer
-        rises
-    steps : whether an edge may jump where its argument changes sign (dry friction), if the data
-        strongly ask for that
-    adaptive : whether smoothness may vary along an edge, if the data strongly ask for that
-    alpha : probability that any edge is called significant where none is there
+    Args:
+        model: The nominal model.
+        recordings: One or several, fitted jointly.
+        equation: The state whose equation gets the edges, as "theta_dot".
+        arguments: Formulas of states, inputs, parameters and t, one an edge: "theta",
+            "theta*theta_dot".
+        nominal: The NLS estimate of the nominal model from these recordings, where it is known
+            already.
+        method: "shooting", or "functional" for the relaxation of Eq. (2) on the coarsest grid,
+            without steps.
+        grid: Intervals of the edges' grids, refined one after the other until the evidence no
+            longer rises.
+        steps: Whether an edge may jump where its argument changes sign (dry friction), if the data
+            strongly ask for that.
+        adaptive: Whether smoothness may vary along an edge, if the data strongly ask for that.
+        alpha: Probability that any edge is called significant where none is there.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : unknown equation, or an argument in other than the model's names
-    pikanid.errors.BadSetting : no argument, one given twice or one that does not move; a bad option
-    pikanid.errors.BadRecording : a channel is missing or unusable
-    pikanid.errors.SimulationFailed : the model cannot be simulated
+    Raises:
+        BadModel: Unknown equation, or an argument in other than the model's names.
+        BadSetting: No argument, one given twice or one that does not move; a bad option.
+        BadRecording: A channel is missing or unusable.
+        SimulationFailed: The model cannot be simulated.
 
     >>> import pikanid as pk
     >>> truth = pk.systems.sloshing().with_term(

@@ -18,23 +18,24 @@ NORMAL_95 = 1.959963984540054
 class Edge:
     """One term δ(argument) of the discrepancy, gauge-fixed, over the visited range.
 
-    Attributes
-    ----------
-    argument : formula of the model's names
-    argument_unit : of a state, an input or a parameter; "" for other formulas
-    name : of its spline in the model
-    grid, values, std : argument (M,), edge (M,) and posterior standard deviation (M,), in the unit
-        of the equation (`unit`)
-    coefficients, covariance : of the gauge-fixed edge (K,), (K, K); the last one is the step's
-        where there is a step
-    p_value, freedom : of the Wald test that the edge is zero, and its degrees of freedom
-    significant : at the discrepancy's α, with Holm's correction over all edges
-    jump_probability : of a step at zero; between 0 and 1 the band holds both, edges with a step
-        and without
-    effective : effective degrees of freedom that the fit spent on the edge beyond its gauge part
-    gauge : what was taken out of it
-    information, gain : (K, K), (K,) of what the data alone say, smooth or not: coefficients c, not
-        gauge-fixed, leave χ² = cᵀ information c - 2 gainᵀ c + const, parameters at their best
+    Attributes:
+        argument: Formula of the model's names.
+        argument_unit: Of a state, an input or a parameter; "" for other formulas.
+        name: Of its spline in the model.
+        grid, values, std: Argument (M,), edge (M,) and posterior standard deviation (M,), in the
+            unit of the equation (`unit`).
+        coefficients, covariance: Of the gauge-fixed edge (K,), (K, K); the last one is the step's
+            where there is a step.
+        p_value, freedom: Of the Wald test that the edge is zero, and its degrees of freedom.
+        significant: At the discrepancy's α, with Holm's correction over all edges.
+        jump_probability: Of a step at zero; between 0 and 1 the band holds both, edges with a step
+            and without.
+        effective: Effective degrees of freedom that the fit spent on the edge beyond its gauge
+            part.
+        gauge: What was taken out of it.
+        information, gain: (K, K), (K,) of what the data alone say, smooth or not: coefficients c,
+            not gauge-fixed, leave χ² = cᵀ information c - 2 gainᵀ c + const, parameters at their
+            best.
     """
 
     argument: str

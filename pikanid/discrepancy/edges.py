@@ -92,10 +92,9 @@ class EdgePlan:
 def plan_edges(model: Model, arguments: Sequence[str], intervals: int) -> tuple[EdgePlan, ...]:
     """One edge an argument, over a grid that is yet to be placed.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : no argument, or one given twice
-    pikanid.errors.BadModel : an argument that is no formula in the model's names
+    Raises:
+        BadSetting: No argument, or one given twice.
+        BadModel: An argument that is no formula in the model's names.
     """
     if not arguments or len(set(arguments)) < len(arguments):
         raise errors.BadSetting(errors.bad_value(

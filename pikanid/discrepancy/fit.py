@@ -54,9 +54,8 @@ def penalised_fit(shooting: Shooting, start: np.ndarray, smoothness: Smoothness,
                   rho: np.ndarray, fixed: bool = False) -> PenalisedFit:
     """Fit from θ = start (n,) and smoothness ρ; with `fixed` ρ stays as it is.
 
-    Raises
-    ------
-    pikanid.errors.SimulationFailed : the model cannot be simulated at the start
+    Raises:
+        SimulationFailed: The model cannot be simulated at the start.
     """
     shooting.choose_steps(start, "coarse")
     stated = all(s is not None for s in shooting.known)

@@ -18,19 +18,20 @@ if TYPE_CHECKING:
 class Discrepancy:
     """An additive KAN inside one equation of a model, fitted together with its parameters.
 
-    Attributes
-    ----------
-    model : the extended model at its estimates, ready to simulate.  Its splines hold the edges and
-        whatever share of the nominal terms the fit gave them; `edges` are freed from that share
-    estimate : parameters, offset and coefficients with their posterior covariance
-    nominal : the estimate of the model without edges
-    equation : the state in whose equation the edges stand
-    edges : one an argument
-    offset : constant part and its standard deviation, all edges' means included
-    p_value : of the test that all edges together are zero, gauge-fixed.  It can be small where no
-        edge is significant: then something is missing, but the data do not tell of what argument
-    alpha : level of significance of the edges, together
-    evidence : log marginal likelihood, up to a constant
+    Attributes:
+        model: The extended model at its estimates, ready to simulate.  Its splines hold the edges
+            and whatever share of the nominal terms the fit gave them; `edges` are freed from that
+            share.
+        estimate: Parameters, offset and coefficients with their posterior covariance.
+        nominal: The estimate of the model without edges.
+        equation: The state in whose equation the edges stand.
+        edges: One an argument.
+        offset: Constant part and its standard deviation, all edges' means included.
+        p_value: Of the test that all edges together are zero, gauge-fixed.  It can be small where
+            no edge is significant: then something is missing, but the data do not tell of what
+            argument.
+        alpha: Level of significance of the edges, together.
+        evidence: Log marginal likelihood, up to a constant.
     """
 
     model: Model
@@ -65,9 +66,8 @@ class Discrepancy:
     def edge(self, argument: str) -> Edge:
         """The edge of an argument.
 
-        Raises
-        ------
-        pikanid.errors.BadModel : there is none
+        Raises:
+            BadModel: There is none.
         """
         named = {e.argument: e for e in self.edges}
         if argument not in named:
@@ -96,9 +96,8 @@ class Discrepancy:
         [inputs, [sums, products], 1].  Grids are the edges' own; a step at zero is a symbolic edge
         (`sgn`) beside the spline.  The offset is the bias of its output.
 
-        Raises
-        ------
-        pikanid.errors.BadSetting : torch or pykan is missing
+        Raises:
+            BadSetting: Torch or pykan is missing.
         """
         from pikanid.approximators.kan.additive import additive_kan
 

@@ -132,9 +132,8 @@ class Smoothness:
 
         The evidence has several maxima: it is climbed from `start` and from stiff edges.
 
-        Parameters
-        ----------
-        A, b : JᵀJ (n, n) and Jᵀ(Jθ - r) (n,) in units of the noise
+        Args:
+            A, b: JᵀJ (n, n) and Jᵀ(Jθ - r) (n,) in units of the noise.
         """
         from scipy.optimize import minimize
 

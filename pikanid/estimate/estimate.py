@@ -23,27 +23,25 @@ if TYPE_CHECKING:
 class Estimate(EstimateData):
     """Estimated parameters with everything that says how far to trust them.
 
-    Attributes
-    ----------
-    model : the model that was fitted, at its guesses; `fitted_model` holds the estimates
-    strategy : "nls", "pda", "ipda", ...
-    free, theta, covariance : layout, values (n_free,) and covariance (n_free, n_free) of θ
-    fits, trajectories : fitted outputs and states, recording by recording
-    cost : half the sum of squared residuals, in output units
-    adequacy : the χ² verdict
-    converged : whether the optimiser stopped at a stationary point
-    settings, history : options as used, and the iterations
-    warnings : sentences that the user should read
-    seconds, seed, version : provenance
-    approximator : the fitted curve of a relaxation strategy, else None
+    Attributes:
+        model: The model that was fitted, at its guesses; `fitted_model` holds the estimates.
+        strategy: "nls", "pda", "ipda", ...
+        free, theta, covariance: Layout, values (n_free,) and covariance (n_free, n_free) of θ.
+        fits, trajectories: Fitted outputs and states, recording by recording.
+        cost: Half the sum of squared residuals, in output units.
+        adequacy: The χ² verdict.
+        converged: Whether the optimiser stopped at a stationary point.
+        settings, history: Options as used, and the iterations.
+        warnings: Sentences that the user should read.
+        seconds, seed, version: Provenance.
+        approximator: The fitted curve of a relaxation strategy, else None.
     """
 
     def index(self, name: str, recording: int | None = None) -> int:
         """Position in θ of a parameter.
 
-        Raises
-        ------
-        pikanid.errors.BadModel : it was not estimated
+        Raises:
+            BadModel: It was not estimated.
         """
         for k, f in enumerate(self.free):
             if f.name == name and f.recording in (None, recording if recording is not None else 0):

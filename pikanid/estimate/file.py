@@ -31,9 +31,8 @@ E = TypeVar("E", bound=EstimateData)
 def save(estimate: EstimateData, path: str | os.PathLike[str]) -> None:
     """Write `estimate`; an existing file is replaced only once the new one is complete.
 
-    Raises
-    ------
-    pikanid.errors.BadRecording : the place cannot be written to
+    Raises:
+        BadRecording: The place cannot be written to.
     """
     atomically(path, content(estimate, path))
 
@@ -64,10 +63,9 @@ def content(estimate: EstimateData, path: str | os.PathLike[str]) -> bytes:
 def load(path: str | os.PathLike[str], kind: Callable[..., E]) -> E:
     """Read an estimate; `kind` makes it of its fields.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : the file is absent or is no saved estimate
-    pikanid.errors.BadModel : the model in it is none
+    Raises:
+        BadSetting: The file is absent or is no saved estimate.
+        BadModel: The model in it is none.
     """
     def wrong(detail: str) -> errors.BadSetting:
         return errors.BadSetting(errors.estimate_file(str(path), detail.rstrip(".")))
@@ -87,9 +85,8 @@ def from_content(content: dict[str, Any], wrong: Callable[[str], errors.PikanidE
                  kind: Callable[..., E]) -> E:
     """The estimate that a file's content describes; `wrong` makes the exception from a sentence.
 
-    Raises
-    ------
-    pikanid.errors.PikanidError : anything in it is of another type, shape or size
+    Raises:
+        PikanidError: Anything in it is of another type, shape or size.
     """
     entries = Entry(content, "its content", wrong).table(_KEYS)
     get = {key: entry.called(f"its {key}") for key, entry in entries.items()}

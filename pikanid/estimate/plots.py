@@ -85,10 +85,9 @@ def plot_fits(fits: Sequence[FitLike], title: str = "") -> Figure:
 def plot_strategies(fits: Mapping[str, Sequence[FitLike]], title: str = "") -> Figure:
     """As `plot_fits`, with one colour for every strategy; all of them fitted the same samples.
 
-    Parameters
-    ----------
-    fits : name in the legend -> fits, in the same order for every name
-    title : of the whole figure
+    Args:
+        fits: Name in the legend -> fits, in the same order for every name.
+        title: Of the whole figure.
     """
     rows = list(zip(*fits.values(), strict=True))
     figure = new_figure(11.0, 0.7 + 2.7 * max(len(rows), 1))
@@ -190,10 +189,9 @@ def image(figure: Figure, ending: str = ".png") -> bytes:
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure to a .png, .svg or .pdf file, atomically.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : the name ends otherwise
-    pikanid.errors.BadRecording : the place cannot be written to
+    Raises:
+        BadSetting: The name ends otherwise.
+        BadRecording: The place cannot be written to.
     """
     atomically(path, image_for(figure, path))
 
@@ -201,9 +199,8 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
 def image_for(figure: Figure, path: str | os.PathLike[str]) -> bytes:
     """What `save_figure` writes to `path`.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : the name ends neither in .png nor in .svg nor in .pdf
+    Raises:
+        BadSetting: The name ends neither in .png nor in .svg nor in .pdf.
     """
     ending = Path(path).suffix.lower()
     if ending not in ENDINGS:

@@ -73,17 +73,15 @@ def parse(text: str, names: Collection[str], where: str,
           functions: Collection[str] = (), work: Work | None = None) -> sp.Expr:
     """Parse one formula.
 
-    Parameters
-    ----------
-    text : the formula, for example ``"u_x/l*cos(theta) - g/l*sin(theta)"``
-    names : the symbols that may occur (``t`` and ``pi`` always may)
-    where : what the formula belongs to, for the error message
-    functions : names of one-argument functions that the model adds (spline edges)
-    work : shared by the formulas of one file, so that all of them together stay cheap
+    Args:
+        text: The formula, for example ``"u_x/l*cos(theta) - g/l*sin(theta)"``.
+        names: The symbols that may occur (``t`` and ``pi`` always may).
+        where: What the formula belongs to, for the error message.
+        functions: Names of one-argument functions that the model adds (spline edges).
+        work: Shared by the formulas of one file, so that all of them together stay cheap.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : unknown name or function, or anything outside the grammar
+    Raises:
+        BadModel: Unknown name or function, or anything outside the grammar.
 
     >>> parse("a*sin(x)**2", {"a", "x"}, "equation of x")
     a*sin(x)**2

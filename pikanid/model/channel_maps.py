@@ -39,9 +39,8 @@ def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
     recorded signal, `hold` ("zero", "first") says how it is interpolated.  Play, limited rate and
     delay act on the recorded signal, before all other maps.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : unknown input or symbol, or a second backlash or rate limit
+    Raises:
+        BadModel: Unknown input or symbol, or a second backlash or rate limit.
 
     >>> from pikanid.model import Input, Model, Output, Parameter, State
     >>> import sympy as sp
@@ -107,9 +106,8 @@ def map_output(model: M, name: str, parameters: Sequence[Parameter] = (), *,
     + drift·t -> function (a formula of the output's name) -> limited to clip = (lo, hi);
     `delay` [s] shifts the whole signal: the sample at t shows y(t - delay).
 
-    Raises
-    ------
-    pikanid.errors.BadModel : unknown output or symbol
+    Raises:
+        BadModel: Unknown output or symbol.
     """
     model = model.with_parameters(*parameters)
     item = model.output(name)

@@ -43,9 +43,8 @@ KEYS = {
 def load(path: str | os.PathLike[str], kind: Callable[..., M]) -> M:
     """Read a model file; `kind` makes the model of its fields.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : not a file, not TOML, or not a consistent model
+    Raises:
+        BadModel: Not a file, not TOML, or not a consistent model.
     """
     def wrong(detail: str) -> errors.BadModel:
         return errors.BadModel(errors.model_file_unreadable(str(path), detail))
@@ -71,9 +70,8 @@ def save(model: Lookup, path: str | os.PathLike[str]) -> None:
 def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -> M:
     """Build a model from the file's content; `source` names it in error messages, `kind` makes it.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : anything in it is of another type, unknown or inconsistent
+    Raises:
+        BadModel: Anything in it is of another type, unknown or inconsistent.
     """
     if not isinstance(content, Mapping):
         raise errors.BadModel(errors.not_of_kind(

@@ -67,12 +67,11 @@ def with_half_derivative(model: M, of: Formula, name: str, band: tuple[float, fl
 
     The filters start in equilibrium with the formula's initial value, as if it had always had it.
 
-    Parameters
-    ----------
-    of : formula of states, inputs and parameters, for example ``"theta_dot"``
-    name : prefix of the new states ``<name>_0 ...``
-    band : frequencies [rad/s] between which the approximation holds
-    order : number of states
+    Args:
+        of: Formula of states, inputs and parameters, for example ``"theta_dot"``.
+        name: Prefix of the new states ``<name>_0 ...``.
+        band: Frequencies [rad/s] between which the approximation holds.
+        order: Number of states.
 
     >>> from pikanid.model.systems import sloshing
     >>> model, half = with_half_derivative(sloshing(), "theta_dot", "memory", (1.0, 300.0), 6)

@@ -46,9 +46,8 @@ class Model(Operations):
     >>> model.with_term("x", "-q*x**2", [Parameter("q", 0.1)]).equations["x"]
     -k*x - q*x**2
 
-    Raises
-    ------
-    pikanid.errors.BadModel : names used twice, unknown symbols, guesses outside their bounds
+    Raises:
+        BadModel: Names used twice, unknown symbols, guesses outside their bounds.
     """
 
     name: str

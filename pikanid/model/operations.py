@@ -45,9 +45,8 @@ class Operations(Lookup):
                   parameters: Sequence[Parameter] = ()) -> Self:
         """Add `term` to the right-hand side of a state's equation.
 
-        Raises
-        ------
-        pikanid.errors.BadModel : unknown equation, or a symbol that is declared nowhere
+        Raises:
+            BadModel: Unknown equation, or a symbol that is declared nowhere.
         """
         self.state(equation)
         model = self.with_parameters(*parameters)

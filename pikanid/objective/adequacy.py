@@ -49,11 +49,10 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
           data: Sequence[np.ndarray], n_free: int, alpha: float = 1e-3) -> Adequacy:
     """Judge the residuals of all outputs together.
 
-    Parameters
-    ----------
-    residuals, sigmas, data : one array (N_o,) an output and recording; σ None where unknown
-    n_free : number of estimated parameters
-    alpha : probability of calling a right model a misfit
+    Args:
+        residuals, sigmas, data: One array (N_o,) an output and recording; σ None where unknown.
+        n_free: Number of estimated parameters.
+        alpha: Probability of calling a right model a misfit.
 
     >>> r = np.random.default_rng(0).normal(0, 2.0, 500)
     >>> judge([r], [np.full(500, 2.0)], [r], 2).verdict

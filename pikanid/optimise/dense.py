@@ -41,11 +41,11 @@ def levenberg_marquardt(residual: Residual, linearised: Linearised, start: Array
                         tolerance: float = 1e-6, damping: float = 1e-3) -> Solution:
     """Minimise |r(z)|² within bounds from `start` (n,).
 
-    Parameters
-    ----------
-    residual, linearised : z -> r (rows,), and z -> (r, ∂r/∂z (rows, n))
-    tolerance : relative fall of the cost in an iteration, three times in a row, at which to stop
-    damping : first μ, relative to the columns' squared norms
+    Args:
+        residual, linearised: z -> r (rows,), and z -> (r, ∂r/∂z (rows, n)).
+        tolerance: Relative fall of the cost in an iteration, three times in a row, at which to
+            stop.
+        damping: First μ, relative to the columns' squared norms.
 
     >>> def line(z): return np.array([z[0] - 3.0, z[0] * z[1] - 6.0]), np.array(
     ...     [[1.0, 0.0], [z[1], z[0]]])

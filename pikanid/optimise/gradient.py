@@ -132,13 +132,12 @@ def adam(loss: Loss, start: Array, *, steps: int, weight: Weight, goal: float | 
          ) -> Descent:
     """Adam (Kingma & Ba, 2015) from `start` (n,), every step put back inside the bounds.
 
-    Parameters
-    ----------
-    weight : λ at every step
-    goal : the λ by which iterates are compared, as λ moves meanwhile; the last one if None
-    rate, decay : learning rate of the first step, and what it has shrunk to by the last
-    lower, upper : bounds (n,)
-    progress : called every 100 steps with step, lam, data and physics
+    Args:
+        weight: λ at every step.
+        goal: The λ by which iterates are compared, as λ moves meanwhile; the last one if None.
+        rate, decay: Learning rate of the first step, and what it has shrunk to by the last.
+        lower, upper: Bounds (n,).
+        progress: Called every 100 steps with step, lam, data and physics.
     """
     z = _tensor(start, device)
     box = [None if b is None else _tensor(b, device) for b in (lower, upper)]

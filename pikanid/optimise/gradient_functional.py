@@ -40,9 +40,8 @@ class _Family:
 class TorchFunctional:
     """Data and physics part of Eq. (2), each divided by the number of samples.
 
-    Raises
-    ------
-    TypeError : an approximator is not an `MLP`
+    Raises:
+        TypeError: An approximator is not an `MLP`.
     """
 
     def __init__(self, functional: Functional, device: str = "cpu"):

@@ -30,11 +30,10 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
              upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100) -> Optimum:
     """Minimise ½|r(θ)|² within bounds from `start` (n,).
 
-    Parameters
-    ----------
-    residual, jacobian : θ (n,) -> r (rows,) and ∂r/∂θ (rows, n)
-    tolerance : relative change of θ and of the cost at which to stop
-    limit : evaluations allowed
+    Args:
+        residual, jacobian: θ (n,) -> r (rows,) and ∂r/∂θ (rows, n).
+        tolerance: Relative change of θ and of the cost at which to stop.
+        limit: Evaluations allowed.
 
     >>> found = minimise(lambda q: np.array([q[0] - 3.0]), lambda q: np.ones((1, 1)),
     ...                  np.array([1.0]), np.array([0.0]), np.array([2.0]))

@@ -125,16 +125,14 @@ class FreeParameter:
 class Problem:
     """A model and the recordings that it is fitted to jointly.
 
-    Parameters
-    ----------
-    model : the model
-    recordings : one recording or several; a DataFrame or the path of a file stands for one
-    need_outputs : whether the recordings must hold the model's outputs (False to simulate only)
+    Args:
+        model: The model.
+        recordings: One recording or several; a DataFrame or the path of a file stands for one.
+        need_outputs: Whether the recordings must hold the model's outputs (False to simulate only).
 
-    Raises
-    ------
-    pikanid.errors.BadRecording : a channel is missing or cannot be used
-    pikanid.errors.BadUnit : a unit is unknown or does not fit
+    Raises:
+        BadRecording: A channel is missing or cannot be used.
+        BadUnit: A unit is unknown or does not fit.
     """
 
     def __init__(self, model: Model, recordings: Recording | Sequence[Recording],

@@ -119,12 +119,12 @@ class Simulator:
             states: bool = False) -> Response:
         """Simulate at parameters p (P,).
 
-        Parameters
-        ----------
-        p : all parameters in model order
-        active : indices (A,) of the parameters whose sensitivities are wanted
-        steps : method and step length (`choose_steps`); by default chosen for 1e-8 of the signal
-        states : whether to return the states at every stop
+        Args:
+            p: All parameters in model order.
+            active: Indices (A,) of the parameters whose sensitivities are wanted.
+            steps: Method and step length (`choose_steps`); by default chosen for 1e-8 of the
+                signal.
+            states: Whether to return the states at every stop.
         """
         p = np.ascontiguousarray(p, dtype=float)
         active = _NOTHING if active is None else active
@@ -179,20 +179,18 @@ class Simulator:
         Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I, sec. II.4).  Where the
         explicit method would need very short steps the implicit one is tried.
 
-        Parameters
-        ----------
-        tolerance : of the outputs, in their own units or in those of `scale`; default 1e-8 of the
-            largest output
-        known : coarser steps in use: shorter ones follow from the method's order, checked at p
-        finest : give up below this step [s]; at least 1/4096 of the median interval is tried
-        trial : the response at p for given steps and whether these are likely to be chosen; by
-            default simulated without sensitivities
-        scale : (rows,) in which the error of each sample is measured, as its σ: what outputs of
-            several units need; the error of the steps found is in it too
+        Args:
+            tolerance: Of the outputs, in their own units or in those of `scale`; default 1e-8 of
+                the largest output.
+            known: Coarser steps in use: shorter ones follow from the method's order, checked at p.
+            finest: Give up below this step [s]; at least 1/4096 of the median interval is tried.
+            trial: The response at p for given steps and whether these are likely to be chosen; by
+                default simulated without sensitivities.
+            scale: (rows,) in which the error of each sample is measured, as its σ: what outputs of
+                several units need; the error of the steps found is in it too.
 
-        Raises
-        ------
-        pikanid.errors.SimulationFailed : the trajectory is not finite at p with any step
+        Raises:
+            SimulationFailed: The trajectory is not finite at p with any step.
         """
         if trial is None:
             def trial(steps: Steps, _: bool) -> Response:

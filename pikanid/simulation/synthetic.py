@@ -22,25 +22,23 @@ def simulate(model: Model, excitation: Recording, *,
              method: MethodChoice = "auto") -> Recording:
     """Simulate a model and return what would be recorded.
 
-    Parameters
-    ----------
-    model : the model, at its guesses and fixed values
-    excitation : a recording that holds the model's inputs
-    sigma : standard deviation of added white Gaussian noise, in the outputs' units; one for all
-        outputs or one by name, or a text with a unit ("0.1deg").  It is stored with the channels.
-    seed : of the noise
-    t : times of the outputs (N,); default: the time base of the excitation
-    parameters : values that differ from the model's
-    tolerance : of the outputs; default 1e-10 of the largest output
+    Args:
+        model: The model, at its guesses and fixed values.
+        excitation: A recording that holds the model's inputs.
+        sigma: Standard deviation of added white Gaussian noise, in the outputs' units; one for all
+            outputs or one by name, or a text with a unit ("0.1deg").  It is stored with the
+            channels.
+        seed: Of the noise.
+        t: Times of the outputs (N,); default: the time base of the excitation.
+        parameters: Values that differ from the model's.
+        tolerance: Of the outputs; default 1e-10 of the largest output.
 
-    Returns
-    -------
-    Recording with the excitation's channels and one channel an output
+    Returns:
+        Recording with the excitation's channels and one channel an output.
 
-    Raises
-    ------
-    pikanid.errors.BadRecording : an input is missing
-    pikanid.errors.SimulationFailed : the trajectory leaves the finite numbers
+    Raises:
+        BadRecording: An input is missing.
+        SimulationFailed: The trajectory leaves the finite numbers.
 
     >>> from pikanid.recording import excitation
     >>> from pikanid.model import systems

@@ -40,21 +40,20 @@ STEADY_STARTS = (1e4, 1e8)
 class IPDA:
     """Iterated principal differential analysis: Gauss-Newton on splines and parameters together.
 
-    Parameters
-    ----------
-    protocol : "default" chooses knots and λ so that neither biases visibly; "paper" is Table II.
-        None elsewhere leaves the choice to it
-    form : "second_order" (a state that is another's derivative shares its spline) or "state"
-    degree : of the splines, for the longest chain
-    intervals : between knots, per recording
-    knots : "collocation" (as many coefficients as physics conditions), "aligned" (repeated at the
-        input switches), "uniform", "adaptive" (equally many samples between any two) or
-        "curvature" (denser where the data bend)
-    physics : "gauss" (integral by Gauss points), "integral" (trapezoidal rule over the samples) or
-        "sum" (over the samples, Eq. 5)
-    lam : a fixed λ, as in Eq. (2) under "paper", else dimensionless: at 1 a physics residual as
-        large as the physics itself costs as much as every sample being off by its σ
-    warmup : iterations at the first λ in which only the splines move
+    Args:
+        protocol: "default" chooses knots and λ so that neither biases visibly; "paper" is Table II.
+            None elsewhere leaves the choice to it.
+        form: "second_order" (a state that is another's derivative shares its spline) or "state".
+        degree: Of the splines, for the longest chain.
+        intervals: Between knots, per recording.
+        knots: "collocation" (as many coefficients as physics conditions), "aligned" (repeated at
+            the input switches), "uniform", "adaptive" (equally many samples between any two) or
+            "curvature" (denser where the data bend).
+        physics: "gauss" (integral by Gauss points), "integral" (trapezoidal rule over the samples)
+            or "sum" (over the samples, Eq. 5).
+        lam: A fixed λ, as in Eq. (2) under "paper", else dimensionless: at 1 a physics residual as
+            large as the physics itself costs as much as every sample being off by its σ.
+        warmup: Iterations at the first λ in which only the splines move.
 
     >>> import numpy as np, pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -76,10 +75,9 @@ class IPDA:
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
 
-        Raises
-        ------
-        pikanid.errors.BadRecording : a channel is missing or unusable
-        pikanid.errors.BadSetting : options that cannot work together, or a delay to be estimated
+        Raises:
+            BadRecording: A channel is missing or unusable.
+            BadSetting: Options that cannot work together, or a delay to be estimated.
         """
         begun = time.perf_counter()
         fit = fit_relaxed(Problem(model, recordings), self)
@@ -89,9 +87,8 @@ class IPDA:
 def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
     """iPDA of a model bound to recordings, with all that it found on the way.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : options that cannot work together, or a delay to be estimated
+    Raises:
+        BadSetting: Options that cannot work together, or a delay to be estimated.
     """
     check_options(settings, degree=1, intervals=1, warmup=0)
     if settings.lam is not None and not settings.lam > 0.0:

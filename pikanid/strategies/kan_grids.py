@@ -28,15 +28,14 @@ APART = 1.0  # cells between two switches that both get kinks: nearer ones are h
 class KanGrid:
     """`intervals` uniform grid cells for every recording.
 
-    Parameters
-    ----------
-    degree : spline degree k of the edges
-    exact_switches : whether to add kinks where an input switches
-    quadrature : "gauss" (integral, no node straddles a switch) or "sum" (over `count` evenly
-        spaced collocation points, Table II)
-    base : "zero" (w_b = 0) or "silu"
-    seed : of pykan's initial coefficients, which a fit overwrites
-    points : Gauss nodes in a cell
+    Args:
+        degree: Spline degree k of the edges.
+        exact_switches: Whether to add kinks where an input switches.
+        quadrature: "gauss" (integral, no node straddles a switch) or "sum" (over `count` evenly
+            spaced collocation points, Table II).
+        base: "zero" (w_b = 0) or "silu".
+        seed: Of pykan's initial coefficients, which a fit overwrites.
+        points: Gauss nodes in a cell.
     """
 
     intervals: int

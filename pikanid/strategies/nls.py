@@ -30,16 +30,16 @@ from pikanid.strategies.starts import starting_points
 class NLS:
     """Single-shooting nonlinear least squares.
 
-    Parameters
-    ----------
-    starts : number of starting points; "auto" begins at the guess and adds a space-filling design
-        of eight only if that fit does not explain the recording
-    protocol : "default", or "paper": best of five starts drawn within ±20 % of the guess (Table II)
-    tolerance : relative change of parameters and cost at which the optimiser stops
-    max_evaluations : simulations allowed a start
-    seed : of the starting points
-    method : integration method, see `pikanid.simulate`
-    segments : with more than one, every start is first led to a basin by multiple shooting
+    Args:
+        starts: Number of starting points; "auto" begins at the guess and adds a space-filling
+            design of eight only if that fit does not explain the recording.
+        protocol: "default", or "paper": best of five starts drawn within ±20 % of the guess (Table
+            II).
+        tolerance: Relative change of parameters and cost at which the optimiser stops.
+        max_evaluations: Simulations allowed a start.
+        seed: Of the starting points.
+        method: Integration method, see `pikanid.simulate`.
+        segments: With more than one, every start is first led to a basin by multiple shooting.
 
     >>> import pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -60,10 +60,9 @@ class NLS:
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
 
-        Raises
-        ------
-        pikanid.errors.BadRecording : a channel is missing or unusable
-        pikanid.errors.SimulationFailed : no starting point can be simulated
+        Raises:
+            BadRecording: A channel is missing or unusable.
+            SimulationFailed: No starting point can be simulated.
         """
         begun = time.perf_counter()
         problem = Problem(model, recordings)

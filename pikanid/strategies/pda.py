@@ -46,12 +46,12 @@ REGRESSION_STEPS = 50
 class PDA:
     """Principal differential analysis: smooth, then regress.
 
-    Parameters
-    ----------
-    protocol : "default" smooths by generalised cross-validation, knots aligned with the switches;
-        "paper" is Table II: least-squares cubic splines with about 80 knots, sums at the samples
-    form, degree, intervals, knots, physics : see `IPDA`
-    smoothing : ρ, the weight of roughness; None chooses it by cross-validation ("paper": none)
+    Args:
+        protocol: "default" smooths by generalised cross-validation, knots aligned with the
+            switches; "paper" is Table II: least-squares cubic splines with about 80 knots, sums at
+            the samples.
+        form, degree, intervals, knots, physics: See `IPDA`.
+        smoothing: ρ, the weight of roughness; None chooses it by cross-validation ("paper": none).
 
     >>> import numpy as np, pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -72,11 +72,10 @@ class PDA:
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
 
-        Raises
-        ------
-        pikanid.errors.BadRecording : a channel is missing or unusable
-        pikanid.errors.BadSetting : the outputs do not determine every spline, or a parameter acts
-            where derivatives do not show it
+        Raises:
+            BadRecording: A channel is missing or unusable.
+            BadSetting: The outputs do not determine every spline, or a parameter acts where
+                derivatives do not show it.
         """
         begun = time.perf_counter()
         fit = fit_decoupled(Problem(model, recordings), self)
@@ -86,9 +85,8 @@ class PDA:
 def fit_decoupled(problem: Problem, settings: PDA) -> RelaxedFit:
     """PDA of a model bound to recordings.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : see `PDA.fit`
+    Raises:
+        BadSetting: See `PDA.fit`.
     """
     check_options(settings, degree=1, intervals=1, smoothing=0)
     paper = settings.protocol == "paper"
@@ -118,9 +116,8 @@ def fit_decoupled(problem: Problem, settings: PDA) -> RelaxedFit:
 def smooth_data(system: BandedSystem, rho: float | None) -> Smoothed:
     """The data-only fit with a given roughness weight, or with the cross-validated one.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : the outputs do not determine every spline
+    Raises:
+        BadSetting: The outputs do not determine every spline.
     """
     functional = system.functional
     theta = functional.problem.guess
@@ -137,9 +134,8 @@ def smooth_data(system: BandedSystem, rho: float | None) -> Smoothed:
 def regress(functional: Functional, point: Point) -> tuple[Point, bool]:
     """θ that minimises the physics residual of fixed splines, within bounds (Gauss-Newton).
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : a parameter has no influence on the derivatives
+    Raises:
+        BadSetting: A parameter has no influence on the derivatives.
     """
     problem = functional.problem
     theta, damping = np.clip(point.theta, problem.lower, problem.upper), 0.0

@@ -43,29 +43,28 @@ Progress = Callable[[dict[str, float]], None]
 class PIKAN:
     """Physics-informed KAN.
 
-    Parameters
-    ----------
-    protocol : "default": refinement until the discretisation no longer shows, switches exact;
-        "paper": Table II (shallow, cubic, 10 → 20 → 40, λ 0 → 0.1, then 500 L-BFGS steps at λ = 1
-        with 501 collocation points), where the gradient norm at the stop is reported
-    width : nodes of every layer; (1, 1) is shallow, in (1, 5, 1) or (1, [3, 1], 1) hidden nodes add
-        or multiply.  Every chain of states has a network of its own.  A deeper network starts from
-        the shallow fit, which it contains, and is trained as a whole from there
-    base : "zero" (w_b = 0 in Eq. 3) or "silu"
-    grid : cells of the only grid over time, in place of refinement
-    hidden_grid : cells of the grids of hidden values
-    degree : of the edges' splines
-    lam : a fixed λ (dimensionless, as in `IPDA`), in place of continuation: λ rises tenfold until
-        no parameter moves by more than 0.05 of its standard error, or until a grid that cannot
-        meet the physics would lock the fit
-    exact_switches : add the known kinks of the trajectory at the input switches
-    form : "second_order" or "state", as in `IPDA`
-    max_grid : finest grid tried; by default ten times the cells that the fastest linearised motion
-        (a radian a cell) or the switches ask for, between 640 and 20000
-    seed : of the starting coefficients of a deeper network
-    device : "cpu", or "cuda" for a pykan model that lives on a GPU.  The fit itself is NumPy and
-        runs on the CPU either way: at these sizes a GPU has nothing to gain
-    progress : called with loss parts, λ and grid after every stage
+    Args:
+        protocol: "default": refinement until the discretisation no longer shows, switches exact;
+            "paper": Table II (shallow, cubic, 10 → 20 → 40, λ 0 → 0.1, then 500 L-BFGS steps at λ =
+            1 with 501 collocation points), where the gradient norm at the stop is reported.
+        width: Nodes of every layer; (1, 1) is shallow, in (1, 5, 1) or (1, [3, 1], 1) hidden nodes
+            add or multiply.  Every chain of states has a network of its own.  A deeper network
+            starts from the shallow fit, which it contains, and is trained as a whole from there.
+        base: "zero" (w_b = 0 in Eq. 3) or "silu".
+        grid: Cells of the only grid over time, in place of refinement.
+        hidden_grid: Cells of the grids of hidden values.
+        degree: Of the edges' splines.
+        lam: A fixed λ (dimensionless, as in `IPDA`), in place of continuation: λ rises tenfold
+            until no parameter moves by more than 0.05 of its standard error, or until a grid that
+            cannot meet the physics would lock the fit.
+        exact_switches: Add the known kinks of the trajectory at the input switches.
+        form: "second_order" or "state", as in `IPDA`.
+        max_grid: Finest grid tried; by default ten times the cells that the fastest linearised
+            motion (a radian a cell) or the switches ask for, between 640 and 20000.
+        seed: Of the starting coefficients of a deeper network.
+        device: "cpu", or "cuda" for a pykan model that lives on a GPU.  The fit itself is NumPy and
+            runs on the CPU either way: at these sizes a GPU has nothing to gain.
+        progress: Called with loss parts, λ and grid after every stage.
 
     >>> import numpy as np, pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -95,10 +94,9 @@ class PIKAN:
         `estimate.approximator` holds the networks (`.kan` is the pykan model of the first
         recording and chain, `.networks` all of them), which evaluate to the fitted curve.
 
-        Raises
-        ------
-        pikanid.errors.BadRecording : a channel is missing or unusable
-        pikanid.errors.BadSetting : options that cannot work, or a delay to be estimated
+        Raises:
+            BadRecording: A channel is missing or unusable.
+            BadSetting: Options that cannot work, or a delay to be estimated.
         """
         begun = time.perf_counter()
         self._check()

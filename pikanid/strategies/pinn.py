@@ -26,25 +26,25 @@ from pikanid.strategies.relaxed_estimate import assemble
 class PINN(PinnSettings):
     """Physics-informed neural network.
 
-    Parameters
-    ----------
-    protocol : "default"; or "paper": Table II, joint gradient descent on plain networks.  None
-        elsewhere leaves the choice to it
-    optimiser : "gauss_newton", or "gradient" (Adam, then L-BFGS)
-    hidden : units of the hidden layers
-    form : "second_order" or "state", as in `IPDA`
-    lam : the (final) λ; under "paper" the physics residual counts in the unit of the state (time in
-        units of the fastest linearised motion), else λ is dimensionless as in `IPDA`.  None lets
-        Gauss-Newton raise it as far as the network can follow
-    balance : "gradnorm" sets λ during Adam, and for L-BFGS, so that both losses pull equally hard
-    hard_initial : the initial state holds exactly; else nothing is known of it
-    exact_switches : add the kinks of the trajectory at up to 32 input switches
-    collocation : number of evenly spaced points for the physics; None: Gauss nodes
-    steps : of Gauss-Newton in all, or of (Adam, L-BFGS)
-    learning_rate : of Adam
-    seed : of the starting weights
-    device : "cpu", or "cuda" where present
-    progress : called with step, lam, data and physics (the two parts of the loss)
+    Args:
+        protocol: "default"; or "paper": Table II, joint gradient descent on plain networks.  None
+            elsewhere leaves the choice to it.
+        optimiser: "gauss_newton", or "gradient" (Adam, then L-BFGS).
+        hidden: Units of the hidden layers.
+        form: "second_order" or "state", as in `IPDA`.
+        lam: The (final) λ; under "paper" the physics residual counts in the unit of the state (time
+            in units of the fastest linearised motion), else λ is dimensionless as in `IPDA`.  None
+            lets Gauss-Newton raise it as far as the network can follow.
+        balance: "gradnorm" sets λ during Adam, and for L-BFGS, so that both losses pull equally
+            hard.
+        hard_initial: The initial state holds exactly; else nothing is known of it.
+        exact_switches: Add the kinks of the trajectory at up to 32 input switches.
+        collocation: Number of evenly spaced points for the physics; None: Gauss nodes.
+        steps: Of Gauss-Newton in all, or of (Adam, L-BFGS).
+        learning_rate: Of Adam.
+        seed: Of the starting weights.
+        device: "cpu", or "cuda" where present.
+        progress: Called with step, lam, data and physics (the two parts of the loss).
 
     Bounds of parameters hold exactly: Adam is put back onto them, L-BFGS-B and Gauss-Newton keep
     to them.
@@ -63,10 +63,9 @@ class PINN(PinnSettings):
 
         `estimate.approximator` holds the networks and evaluates the fitted curve.
 
-        Raises
-        ------
-        pikanid.errors.BadRecording : a channel is missing or unusable
-        pikanid.errors.BadSetting : options that cannot work, no torch, or a delay to be estimated
+        Raises:
+            BadRecording: A channel is missing or unusable.
+            BadSetting: Options that cannot work, no torch, or a delay to be estimated.
         """
         begun = time.perf_counter()
         check(self)

@@ -74,9 +74,8 @@ class _Stop:
 def fit_network(problem: Problem, settings: PinnSettings) -> tuple[PinnFit, Any]:
     """A PINN of a model bound to recordings, and its curves.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : see `PINN.fit`
+    Raises:
+        BadSetting: See `PINN.fit`.
     """
     _need_torch(settings.device)
     from pikanid.optimise.gradient import one_thread

@@ -27,11 +27,10 @@ Groups = tuple[tuple[tuple[int, ...], ...], ...]
 class Composition:
     """A network of forms with one output.
 
-    Attributes
-    ----------
-    groups : layer by layer, the subnodes that every node multiplies
-    forms : the form of every edge that is there
-    inputs : formulas of the inputs
+    Attributes:
+        groups: Layer by layer, the subnodes that every node multiplies.
+        forms: The form of every edge that is there.
+        inputs: Formulas of the inputs.
     """
 
     groups: Groups

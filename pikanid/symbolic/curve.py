@@ -26,18 +26,17 @@ EXACT = 1e-6  # of the spread of y: closer than this nothing is told apart
 class Curve:
     """An edge over its range.
 
-    Attributes
-    ----------
-    x, y : argument and value (n,), sorted by x
-    weight : functions of x are compared as `weight @ f`: (r, n), or (n,) for a diagonal; in units
-        of the noise where `known`
-    known : whether the noise is known, or only that all of `weight` is equally noisy
-    free : further columns (n, m) that every candidate may use
-    samples : number of observations behind the curve, for BIC
-    argument, unit, x_unit : what x and y are
-    target : y as it is compared (r,)
-    std : standard deviation of y (n,), where it is known
-    exact : share of the spread of y below which nothing is told apart
+    Attributes:
+        x, y: Argument and value (n,), sorted by x.
+        weight: Functions of x are compared as `weight @ f`: (r, n), or (n,) for a diagonal; in
+            units of the noise where `known`.
+        known: Whether the noise is known, or only that all of `weight` is equally noisy.
+        free: Further columns (n, m) that every candidate may use.
+        samples: Number of observations behind the curve, for BIC.
+        argument, unit, x_unit: What x and y are.
+        target: y as it is compared (r,).
+        std: Standard deviation of y (n,), where it is known.
+        exact: Share of the spread of y below which nothing is told apart.
     """
 
     x: Array
@@ -59,10 +58,9 @@ class Curve:
                   exact: float = EXACT) -> Curve:
         """Points with independent noise of standard deviation sigma; None: equal and unknown.
 
-        Raises
-        ------
-        pikanid.errors.BadSetting : fewer than 8 points, values that are not finite, an x that does
-            not move, a sigma that is not positive
+        Raises:
+            BadSetting: Fewer than 8 points, values that are not finite, an x that does not move, a
+                sigma that is not positive.
         """
         x, y = np.asarray(x, float).ravel(), np.asarray(y, float).ravel()
         if len(x) != len(y) or len(x) < FEWEST or not np.isfinite([x, y]).all() or np.ptp(x) == 0:

@@ -20,24 +20,22 @@ def extract(source: Any, x: Array | None = None, y: Array | None = None, *,
             recordings: Recording | Sequence[Recording] | None = None) -> Reading:
     """Read a network as a formula with standard errors.
 
-    Parameters
-    ----------
-    source : a pykan model with one output, trained here or elsewhere; or the result of
-        `kan_discrepancy`, or the estimate in it, as it was saved
-    x, y : of a pykan model, the data behind it: inputs (M, n) and output (M,).  Without y its own
-        values are read and nothing can be tested; without x, over the inputs that it saw last
-    inputs : of a pykan model, names of its inputs
-    library : the forms that compete, `LIBRARY` and any `user_form`
-    alpha : level at which an edge of a pykan model is significant
-    recordings : of a discrepancy, to refit what was read inside the ODE and choose by the data
+    Args:
+        source: A pykan model with one output, trained here or elsewhere; or the result of
+            `kan_discrepancy`, or the estimate in it, as it was saved.
+        x, y: Of a pykan model, the data behind it: inputs (M, n) and output (M,).  Without y its
+            own values are read and nothing can be tested; without x, over the inputs that it saw
+            last.
+        inputs: Of a pykan model, names of its inputs.
+        library: The forms that compete, `LIBRARY` and any `user_form`.
+        alpha: Level at which an edge of a pykan model is significant.
+        recordings: Of a discrepancy, to refit what was read inside the ODE and choose by the data.
 
-    Returns
-    -------
-    Reading, whose `expression` and `parameters` go into `model.with_term`
+    Returns:
+        Reading, whose `expression` and `parameters` go into `model.with_term`.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : data that do not fit the network, or nothing to read
+    Raises:
+        BadSetting: Data that do not fit the network, or nothing to read.
 
     >>> import numpy as np
     >>> from pikanid.approximators.kan import build_kan

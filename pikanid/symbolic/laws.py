@@ -51,13 +51,12 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
                 ranges: Sequence[tuple[float, float]], unit: str = "") -> Laws:
     """The sum without the laws' offsets, which the equation's own constant part holds.
 
-    Parameters
-    ----------
-    model : in whose names the arguments are, and whose names the constants must not take
-    arguments : of every edge, by its number
-    fits : the laws, by place (0, number, 0)
-    ranges : of every edge's argument, which bound the parameters inside a law
-    unit : of the sum, from which the units of the parameters follow; left open if empty
+    Args:
+        model: In whose names the arguments are, and whose names the constants must not take.
+        arguments: Of every edge, by its number.
+        fits: The laws, by place (0, number, 0).
+        ranges: Of every edge's argument, which bound the parameters inside a law.
+        unit: Of the sum, from which the units of the parameters follow; left open if empty.
     """
     terms, parameters = [], []
     taken = set(model.symbols)

@@ -84,13 +84,12 @@ def reach_of(size: float) -> float:
 class Form:
     """One candidate.
 
-    Attributes
-    ----------
-    name : what it is called
-    family : forms of one family share its prior probability
-    columns : the f_k(x; p)
-    knobs : the p
-    powers : power of x's unit in every f_k; None where it follows an exponent
+    Attributes:
+        name: What it is called.
+        family: Forms of one family share its prior probability.
+        columns: The f_k(x; p).
+        knobs: The p.
+        powers: Power of x's unit in every f_k; None where it follows an exponent.
     """
 
     name: str
@@ -236,9 +235,8 @@ def user_form(expression: sp.Expr | str, argument: str = "x", name: str | None =
     Parameters that enter linearly are amplitudes and an offset: they are estimated in closed form.
     The others are looked for as rates unless they shift the argument.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : a formula that cannot be read, or without its argument
+    Raises:
+        BadModel: A formula that cannot be read, or without its argument.
 
     >>> form = user_form("q*sin(w*x)*exp(-x)")
     >>> form.columns, [k.name for k in form.knobs]

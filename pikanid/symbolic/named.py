@@ -25,13 +25,12 @@ CHANCE = 0.01
 class Candidate:
     """One form on one edge.
 
-    Attributes
-    ----------
-    form, fit : what it is and its best constants
-    probability : among all candidates, "nothing" and "no simple form"
-    score : BIC less twice the log of the prior
-    adequacy : probability of what it leaves behind, were it right
-    agrees : whether its curve is the first candidate's, as far as the data can tell
+    Attributes:
+        form, fit: What it is and its best constants.
+        probability: Among all candidates, "nothing" and "no simple form".
+        score: BIC less twice the log of the prior.
+        adequacy: Probability of what it leaves behind, were it right.
+        agrees: Whether its curve is the first candidate's, as far as the data can tell.
     """
 
     form: Form
@@ -92,12 +91,13 @@ class Candidate:
 class NamedEdge:
     """What an edge may be, ranked.
 
-    Attributes
-    ----------
-    curve : the edge
-    candidates : most probable first; those that leave a trace in the residual have probability 0
-    unnamed : probability of "no simple form"
-    noise : standard deviation of the noise that is left (1 where it was given), in whitened units
+    Attributes:
+        curve: The edge.
+        candidates: Most probable first; those that leave a trace in the residual have probability
+            0.
+        unnamed: Probability of "no simple form".
+        noise: Standard deviation of the noise that is left (1 where it was given), in whitened
+            units.
     """
 
     curve: Curve

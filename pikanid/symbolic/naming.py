@@ -35,18 +35,16 @@ def name_edge(x: np.ndarray, y: np.ndarray, *, sigma: float | np.ndarray | None 
               argument: str = "x", unit: str = "", x_unit: str = "") -> NamedEdge:
     """Name the function behind the points of one edge.
 
-    Parameters
-    ----------
-    x, y : argument and value (n,), in `x_unit` and `unit`
-    sigma : standard deviation of independent noise, one or (n,); unknown and equal unless given
-    covariance : of y (n, n) instead, as a spline's values have it
-    library : the candidates; "nothing" always competes
-    argument : what x is, for sentences and the expression
+    Args:
+        x, y: Argument and value (n,), in `x_unit` and `unit`.
+        sigma: Standard deviation of independent noise, one or (n,); unknown and equal unless given.
+        covariance: Of y (n, n) instead, as a spline's values have it.
+        library: The candidates; "nothing" always competes.
+        argument: What x is, for sentences and the expression.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : fewer than 8 points, values that are not finite, an x that does not
-        move, a sigma that is not positive
+    Raises:
+        BadSetting: Fewer than 8 points, values that are not finite, an x that does not move, a
+            sigma that is not positive.
 
     >>> x = np.linspace(-1.0, 1.0, 200)
     >>> noise = np.random.default_rng(0).normal(0.0, 0.05, x.size)

@@ -43,15 +43,14 @@ def read_network(kan: Any, x: Array | None = None, y: Array | None = None, *,
                  alpha: float = 0.01, units: tuple[Sequence[str], str] | None = None) -> Reading:
     """A pykan model with one output as a formula; the model stays as it is.
 
-    Parameters
-    ----------
-    kan : any pykan model, trained here or elsewhere
-    x, y : the data behind it, (M, n) and (M,); without y the network's own values are read and
-        nothing can be tested, without x the inputs that it saw last are taken
-    inputs : names of the inputs, "x1", "x2", ... unless given; also formulas of a model's names
-    library : the forms that compete
-    alpha : level at which edges are significant
-    units : units of the inputs, and of the output
+    Args:
+        kan: Any pykan model, trained here or elsewhere.
+        x, y: The data behind it, (M, n) and (M,); without y the network's own values are read and
+            nothing can be tested, without x the inputs that it saw last are taken.
+        inputs: Names of the inputs, "x1", "x2", ... unless given; also formulas of a model's names.
+        library: The forms that compete.
+        alpha: Level at which edges are significant.
+        units: Units of the inputs, and of the output.
     """
     seen = kan.cache_data if x is None else x
     if seen is None:

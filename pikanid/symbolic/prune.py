@@ -18,11 +18,10 @@ from pikanid.symbolic.significance import Contribution, contributions
 class Pruned:
     """A KAN without its insignificant edges.
 
-    Attributes
-    ----------
-    kan : a new pykan model; the one that was given is as it was
-    fit : its least squares on the data
-    removed : the edges that went, in order, each as it was judged
+    Attributes:
+        kan: A new pykan model; the one that was given is as it was.
+        fit: Its least squares on the data.
+        removed: The edges that went, in order, each as it was judged.
     """
 
     kan: Any
@@ -38,16 +37,14 @@ def prune(kan: Any, x: Array, y: Array, *, alpha: float = 0.01, refit: bool = Tr
     than one layer every other edge is then tried, the faintest first, since its part may be one
     that the rest can take over.  The last edge stays.
 
-    Parameters
-    ----------
-    kan : a pykan model with one output
-    x, y : data (M, inputs), (M,)
-    alpha : level of each Wald test
-    refit : whether the model is fitted to the data before the first test
+    Args:
+        kan: A pykan model with one output.
+        x, y: Data (M, inputs), (M,).
+        alpha: Level of each Wald test.
+        refit: Whether the model is fitted to the data before the first test.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : a level outside 0 ... 1, data that do not fit the model
+    Raises:
+        BadSetting: A level outside 0 ... 1, data that do not fit the model.
     """
     if not 0.0 < alpha < 1.0:
         raise errors.BadSetting(errors.bad_value("alpha", alpha, "between 0 and 1"))

@@ -25,9 +25,8 @@ def push(reading: Reading) -> Any:
     pykan's plot, its `symbolic_formula` and its forward pass show what was read.  The model that
     was read stays as it is, and pykan's table of functions too.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : the reading is not that of a KAN
+    Raises:
+        BadSetting: The reading is not that of a KAN.
     """
     if reading.kan is None or reading.composition is None:
         raise errors.BadSetting(errors.nothing_to_push())

@@ -32,26 +32,26 @@ CLOSE = 0.03  # share of the spread that may be left where no data can judge
 class Reading:
     """What a network says.
 
-    Attributes
-    ----------
-    expression : SymPy, in the inputs' names and its constants
-    names, values, covariance : of the constants (k,), (k,), (k, k)
-    inputs : names or formulas of the inputs
-    ranges : lowest and highest value of every input: outside them the formula means nothing
-    edges : every edge that was read, by (layer, source, target)
-    contributions : of edges and nodes, those removed included
-    probability : of this choice of forms among those tried
-    alternatives : (forms, probability) of the runners-up
-    error_network, error_data : root mean square of formula less network, and of data less formula
-    spread : standard deviation of the data (or of the network where there are none)
-    p_value : probability of leaving so much more than the network does, were the formula right;
-        None without data
-    forms : the form chosen for every edge
-    units : of the constants, "" where not known
-    kan, composition, theta : the network that was read, pruned, and the formula in its places with
-        all its constants
-    estimate : of the model with the formula in it, where it was refitted inside an ODE
-    caution : why the formula cannot be trusted whatever its fit, or ""
+    Attributes:
+        expression: SymPy, in the inputs' names and its constants.
+        names, values, covariance: Of the constants (k,), (k,), (k, k).
+        inputs: Names or formulas of the inputs.
+        ranges: Lowest and highest value of every input: outside them the formula means nothing.
+        edges: Every edge that was read, by (layer, source, target).
+        contributions: Of edges and nodes, those removed included.
+        probability: Of this choice of forms among those tried.
+        alternatives: (forms, probability) of the runners-up.
+        error_network, error_data: Root mean square of formula less network, and of data less
+            formula.
+        spread: Standard deviation of the data (or of the network where there are none).
+        p_value: Probability of leaving so much more than the network does, were the formula right;
+            None without data.
+        forms: The form chosen for every edge.
+        units: Of the constants, "" where not known.
+        kan, composition, theta: The network that was read, pruned, and the formula in its places
+            with all its constants.
+        estimate: Of the model with the formula in it, where it was refitted inside an ODE.
+        caution: Why the formula cannot be trusted whatever its fit, or "".
     """
 
     expression: sp.Expr
@@ -108,9 +108,8 @@ class Reading:
     def __call__(self, x: Array) -> Array:
         """The formula at inputs (M, n), which must lie in their ranges to mean anything.
 
-        Raises
-        ------
-        pikanid.errors.BadSetting : another number of inputs, or inputs that are formulas
+        Raises:
+            BadSetting: Another number of inputs, or inputs that are formulas.
         """
         x = np.asarray(x, float).reshape(len(x), -1)
         if x.shape[1] != len(self.inputs) or not all(n.isidentifier() for n in self.inputs):

@@ -29,9 +29,8 @@ def read_estimate(estimate: Estimate, library: Sequence[Form]) -> Reading:
     What edges and parameters can do in each other's place has a large variance, and so does not
     speak for or against a law.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : the model holds no such edges
+    Raises:
+        BadSetting: The model holds no such edges.
     """
     plans = _plans(estimate)
     if not plans:

@@ -59,12 +59,11 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
            exact: float) -> list[Ranked]:
     """Compositions that were tried to the end, best first.
 
-    Parameters
-    ----------
-    named : the edges that are there
-    offsets : constants of every layer's subnodes beside the edges' own
-    priors : prior probability of every form, by name
-    exact : share of the spread of y below which nothing is told apart
+    Args:
+        named: The edges that are there.
+        offsets: Constants of every layer's subnodes beside the edges' own.
+        priors: Prior probability of every form, by name.
+        exact: Share of the spread of y below which nothing is told apart.
     """
     lists = {place: shortlist(edge) for place, edge in named.items()}
     step = max(1, len(x) // SEARCHED)

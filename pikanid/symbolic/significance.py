@@ -43,11 +43,10 @@ class Contribution:
 def contributions(fit: PointFit, x: Array, attribution: bool = False) -> tuple[Contribution, ...]:
     """Of every active edge, then of every hidden and input node.
 
-    Parameters
-    ----------
-    fit : a KAN at the least squares of its points
-    x : their inputs (M, inputs)
-    attribution : whether pykan's scores are computed for comparison
+    Args:
+        fit: A KAN at the least squares of its points.
+        x: Their inputs (M, inputs).
+        attribution: Whether pykan's scores are computed for comparison.
     """
     edges = edges_of(fit.network)
     inputs = arguments(fit.kan, x)

@@ -62,16 +62,14 @@ def cramer_rao(model: Model, recording: Recording | Sequence[Recording],
                sigma: float | Mapping[str, float] | None = None) -> CramerRao:
     """The Cramér-Rao bound of an experiment at the model's parameter values.
 
-    Parameters
-    ----------
-    model : values of its free parameters are taken as true
-    recording : one or several; where an output is missing its samples are taken at the recording's
-        own times, so that an excitation alone will do
-    sigma : noise of the outputs, if the recordings do not carry it
+    Args:
+        model: Values of its free parameters are taken as true.
+        recording: One or several; where an output is missing its samples are taken at the
+            recording's own times, so that an excitation alone will do.
+        sigma: Noise of the outputs, if the recordings do not carry it.
 
-    Raises
-    ------
-    pikanid.errors.BadSetting : no σ is known for an output
+    Raises:
+        BadSetting: No σ is known for an output.
 
     >>> from pikanid.recording import excitation
     >>> from pikanid.model import systems

@@ -95,10 +95,9 @@ class Partition:
 def information_partition(coefficients: np.ndarray, parameters: np.ndarray) -> Partition:
     """Effective Fisher information on p when coefficients c are estimated jointly.
 
-    Parameters
-    ----------
-    coefficients : ∂r/∂c (rows, K) of the standardised residual [data; √λ physics]
-    parameters : ∂r/∂p (rows, n)
+    Args:
+        coefficients: ∂r/∂c (rows, K) of the standardised residual [data; √λ physics].
+        parameters: ∂r/∂p (rows, n).
 
     >>> part = information_partition(np.array([[1.0], [0.0]]), np.array([[1.0], [1.0]]))
     >>> part.shares

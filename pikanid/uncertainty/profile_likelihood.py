@@ -42,16 +42,14 @@ def profile(model: Model, recordings: Recording | Sequence[Recording], theta: np
     Steps outwards from the optimum on both sides, refitting all others, until the excess passes
     the quantile or the parameter's bound is met; the crossing is interpolated.
 
-    Parameters
-    ----------
-    model, recordings, theta : as fitted (`estimate.model`, ..., `estimate.theta`)
-    name : the parameter (its label, where every recording has its own)
-    level : coverage of the interval
-    points : values a side at most
+    Args:
+        model, recordings, theta: As fitted (`estimate.model`, ..., `estimate.theta`).
+        name: The parameter (its label, where every recording has its own).
+        level: Coverage of the interval.
+        points: Values a side at most.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : the parameter was not estimated
+    Raises:
+        BadModel: The parameter was not estimated.
     """
     from scipy.stats import chi2
 

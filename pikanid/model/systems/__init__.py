@@ -33,9 +33,8 @@ SYSTEMS: Mapping[str, Callable[[], Model]] = {
 def find(name: str) -> Model:
     """The ready-made model of that name, or the model in that TOML file.
 
-    Raises
-    ------
-    pikanid.errors.BadModel : neither a known name nor a readable model file
+    Raises:
+        BadModel: Neither a known name nor a readable model file.
 
     >>> find("pendulum").free_names
     ('l', 'd', 'theta_0', 'theta_dot_0')
