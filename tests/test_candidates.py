@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import ast
+import re
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import pikanid as pk
 from pikanid.formula.expressions import symbol
@@ -16,6 +21,7 @@ from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Model, systems
 from pikanid.recording import excitation
+from pikanid.symbolic.library import LIBRARY
 
 
 def made(model: Model) -> tuple[Candidate, ...]:
@@ -41,3 +47,72 @@ def test_candidates_are_well_formed(make: Callable[[], Model]) -> None:
     groups = Counter(c.twin for c in found if c.twin)
     assert groups and min(groups.values()) > 1  # nothing is a twin of nothing
     assert {c.channel for c in found} == set(get_args(Channel))
+
+
+def test_no_entry_is_known_by_name_outside_the_catalogue() -> None:
+    run = pk.simulate(systems.sloshing(), excitation.two_pulse())
+    run = run.with_channels(replace(run["u_x"], name="u_y"))  # what could act across the axis
+    known = {i for c in candidates(sites(systems.sloshing(), (run,))) for i in c.ids}
+    root = Path(pk.__file__).parent
+    elsewhere = [path for path in root.rglob("*.py")
+                 if not path.is_relative_to(root / "mismatch" / "catalogue")
+                 and not path.is_relative_to(root / "validation")]  # has effects of its own
+    assert len(known) > 35 and len(elsewhere) > 100
+    assert not {str(path.relative_to(root)): found for path in elsewhere
+                if (found := known & words(path))}
+
+
+def words(path: Path) -> set[str]:
+    """The words in texts of a module, docstrings left out."""
+    tree = ast.parse(path.read_text())
+    told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    texts = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)
+             and isinstance(node.value, str) and id(node) not in told]
+    return {word for text in texts for word in re.findall(r"\w+", text)}
+
+
+def test_entries_name_entries() -> None:
+    found = made(systems.sloshing())
+    keys, ids = {c.key for c in found}, {i for c in found for i in c.ids}
+    named = {key for c in found for key in c.covers}
+    assert named and named <= keys
+    limits = {i for c in found if c.limit for i in c.limit.ids}
+    assert limits and limits <= ids
+    for c in found:
+        own = {p.name for p in c.parameters}
+        assert all(set(begun) < own for begun in c.covers.values()), c.key
+        assert c.limit is None or c.limit.parameter in own, c.key
+
+
+def test_forms_are_those_of_the_library() -> None:
+    site = sites(systems.sloshing(), (pk.simulate(systems.sloshing(), excitation.two_pulse()),))[0]
+    forms = {f.name: f for f in LIBRARY}
+    formed = [c for c in candidates((site,)) if c.form]
+    assert {c.argument for c in formed} == {"", "theta", "theta_dot"}
+    for c in formed:
+        size, *more = c.parameters
+        force = c.applied(site.model).equations[site.v] - site.acceleration
+        law = sp.Integer(1)
+        if c.argument:
+            form = forms[c.form]
+            (column,), (x, *knobs) = form.columns, form.symbols
+            law = column.subs({x: symbol(c.argument), **{
+                k: symbol(p.name) for k, p in zip(knobs, more, strict=True)}})
+        assert sp.Abs(sp.simplify(force / law)) == sp.Abs(symbol(size.name)), c.key
+
+
+@pytest.mark.parametrize("identifier", [
+    "coulomb_friction", "quadratic_drag", "power_drag", "stribeck_friction"])
+def test_resistance_is_the_force_against_the_motion(identifier: str) -> None:
+    (law,) = (c for c in made(systems.sloshing()) if c.ids[0] == identifier)
+    size, *more = law.parameters
+    at = {p.name: 0.7 for p in more}
+    speed = np.array([0.1, 0.6, 2.3])
+    assert law.resistance is not None
+    force = law.applied(law.site.model).equations[law.site.v] - law.site.acceleration
+    at_one = force.subs({symbol(n): v for n, v in {size.name: 1.0, **at}.items()})
+    seen = [float(-at_one.subs(symbol(law.site.v), v)) for v in speed]
+    np.testing.assert_allclose(law.resistance(speed, *at.values()), seen, rtol=1e-12)
+    exponent = law.exponent.name if isinstance(law.exponent, pk.Parameter) else law.exponent
+    assert exponent == {"coulomb_friction": 0.0, "quadratic_drag": 2.0,
+                        "power_drag": "n"}.get(identifier)

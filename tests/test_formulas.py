@@ -33,7 +33,8 @@ def case() -> Case:
 
 def test_the_missing_law_is_among_the_formulas(case: Case) -> None:
     shape = force_shape(case.base, case.sites[0], case.candidates)
-    formulas = [c.ids[0] for c in symbolic_candidates(shape, case.sites[0])]
+    formulas = [c.ids[0] for c in symbolic_candidates(
+        shape, case.sites[0], case.candidates)]
     assert f"{SYMBOLIC}a_theta*theta**2" in formulas
     assert f"{SYMBOLIC}a_theta*theta**3" not in formulas  # the catalogue's own
 

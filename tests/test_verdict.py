@@ -315,7 +315,7 @@ def test_a_formula_is_not_sure_beside_another_law_that_does_about_as_well() -> N
 
 
 def test_a_formula_that_is_the_sum_of_two_entries_needs_both() -> None:
-    both = replace(effect(f"{SYMBOLIC}k*sign(v) + f"), covers=("a", "b"))
+    both = replace(effect(f"{SYMBOLIC}k*sign(v) + f"), covers={"a": {}, "b": {}})
     fits = [BASE, hypothesis(1900.0, B), hypothesis(1000.5, GUARD), hypothesis(1000.0, both)]
     assert answered([*fits, hypothesis(1100.0, A)], refused=("a",)).verdict == "named"
     weak = answered([*fits, hypothesis(1040.0, A)], refused=("a",))

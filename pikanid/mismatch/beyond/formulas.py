@@ -7,7 +7,7 @@ estimated anew inside the equation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from pikanid.formula import units
@@ -25,17 +25,25 @@ from pikanid.symbolic.search import shortlist
 FORMS = 3  # of an edge
 MOST, ALMOST = 0.6, 0.9  # of what all edges explain, or the best one alone: less is not read
 LINEAR = "linear"  # what free parameters do already, as a rule
-CATALOGUED = {"q": {"cubic": "cubic_stiffness"},
-              "v": {"sign": "coulomb_friction", "signed square": "quadratic_drag",
-                    "signed power": "power_drag"}}
+CONSTANT = ("constant", "")
+Entries = Mapping[tuple[str, str], str]  # form and argument -> key in the catalogue
 
 
-def symbolic_candidates(shape: ForceShape, site: Site) -> list[Candidate]:
-    """Formulas for what an edge shows, as effects, of the edges that explain most alone."""
+def symbolic_candidates(shape: ForceShape, site: Site, entries: Sequence[Candidate]
+                        ) -> list[Candidate]:
+    """Formulas for what an edge shows, as effects, of the edges that explain most alone.
+
+    Args:
+        shape: The missing force.
+        site: Where it acts.
+        entries: The catalogue: a form that is an entry of it is no formula of its own.
+    """
+    named = {(e.form, e.argument): e.key for e in entries if e.form and e.site.q == site.q}
     best = max((e.alone for e in shape.edges), default=0.0)
     edges = [e for e in shape.edges if e.alone > max(MOST, ALMOST * best)]
-    return [_candidate(site, edge, fit, constant) for edge in edges for fit in _forms(edge)
-            for constant in (False, True) if constant or not _catalogued(edge, fit, site)]
+    return [_candidate(site, edge, fit, constant, named)
+            for edge in edges for fit in _forms(edge) for constant in (False, True)
+            if constant or (fit.form.name, edge.argument) not in named]
 
 
 def _forms(edge: Edge) -> list[FormFit]:
@@ -43,14 +51,7 @@ def _forms(edge: Edge) -> list[FormFit]:
     return [f for f in fits if f.form is not NOTHING and f.form.family != LINEAR][:FORMS]
 
 
-def _catalogued(edge: Edge, fit: FormFit, site: Site) -> str:
-    """The key of the entry that a form alone would be; empty where there is none."""
-    kind = {site.q: "q", site.v: "v"}.get(edge.argument, "")
-    found = CATALOGUED.get(kind, {}).get(fit.form.name)
-    return found + site.suffix if found else ""
-
-
-def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool) -> Candidate:
+def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entries) -> Candidate:
     law = sum_of_laws(site.model, [edge.argument], {(0, 0, 0): fit},
                       [(edge.curve.low, edge.curve.high)])
     parameters = tuple(_with_units(law, site, edge, fit))
@@ -60,10 +61,11 @@ def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool) -> Candidat
         parameters = (*parameters, force)
         expression = expression + symbol(force.name)
     text = str(expression)
-    alone = _catalogued(edge, fit, site)
+    alone = named.get((fit.form.name, edge.argument))
+    covers: dict[str, dict[str, float]] = {alone: {}, named[CONSTANT]: {}} if alone else {}
     return Candidate((SYMBOLIC + text,), f"a law {text}", text, "dynamics", site, parameters,
                      lambda m: m.with_term(site.v, expression), lambda view: (),
-                     covers=(alone, "static_bias" + site.suffix) if alone else ())
+                     covers=covers, static=True)
 
 
 def _with_units(law: Laws, site: Site, edge: Edge, fit: FormFit) -> Iterator[Parameter]:

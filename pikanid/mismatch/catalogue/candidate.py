@@ -14,6 +14,7 @@ from pikanid.model.parts import Parameter
 
 Channel = Literal["dynamics", "input", "sensor"]
 Array = np.ndarray
+Resistance = Callable[..., Array]  # (speed (N,), each parameter but the size) -> (N,)
 SYMBOLIC = "symbolic:"  # before the formula, in the id of a law that no catalogue holds
 
 
@@ -57,8 +58,16 @@ class TangentDirection:
 
 
 @dataclass(frozen=True)
+class Limit:
+    """The law that an effect turns into as a length among its parameters goes to zero."""
+
+    parameter: str
+    ids: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Candidate:
-    """One effect in one model.
+    """One effect in one model, and all that is special about it.
 
     Attributes:
         ids: Names in reports: one, or all of a group of exact twins.
@@ -75,7 +84,14 @@ class Candidate:
         absent: Whether another recording is not expected to show it.
         known: Whether the catalogue holds it; a guard only keeps wrong names away.
         fits: Whether it can be added and refitted, not only looked for.
-        covers: Keys of candidates that it contains as special cases.
+        covers: Keys of candidates that it contains as special cases, each with values of its own
+            further parameters from where a fit in that one's place begins; none: from several.
+        static: Whether it is a force that the state at the same instant determines.
+        resistance: The force against the motion at size 1, where it is no more than that.
+        exponent: Of the speed, where that force is a power of it: a number, or the parameter.
+        limit: What it cannot be told from where it is narrow.
+        form: Name in the library of `pikanid.symbolic` of its force over `argument`.
+        argument: State that `form` is a function of; empty for a constant.
         other_minima: Factors of its first parameter by which χ² may have other minima, as where a
             motion comes to rest between two samples.
         levels: Values of its parameters, from the best of which a fit begins where the model is far
@@ -99,7 +115,13 @@ class Candidate:
     absent: bool = False
     known: bool = True
     fits: bool = True
-    covers: tuple[str, ...] = ()
+    covers: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    static: bool = False
+    resistance: Resistance | None = None
+    exponent: float | Parameter | None = None
+    limit: Limit | None = None
+    form: str = ""
+    argument: str = ""
     other_minima: tuple[float, ...] = ()
     levels: tuple[Mapping[str, float], ...] = ()
     beside: tuple[str, ...] = ()

@@ -89,9 +89,12 @@ def stribeck_friction(site: Site) -> list[Candidate]:
                                  one_sided=True)
                 for s in (0.05, 0.15, 0.5)]
 
+    def resistance(speed: np.ndarray, rise: float, slow: float) -> np.ndarray:
+        return np.asarray(1 + rise * np.exp(-(speed / slow) ** 2))
+
     return [Candidate(("stribeck_friction",), "friction that rises at low speed", text, "dynamics",
                       site, (c, rise, slow), lambda m: m.with_term(site.v, text), directions,
-                      known=False, covers=("coulomb_friction",))]
+                      known=False, covers={"coulomb_friction": {}}, resistance=resistance)]
 
 
 def dissipating_wall(site: Site) -> list[Candidate]:
@@ -109,7 +112,7 @@ def dissipating_wall(site: Site) -> list[Candidate]:
         found.append(Candidate(
             ("dissipating_wall",), "impact on a wall that takes energy out", text, "dynamics",
             site, (*wall.parameters, a), _with_term(site.v, text), lambda view: [], wall.variant,
-            known=False, other_minima=wall.other_minima, levels=wall.levels, covers=(wall.key,)))
+            known=False, other_minima=wall.other_minima, levels=wall.levels, covers={wall.key: {}}))
     return found
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import sympy as sp
 
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
+from pikanid.mismatch.catalogue.candidate import Candidate, Limit, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, State
@@ -42,16 +43,19 @@ def sense(view: View, v: str) -> np.ndarray:
 def coulomb_friction(site: Site) -> list[Candidate]:
     """Dry friction: the same force at every speed, against the motion."""
     c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
-    return [term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-                 lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING)]
+    law = term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
+               lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING)
+    return [replace(law, static=True, resistance=np.ones_like, exponent=0.0, form="sign",
+                    argument=site.v)]
 
 
 def quadratic_drag(site: Site) -> list[Candidate]:
     """Drag that grows with the square of the speed."""
     q = Parameter(site.name("q2"), 0.0, f"1/({site.unit})", (0.0, INF))
-    return [term(site, "quadratic_drag", "quadratic drag",
-                 f"-{q.name}*abs({site.v})*{site.v}", q,
-                 lambda w: -np.abs(w.x[site.v]) * w.x[site.v], one_sided=True)]
+    law = term(site, "quadratic_drag", "quadratic drag", f"-{q.name}*abs({site.v})*{site.v}", q,
+               lambda w: -np.abs(w.x[site.v]) * w.x[site.v], one_sided=True)
+    return [replace(law, static=True, resistance=np.square, exponent=2.0, form="signed square",
+                    argument=site.v)]
 
 
 def power_drag(site: Site) -> list[Candidate]:
@@ -69,7 +73,9 @@ def power_drag(site: Site) -> list[Candidate]:
 
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
                       (c, n), lambda m: m.with_term(site.v, text), directions,
-                      covers=("coulomb_friction", "quadratic_drag"))]
+                      covers={"coulomb_friction": {n.name: 0.3}, "quadratic_drag": {n.name: 1.8}},
+                      static=True, resistance=np.power, exponent=n, form="signed power",
+                      argument=site.v)]
 
 
 def amplitude_damping(site: Site) -> list[Candidate]:
@@ -79,9 +85,10 @@ def amplitude_damping(site: Site) -> list[Candidate]:
     if not site.rate:
         return []
     c = Parameter(site.name("c2"), 0.0, f"1/(s*({site.unit})^2)", (0.0, INF))
-    return [term(site, "amplitude_damping", "damping that grows with amplitude",
-                 f"-{c.name}*{site.q}**2*{site.v}", c,
-                 lambda w: -w.x[site.q] ** 2 * w.x[site.v], one_sided=True)]
+    law = term(site, "amplitude_damping", "damping that grows with amplitude",
+               f"-{c.name}*{site.q}**2*{site.v}", c,
+               lambda w: -w.x[site.q] ** 2 * w.x[site.v], one_sided=True)
+    return [replace(law, static=True)]
 
 
 def cubic_stiffness(site: Site) -> list[Candidate]:
@@ -89,8 +96,9 @@ def cubic_stiffness(site: Site) -> list[Candidate]:
     if not site.rate:
         return []
     k = Parameter(site.name("k3"), 0.0, f"1/(s^2*({site.unit})^2)")
-    return [term(site, "cubic_stiffness", "cubic stiffness", f"-{k.name}*{site.q}**3", k,
-                 lambda w: -w.x[site.q] ** 3, one_sided=False)]
+    law = term(site, "cubic_stiffness", "cubic stiffness", f"-{k.name}*{site.q}**3", k,
+               lambda w: -w.x[site.q] ** 3, one_sided=False)
+    return [replace(law, static=True, form="cubic", argument=site.q)]
 
 
 def static_bias(site: Site) -> list[Candidate]:
@@ -118,7 +126,7 @@ def static_bias(site: Site) -> list[Candidate]:
         return [TangentDirection({b.name: 1.0}, force=np.ones(len(view.t)), initial=initial)]
 
     return [Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site,
-                      (b,), extend, directions, twin="offset")]
+                      (b,), extend, directions, twin="offset", static=True, form="constant")]
 
 
 def parameter_drift(site: Site) -> list[Candidate]:
@@ -158,7 +166,7 @@ def wall_impact(site: Site) -> list[Candidate]:
 
         return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
                          lambda m: m.with_term(site.v, text), directions,
-                         variant="" if side > 0 else SIDE,
+                         variant="" if side > 0 else SIDE, static=True,
                          other_minima=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))
@@ -193,7 +201,10 @@ def hysteresis(site: Site) -> list[Candidate]:
         return found
 
     return [Candidate(("hysteresis",), "hysteresis (Bouc-Wen)", f"-{b.name}*{z}", "dynamics", site,
-                      (b, d), extend, directions, variant="bouc_wen")]
+                      (b, d), extend, directions, variant="bouc_wen",
+                      # a narrow loop is dry friction that gives before it slips (P. Dahl, AIAA J.
+                      # 14, 1976)
+                      limit=Limit(d.name, ("coulomb_friction",)))]
 
 
 def boundary_layer(site: Site) -> list[Candidate]:

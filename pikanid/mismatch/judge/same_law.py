@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.search.screen import EXPONENTS
+from pikanid.model.parts import Parameter
 
 SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
 WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
 OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
-NARROW = 0.03  # of the half range: a loop no wider is dry friction that gives before it slips
+NARROW = 0.03  # of the half range: what is no wider cannot be told from its limit
 
 
 def integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
@@ -24,7 +24,7 @@ def integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
 
 def _exponent(h: Hypothesis) -> str | None:
     """Name of the exponent of a hypothesis' power law, if it has one."""
-    return next((e.parameters[1].name for e in h.effects if e.ids[0] == "power_drag"), None)
+    return next((e.exponent.name for e in h.effects if isinstance(e.exponent, Parameter)), None)
 
 
 def _exponent_gap(h: Hypothesis, whole: float) -> float | None:
@@ -48,10 +48,13 @@ def _open_exponent(h: Hypothesis, whole: float) -> bool:
     return gap is not None and gap < OPEN and not (gap < WHOLE and _sharp(h))
 
 
-def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]) -> Hypothesis | None:
-    """The hypothesis with a law of free exponent in the place of one of `h`'s effects."""
+def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]
+               ) -> tuple[Hypothesis, Candidate] | None:
+    """The hypothesis with a law of free exponent in the place of one of `h`'s effects, and that
+    law.
+    """
     rest = h.key - {effect.key}
-    return next((o for o in tried for e in o.effects
+    return next(((o, e) for o in tried for e in o.effects
                  if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
 
 
@@ -60,7 +63,7 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
-    open, and hysteresis dry friction where its loop is narrow (P. Dahl, AIAA J. 14, 1976).
+    open, and an effect with a limit has that where it is narrow.
     """
     def group(e: Candidate) -> str:
         return e.twin + e.site.suffix if e.twin else e.key
@@ -77,11 +80,11 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
                 if group(o) == group(e):
                     table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.names)))
         for e in h.effects:
-            power = _power_law(h, e, tried) if e.ids[0] in EXPONENTS else None
-            if leader is h and power and _open_exponent(power, EXPONENTS[e.ids[0]]):
-                table[e.key] += ("power_drag",)
-                absorbed.add(power.key)
-            if leader is h and e.ids[0] == "hysteresis" and e.channel == "dynamics" and (
-                    h.values[e.parameters[1].name] < NARROW * e.site.half_range):
-                table[e.key] += ("coulomb_friction",)
+            if leader is h and isinstance(e.exponent, int | float) and (
+                    wider := _power_law(h, e, tried)) and _open_exponent(wider[0], e.exponent):
+                table[e.key] += wider[1].names
+                absorbed.add(wider[0].key)
+            if leader is h and e.limit and (
+                    h.values[e.limit.parameter] < NARROW * e.site.half_range):
+                table[e.key] += e.limit.ids
     return [h for h in first.values() if h.key not in absorbed], twins

@@ -11,7 +11,7 @@ import numpy as np
 
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
-from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate, Channel
+from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import unit_columns
 from pikanid.mismatch.detect.tangent import directions
@@ -60,8 +60,7 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
                    ) if answer.given else ()
     static: bool | None = None
     if answer.given:
-        static = all(e.channel == "dynamics" and (
-            e.ids[0] in STATIC or e.ids[0].startswith(SYMBOLIC)) for e in best.effects)
+        static = all(e.static for e in best.effects)
     elif shape is not None:
         states, static = shape.depends_on(alpha), shape.static_law
     spans: tuple[tuple[float, float], ...] = ()
@@ -90,10 +89,6 @@ def smallest(base: Hypothesis, candidates: Sequence[Candidate]) -> dict[str, Val
                 if key not in sizes or size < sizes[key].value:
                     sizes[key] = Value(size, 0.0, unit)
     return sizes
-
-
-STATIC = frozenset({"coulomb_friction", "quadratic_drag", "power_drag", "amplitude_damping",
-                    "cubic_stiffness", "static_bias", "wall_impact"})
 
 
 def loud_windows(base: Hypothesis) -> tuple[tuple[float, float], ...]:

@@ -59,9 +59,9 @@ def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
                 continue
             rest = [e for e in h.effects if e is not effect and e is not other]
             size, *more = other.parameters
-            if other.known:
-                n = {"coulomb_friction": 0.3}.get(effect.ids[0], 1.8)
-                starts = [{size.name: as_strong(h, effect, other, n), more[0].name: n}]
+            if begun := other.covers[effect.key]:
+                size_there = as_strong(h, effect, other, [begun[p.name] for p in more])
+                starts = [{size.name: size_there, **begun}]
             else:
                 starts = [{size.name: as_strong(h, effect, other),
                            **{p.name: p.value for p in more if p.name not in h.point},

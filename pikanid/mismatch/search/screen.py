@@ -17,33 +17,34 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 FAINT, FAINT_PAIR = 3.0, 6.0  # χ² that one effect, and two, must gain to first order to be tried
 MOSTLY = 0.8  # of a parameter, that an effect may really be
 NOWHERE: Mapping[str, float] = {}
-EXPONENTS = {"coulomb_friction": 0.0, "quadratic_drag": 2.0}  # of |v|, that have names
 
 
-def as_strong(h: Hypothesis, effect: Candidate, other: Candidate, n: float | None = None) -> float:
-    """Size of a law of |v|ⁿ that takes as much energy out of the motion as another one does, or
-    that one's own size where either is no such law.
+def as_strong(h: Hypothesis, effect: Candidate, other: Candidate, more: Sequence[float] = ()
+              ) -> float:
+    """Size of a law that takes as much energy out of the motion as another one does, or that one's
+    own size where either does not only that.
+
+    Args:
+        h: Hypothesis with the effect.
+        effect: Of it.
+        other: To stand in its place.
+        more: Values of its parameters but the size.
     """
-    size, *more = (h.values[p.name] for p in effect.parameters)
+    size, *own = (h.values[p.name] for p in effect.parameters)
     at = h.model.state_names.index(effect.site.v)
     speed = np.concatenate([np.abs(response.states[:, at]) for response in
                             h.whitened.responses(h.minimum.theta, states=True)])
-    shape = _shape(effect.ids[0], more, speed)
-    wanted = _shape(other.ids[0], [] if n is None else [n], speed)
+    shape, wanted = _resistance(effect, own, speed), _resistance(other, more, speed)
     if shape is None or wanted is None:
         return size
     return float(size * np.mean(shape * speed) / max(float(np.mean(wanted * speed)), 1e-12))
 
 
-def _shape(law: str, more: Sequence[float], speed: np.ndarray) -> np.ndarray | None:
-    """What resists a motion of a speed (N,), at size 1 and with more parameters."""
-    if law in EXPONENTS:
-        return np.asarray(speed ** EXPONENTS[law])
-    if law == "power_drag" and more:
-        return np.asarray(speed ** more[0])
-    if law == "stribeck_friction" and more:
-        return np.asarray(1 + more[0] * np.exp(-(speed / more[1]) ** 2))
-    return None
+def _resistance(law: Candidate, more: Sequence[float], speed: np.ndarray) -> np.ndarray | None:
+    """What resists a motion of a speed (N,), at size 1; None where a parameter is not known yet."""
+    if law.resistance is None or len(more) < len(law.parameters) - 1:
+        return None
+    return np.asarray(law.resistance(speed, *more))
 
 
 def law(c: Candidate) -> bool:

@@ -33,7 +33,7 @@ def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site,
                       ) -> Answer:
     """The answer, once formulas read from the shape of the force have been offered as well."""
     search = case.search
-    search.offer(symbolic_candidates(shape, site))
+    search.offer(symbolic_candidates(shape, site, case.candidates))
     return with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
                          case.later is not None, case.proves, alpha)
 
