@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pikanid import Model, Recording
-from pikanid.mismatch.catalogue.forces import coulomb_friction
+from pikanid.mismatch.catalogue.friction import coulomb_friction
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.noise_level import Level, bridged, refined
 from pikanid.mismatch.data.outliers import lone, without_lone, without_outliers

@@ -4,24 +4,52 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pikanid.mismatch.catalogue import channels, decoys, forces, late_inputs
+from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
 from pikanid.mismatch.catalogue.second_mode import second_mode
 from pikanid.mismatch.catalogue.site import Site
 
 ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
-    forces.coulomb_friction, forces.quadratic_drag, forces.power_drag, forces.amplitude_damping,
-    forces.cubic_stiffness, forces.static_bias, forces.parameter_drift, second_mode,
-    forces.wall_impact, cross_axis, forces.disturbance, forces.boundary_layer,
-    forces.hysteresis, channels.delay, late_inputs.input_delay, channels.lags, channels.input_gain,
-    channels.sensor_gain, channels.input_limits, channels.input_backlash, channels.sensor_offset,
-    channels.sensor_drift, channels.sensor_saturation, channels.sensor_nonlinearity,
-    forces.initial_state, channels.input_hold)
+    friction.coulomb_friction,
+    friction.quadratic_drag,
+    friction.power_drag,
+    friction.amplitude_damping,
+    forces.cubic_stiffness,
+    forces.static_bias,
+    forces.parameter_drift,
+    second_mode,
+    forces.wall_impact,
+    cross_axis,
+    forces.disturbance,
+    friction.boundary_layer,
+    friction.hysteresis,
+    channels.delay,
+    late_inputs.input_delay,
+    channels.lags,
+    channels.input_gain,
+    channels.sensor_gain,
+    channels.input_limits,
+    channels.input_backlash,
+    channels.sensor_offset,
+    channels.sensor_drift,
+    channels.sensor_saturation,
+    channels.sensor_nonlinearity,
+    forces.initial_state,
+    channels.input_hold,
+)
 GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
-    decoys.even_stiffness, decoys.quintic_stiffness, decoys.one_way_friction,
-    decoys.stribeck_friction, decoys.dissipating_wall, decoys.velocity_coupled_drive,
-    decoys.soft_saturation, decoys.clock_error, decoys.wobble, decoys.rate_limit)
+    decoys.even_stiffness,
+    decoys.quintic_stiffness,
+    decoys.one_way_friction,
+    decoys.stribeck_friction,
+    decoys.dissipating_wall,
+    decoys.velocity_coupled_drive,
+    decoys.soft_saturation,
+    decoys.clock_error,
+    decoys.wobble,
+    decoys.rate_limit,
+)
 
 
 def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:

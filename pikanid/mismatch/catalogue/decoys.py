@@ -12,7 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
-from pikanid.mismatch.catalogue.forces import INF, STICKING, sense, term, wall_impact
+from pikanid.mismatch.catalogue.forces import INF, term, wall_impact
+from pikanid.mismatch.catalogue.friction import STICKING, sense
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter

@@ -10,14 +10,13 @@ import numpy as np
 import sympy as sp
 
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, Limit, TangentDirection, View
+from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
-from pikanid.model.parts import Parameter, State
+from pikanid.model.parts import Parameter
 
 INF = float("inf")
 SIDE = "negative side"
-STICKING = (0.6, 0.8, 1.25, 1.6)  # of the size of dry friction: a motion comes to rest elsewhere
 
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
@@ -31,64 +30,6 @@ def term(site: Site, identifier: str, name: str, expression: str, size: Paramete
                      lambda m: m.with_term(site.v, expression), directions, variant, twin,
                      known=known,
                      other_minima=other_minima)
-
-
-def sense(view: View, v: str) -> np.ndarray:
-    """The sign (L,) of a rate, averaged over a step where it changes inside."""
-    near = 0.5 * np.abs(view.rates[v]) * np.gradient(view.t)
-    speed = view.x[v]
-    return np.asarray(np.clip(speed / np.maximum(near, 1e-300), -1.0, 1.0))
-
-
-def coulomb_friction(site: Site) -> list[Candidate]:
-    """Dry friction: the same force at every speed, against the motion."""
-    c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
-    law = term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-               lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING)
-    return [replace(law, static=True, resistance=np.ones_like, exponent=0.0, form="sign",
-                    argument=site.v)]
-
-
-def quadratic_drag(site: Site) -> list[Candidate]:
-    """Drag that grows with the square of the speed."""
-    q = Parameter(site.name("q2"), 0.0, f"1/({site.unit})", (0.0, INF))
-    law = term(site, "quadratic_drag", "quadratic drag", f"-{q.name}*abs({site.v})*{site.v}", q,
-               lambda w: -np.abs(w.x[site.v]) * w.x[site.v], one_sided=True)
-    return [replace(law, static=True, resistance=np.square, exponent=2.0, form="signed square",
-                    argument=site.v)]
-
-
-def power_drag(site: Site) -> list[Candidate]:
-    """Drag with an exponent of its own, other than 0, 1 and 2."""
-    c = Parameter(site.name("c_n"), 0.0, f"({site.unit})/s^2", (0.0, INF))
-    n = Parameter(site.name("n"), 1.5, "", (0.2, 4.0))
-    text = f"-{c.name}*signed_power({site.v}, {n.name})"
-
-    def directions(view: View) -> list[TangentDirection]:
-        v = view.x[site.v]
-        return [TangentDirection({c.name: 1.0, n.name: e},
-                                 force=-sense(view, site.v) * np.abs(v) ** e,
-                     one_sided=True)
-                for e in (0.2, 0.35, 0.5, 0.7, 1.3, 1.5, 1.75, 2.3, 2.7, 3.2)]
-
-    return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
-                      (c, n), lambda m: m.with_term(site.v, text), directions,
-                      covers={"coulomb_friction": {n.name: 0.3}, "quadratic_drag": {n.name: 1.8}},
-                      static=True, resistance=np.power, exponent=n, form="signed power",
-                      argument=site.v)]
-
-
-def amplitude_damping(site: Site) -> list[Candidate]:
-    """Viscous damping that grows with the square of the amplitude, where there is a rest to swing
-    about.
-    """
-    if not site.rate:
-        return []
-    c = Parameter(site.name("c2"), 0.0, f"1/(s*({site.unit})^2)", (0.0, INF))
-    law = term(site, "amplitude_damping", "damping that grows with amplitude",
-               f"-{c.name}*{site.q}**2*{site.v}", c,
-               lambda w: -w.x[site.q] ** 2 * w.x[site.v], one_sided=True)
-    return [replace(law, static=True)]
 
 
 def cubic_stiffness(site: Site) -> list[Candidate]:
@@ -172,70 +113,6 @@ def wall_impact(site: Site) -> list[Candidate]:
                                       for at in walls for share in stiffnesses))
 
     return [one(1), one(-1)]
-
-
-def hysteresis(site: Site) -> list[Candidate]:
-    """A force with memory: Bouc-Wen."""
-    b = Parameter(site.name("b_z"), 0.0, f"{site.unit}/s^2", (0.0, INF))
-    # a loop narrower than that is dry friction, and as hard to simulate as a wall
-    least = max(0.01 * site.half_range, 1e-4)
-    d = Parameter(site.name("z_yield"), max(0.01, least), site.unit, (least, INF))
-    z = site.name("z")
-
-    def extend(model: Model) -> Model:
-        loop = f"({site.v} - (abs({site.v})*{z} + {site.v}*abs({z}))/2)/{d.name}"
-        return model.with_state(State(z), loop).with_term(site.v, f"-{b.name}*{z}")
-
-    def directions(view: View) -> list[TangentDirection]:
-        from pikanid.mismatch.catalogue.recurrences import bouc_wen
-
-        v = view.x[site.v]
-        if np.all(v >= 0) or np.all(v <= 0):
-            return []  # without a return there is no loop
-        top = float(np.abs(view.x[site.q]).max(initial=1e-9))
-        found = []
-        for share in (0.02, 0.06, 0.15, 0.4):
-            path = bouc_wen(view.x[site.q] / (share * top))
-            found.append(TangentDirection(
-                {b.name: 1.0, d.name: share * top}, force=-path, one_sided=True))
-        return found
-
-    return [Candidate(("hysteresis",), "hysteresis (Bouc-Wen)", f"-{b.name}*{z}", "dynamics", site,
-                      (b, d), extend, directions, variant="bouc_wen",
-                      # a narrow loop is dry friction that gives before it slips (P. Dahl, AIAA J.
-                      # 14, 1976)
-                      limit=Limit(d.name, ("coulomb_friction",)))]
-
-
-def boundary_layer(site: Site) -> list[Candidate]:
-    """The wall's oscillating boundary layer: damping by the half-derivative of the rate."""
-    if not site.rate:
-        return []
-    b = Parameter(site.name("b_layer"), 0.0, "1/s^0.5", (0.0, INF))
-    # beyond three times the natural rate little moves; faster states would need shorter steps
-    band = (site.rate / 20, site.rate * 3)
-
-    def extend(model: Model) -> Model:
-        model, half = model.with_half_derivative(site.v, site.name("layer"), band, 6)
-        return model.with_term(site.v, -symbol(b.name) * half)
-
-    def directions(view: View) -> list[TangentDirection]:
-        return [TangentDirection({b.name: 1.0}, force=-_half_derivative(view.t, view.x[site.v]),
-                                 one_sided=True)]
-
-    return [Candidate(("boundary_layer",), "boundary layer at the wall",
-                      f"-{b.name}*D^(1/2) {site.v}", "dynamics", site, (b,), extend, directions)]
-
-
-def _half_derivative(t: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """D^½ z by Grünwald and Letnikov on an even grid."""
-    from scipy.signal import fftconvolve
-
-    h = (t[-1] - t[0]) / (len(t) - 1)
-    even = np.interp(t[0] + h * np.arange(len(t)), t, z - z[0])
-    k = np.arange(1, len(t))
-    weights = np.concatenate([[1.0], np.cumprod((k - 1.5) / k)])
-    return np.asarray(fftconvolve(even, weights)[:len(t)] / np.sqrt(h))
 
 
 def disturbance(site: Site) -> list[Candidate]:
