@@ -64,6 +64,17 @@ def test_delay_of_many_samples_and_none() -> None:
         assert np.abs(y - expected).max() < 1e-6
 
 
+def test_another_delay_gets_sub_steps_of_its_own() -> None:
+    """Stops of the integrator move with the delay; nothing of the last one may be left."""
+    recording = excitation.two_pulse(2.0, 0.02)
+    model = systems.sloshing().map_input("u_x", [TAU], delay="tau")
+    one, steps = interpreted.simulator(model, recording), Steps("explicit", 0.005)
+    for delay in (0.0137, 0.031, 0.02):
+        p = np.array(list({**model.values, "tau": delay}.values()))
+        fresh = interpreted.simulator(model, recording).run(p, None, steps).y
+        assert np.array_equal(one.run(p, None, steps).y, fresh)
+
+
 def test_delayed_output_shows_the_start_until_the_delay_has_passed() -> None:
     recording = waves("first")
     model = systems.sloshing().with_initial(theta=0.05).map_output(

@@ -98,6 +98,22 @@ def test_simulated_motion_is_that_under_the_signal_behind_the_play() -> None:
     assert np.abs(found - rigid).max() > 1e-3
 
 
+def test_simulated_motion_is_that_under_the_signal_of_limited_rate() -> None:
+    rec = wandering()
+    sloth = signals.slewed(signals.zero_order(rec["u_x"].time, rec["u_x"].values), RATE)
+    t = np.linspace(0.0, rec["u_x"].time[-1], 60_000)
+    behind = pk.Recording.from_arrays(t, {"u_x": sloth.at(t)}, units={"u_x": "m/s^2"},
+                                      hold={"u_x": "first"})
+    most = Parameter("R", RATE, "m/s^3", (1e-3, 1e3))
+    limited = pk.systems.sloshing().map_input("u_x", [most], rate_limit="R")
+    found = pk.simulate(limited, rec, sigma=0.0)["theta"].values
+    at = rec["u_x"].time
+    expected = pk.simulate(pk.systems.sloshing(), behind, sigma=0.0, t=at)["theta"].values
+    free = pk.simulate(pk.systems.sloshing(), rec, sigma=0.0)["theta"].values
+    assert found == pytest.approx(expected, abs=1e-5)
+    assert np.abs(found - free).max() > 1e-3
+
+
 def test_fit_finds_the_play() -> None:
     rec = pk.simulate(loose(), wandering(), sigma=0.002, seed=1)
     est = pk.NLS().fit(loose().with_values(b=0.1), rec)

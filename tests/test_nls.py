@@ -209,3 +209,28 @@ def test_multiple_shooting_finds_a_long_chaotic_record() -> None:
     assert found.ok
     for name, value in (("k", -1.0), ("k3", 1.0), ("c", 0.3)):
         assert abs(found.value(name) - value) < 4 * found.std(name)
+
+
+def oscillator(**values: float) -> Model:
+    """Rings freely from 1: χ² has a minimum near every frequency that fits a few periods less."""
+    return Model.from_dict({
+        "name": "oscillator", "states": {"x": {"unit": "m", "initial": 1.0}, "v": {"unit": "m/s"}},
+        "parameters": {"w": {"unit": "rad/s", "guess": 5.0, "bounds": [1, 10]}},
+        "equations": {"x": "v", "v": "-w**2*x"},
+        "outputs": {"x": {"unit": "m", "expression": "x"}}}).with_values(**values)
+
+
+def test_of_several_minima_the_lowest_is_kept() -> None:
+    t = np.linspace(0.0, 8.0, 161)
+    nothing = Recording.from_arrays(t, {"x": np.zeros(161)}, units={"x": "m"})
+    truth = pk.simulate(oscillator(), nothing, sigma=0.01, seed=2)
+    found = pk.NLS(starts=20, seed=1).fit(oscillator(w=1.5), truth)
+    costs = [h["cost"] for h in found.history]
+    assert abs(found.value("w") - 5.0) < 4 * found.std("w")
+    assert max(costs) > 100 * min(costs)  # starts do end elsewhere
+
+
+def test_simulations_of_a_start_are_limited() -> None:
+    free, few = (pk.NLS(starts=1, max_evaluations=n).fit(START, NOISY) for n in (100, 3))
+    assert free.converged and free.history[0]["evaluations"] > 8
+    assert not few.converged and few.history[0]["evaluations"] <= 2 * (3 + 3)

@@ -13,6 +13,7 @@ from pikanid.model import Model, Output, Parameter, Spline, State, systems
 from pikanid.recording import Recording, excitation
 from pikanid.simulation import VectorField
 from pikanid.simulation.simulator import Steps
+from pikanid.simulation.structure import Structure
 
 DRAG = Spline("drag", 3, (-4.0,) * 4 + (-2.0, -0.5, 0.5, 2.0) + (4.0,) * 4)
 COEFFICIENTS = (3.0, 1.8, 1.4, 0.3, -0.3, -1.2, -2.0, -2.9)
@@ -127,3 +128,17 @@ def test_edge_of_degree_one_has_kinks_but_exact_values() -> None:
 def test_edges_survive_the_model_file() -> None:
     for model in (with_drag(), two_splines()):
         assert Model.from_dict(model.to_dict()) == model
+
+
+def test_models_that_differ_in_knots_alone_are_told_apart() -> None:
+    """Their formulas are the same; what is compiled for one must not be used for the other."""
+    wide = with_drag(Spline("drag", 3, tuple(2.0 * k for k in DRAG.knots)))
+    x, u, t = np.array([[0.1, 1.5]]), np.zeros((1, 2)), np.zeros(1)
+    found = []
+    for model in (with_drag(), wide):
+        p = np.array(list(model.values.values()))
+        found.append(float(VectorField(model).rhs(t, x, u, p)[0, 1]))
+        rate = found[-1] - float(VectorField(systems.sloshing()).rhs(t, x, u, p[:4])[0, 1])
+        spline = model.splines[0]
+        assert rate == pytest.approx(float(curve(spline, COEFFICIENTS)(1.5)), abs=1e-12)
+    assert Structure(with_drag()) != Structure(wide) and abs(found[0] - found[1]) > 0.1
