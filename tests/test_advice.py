@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.report.advice import EXPLORE, PROVE, STRENGTHEN, advice
 from pikanid.mismatch.report.findings import Explanation
+from pikanid.noise.level import NoiseModel
 
 RATE = float(np.sqrt(9.81 / 0.045))
 
@@ -26,7 +26,7 @@ def explanation(title: str, term: str, identifier: str = "law") -> Explanation:
 @pytest.fixture(scope="module")
 def records() -> Records:
     rec = pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=0.002, seed=0)
-    level = cast(Level, SimpleNamespace(sigma=0.002))
+    level = cast(NoiseModel, SimpleNamespace(sigma=0.002))
     return Records((rec,), ({"theta": level},))
 
 

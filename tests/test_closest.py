@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import GROSS, Records, Whitened, allowance
 from pikanid.mismatch.fitting.closest import Closest
+from pikanid.noise.level import NoiseModel
 
 SIGMA = 0.002
 
@@ -17,7 +17,7 @@ SIGMA = 0.002
 def records() -> Records:
     recording = pk.simulate(
         pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=SIGMA, seed=1)
-    return Records((recording,), ({"theta": Level(SIGMA, 0.0, 0.0, 0.01, "given")},))
+    return Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "given")},))
 
 
 def test_only_a_closer_fit_that_changes_nothing_lets_a_decision_stand() -> None:

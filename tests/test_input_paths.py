@@ -15,10 +15,10 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.model.parts import Hold, Parameter
+from pikanid.noise.level import NoiseModel
 from pikanid.problem.held import HeldInput, acting
 from pikanid.problem.problem import bind
 from pikanid.simulation.simulator import Simulator
@@ -157,7 +157,7 @@ def test_recorded_rates_below_the_limit_change_nothing() -> None:
 
 
 def test_a_play_wider_than_the_input_leaves_nothing_to_look_for_in_it() -> None:
-    level = cast(Level, SimpleNamespace(sigma=0.002, whiten=lambda r, t: r))
+    level = cast(NoiseModel, SimpleNamespace(sigma=0.002, whiten=lambda r, t: r))
     records = Records((pk.simulate(loose(), wandering(), sigma=0.002, seed=1),),
                       ({"theta": level},))
     model = loose().with_values(b=9.0)

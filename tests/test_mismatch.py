@@ -12,7 +12,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.forces import disturbance
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level, refined
+from pikanid.mismatch.data.noise_level import refined
 from pikanid.mismatch.data.outliers import without_outliers
 from pikanid.mismatch.data.preparation import averaged, oversampling
 from pikanid.mismatch.data.whitened import Records, Whitened
@@ -28,6 +28,7 @@ from pikanid.mismatch.fitting.hypothesis import extended
 from pikanid.mismatch.fitting.least_squares import minimise
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.model import Model, systems
+from pikanid.noise.level import NoiseModel
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording, excitation
 from pikanid.simulation import simulate
@@ -36,7 +37,7 @@ SIGMA = 0.002
 
 
 def records_of(recording: Recording) -> Records:
-    return Records((recording,), ({"theta": Level(SIGMA, 0.0, 0.0, 0.01, "given")},))
+    return Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "given")},))
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +153,7 @@ def test_coloured_noise_is_recognised_without_a_quiet_stretch() -> None:
         e[k] = 0.5 * e[k - 1] + np.sqrt(0.75) * rng.standard_normal()
     e *= SIGMA
     channel = Recording.from_arrays(t, {"y": np.sin(15 * t) + e})["y"]
-    level = refined(Level(SIGMA, 0.0, 0.1, 0.01, "test"), channel, t, e, 15.0, None)
+    level = refined(NoiseModel(SIGMA, 0.0, 0.1, 0.01, "test"), channel, t, e, 15.0, None)
     # from the upper part of the band alone ρ is known to about 0.04 here
     assert level.rho == pytest.approx(0.5, abs=0.12)
     assert level.sigma == pytest.approx(SIGMA, rel=0.1)

@@ -14,7 +14,6 @@ from pikanid import Recording
 from pikanid.mismatch.beyond.patch import _Basis
 from pikanid.mismatch.beyond.penalised import Penalised, _prior
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.preparation import averaged, oversampling
 from pikanid.mismatch.design.separation import mean_precision, unexplained
 from pikanid.mismatch.design.sizing import _next
@@ -23,6 +22,7 @@ from pikanid.mismatch.detect.tangent import _middle
 from pikanid.mismatch.fitting.progressive_horizon import lost
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside
 from pikanid.model import systems
+from pikanid.noise.level import NoiseModel
 from pikanid.recording.channel import Channel
 from pikanid.simulation.vectorfield import VectorField
 
@@ -154,9 +154,9 @@ def test_noise_of_repeats_has_the_level_that_it_was_drawn_with(rho: float) -> No
     residuals = list(lfilter([1.0], [1.0, -rho], white, axis=1)[:, 200:])
     t = np.linspace(0.0, 9.99, 1000)
     spectra = Spectra.of([t] * 3, residuals, [np.ones((1000, 1))] * 3, 0.01)
-    old = Level(1.0, rho, 0.05, 0.01, "stated")
+    old = NoiseModel(1.0, rho, 0.05, 0.01, "stated")
     found = spectra.level(old)
     assert found.sigma == pytest.approx(1.0, abs=0.12) and found.rho == pytest.approx(rho, abs=0.1)
     assert spectra.beyond(old) > 0.01
-    assert spectra.beyond(Level(0.7, rho, 0.05, 0.01, "stated")) < 1e-6
+    assert spectra.beyond(NoiseModel(0.7, rho, 0.05, 0.01, "stated")) < 1e-6
     assert rho or spectra.apart == pytest.approx(1.0, abs=0.1)

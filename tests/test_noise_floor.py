@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import pikanid as pk
-from pikanid.mismatch.data.noise_level import Level, first_level, refined
+from pikanid.mismatch.data.noise_level import first_level, refined
 from pikanid.mismatch.data.preparation import prepared, set_aside
 from pikanid.mismatch.data.whitened import Records
 from pikanid.noise import level as noise
 from pikanid.noise.floor import repeated, rounding_noise, rounding_step
+from pikanid.noise.level import NoiseModel
 from pikanid.objective.adequacy import difference_noise, judge
 from pikanid.recording.channel import Channel
 
@@ -78,11 +79,11 @@ def test_no_estimate_of_noise_is_below_that_of_rounding() -> None:
     assert noise.estimate(channel).sigma >= 0.999 * floor
     # the user's own quiet stretch shows a constant
     still = noise.estimate(channel, (0.0, 3.5))
-    assert still.sigma == pytest.approx(floor) and still.white
+    assert still.sigma == pytest.approx(floor) and still.rho == 0.0
     recording = pk.Recording({"motor": channel})
     assert first_level(recording, "motor", (0.0, 3.5)).sigma == pytest.approx(floor)
     left = np.where(TIMES < 4, 0.0, floor * np.random.default_rng(0).standard_normal(600))
-    level = Level(floor, 0.0, 0.1, 0.01, "")
+    level = NoiseModel(floor, 0.0, 0.1, 0.01, "")
     assert refined(level, channel, TIMES, left, 3.0, None).sigma >= 0.999 * floor
 
 
@@ -95,7 +96,7 @@ def test_a_right_model_of_a_rig_at_rest_explains_it() -> None:
 
 def test_beginnings_hold_motion_and_so_many_rows() -> None:
     y = np.where(TIMES < 4, 0.0, 0.3 * np.sin(3 * (TIMES - 4)))
-    level = {"motor": Level(0.001, 0.0, 0.0, 0.01, "")}
+    level = {"motor": NoiseModel(0.001, 0.0, 0.0, 0.01, "")}
 
     def beginning(values: np.ndarray, rows: int) -> Channel:
         recording = pk.Recording.from_arrays(TIMES, {"motor": values})

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pikanid.mismatch.data.noise_level import Level, _still, _whittle, first_level, refined
+from pikanid.mismatch.data.noise_level import _whittle, first_level, refined
+from pikanid.noise.level import NoiseModel
+from pikanid.noise.quiet import without_moves
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
 T = np.arange(1000) * 0.01
+WHITE = NoiseModel(1.0, 0.0, 0.0, 0.01, "")
 MOVING = np.where(T < 2.0, 0.0, np.sin(9 * (T - 2.0)))
 
 
 def still(u: np.ndarray, start: float, stop: float) -> tuple[float, float]:
-    return _still(Channel("y", T, T), [Channel("u", T, u)], start, stop)
+    return without_moves(Channel("y", T, T), [Channel("u", T, u)], start, stop)
 
 
 def test_a_stretch_ends_where_the_input_begins_to_move() -> None:
@@ -61,7 +66,7 @@ def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None
     low = np.linspace(0.0, 0.25 * np.pi, 50)
     for seed in range(120):
         y = coloured(rho, seed)
-        level = refined(Level(1.0, 0.0, 0.0, 0.01, "", (0.0, 2.16)), Channel("y", t, y), t, y, 8.0,
+        level = refined(replace(WHITE, stretch=(0.0, 2.16)), Channel("y", t, y), t, y, 8.0,
                         None)
         gain = 1 - 2 * level.rho * np.cos(low) + level.rho**2
         powers.append(np.mean(np.log(level.sigma**2 * (1 - level.rho**2) / gain)))
@@ -88,7 +93,7 @@ def rung(amplitude: float) -> tuple[np.ndarray, np.ndarray]:
 def test_a_stretch_in_which_a_motion_dies_out_is_no_quiet_one() -> None:
     t, motion = rung(300.0)
     noise = coloured(0.0, 5)
-    before = Level(1.0, 0.0, 0.0, 0.01, "", (3.0, 6.0))
+    before = replace(WHITE, stretch=(3.0, 6.0))
     level = refined(before, Channel("y", t, motion + noise), t, noise, 8.0, None)
     assert (level.sigma, level.rho) == (pytest.approx(1.0, abs=0.06), 0.0)
     assert level.source == "the residual at all frequencies"
@@ -103,7 +108,7 @@ def test_the_shape_of_high_frequencies_does_not_mislead() -> None:
     noise = coloured(0.6, 7)[:501]
     steep = np.fft.irfft(np.fft.rfft(noise) * np.interp(
         np.linspace(0, 1, 251), [0, 0.2, 1], [1.0, 1.0, 0.25]), 501)
-    level = refined(Level(1.0, 0.0, 0.0, 0.01, ""), Channel("y", t, steep), t, steep, 20.0, None)
+    level = refined(WHITE, Channel("y", t, steep), t, steep, 20.0, None)
     power = level.sigma**2 * (1 + level.rho) / (1 - level.rho)
     assert power < 2 * 1.6 / 0.4
 
@@ -114,7 +119,7 @@ def test_an_explanation_tells_the_noise_better_than_high_frequencies_alone(rho: 
     true = np.mean(np.log((1 - rho**2) / (1 - 2 * rho * np.cos(low) + rho**2)))
     for seed in range(60):
         y = coloured(rho, 1000 + seed)
-        levels = [refined(Level(1.0, 0.0, 0.0, 0.01, "", (0.0, 2.16)), Channel("y", t, y), t, y,
+        levels = [refined(replace(WHITE, stretch=(0.0, 2.16)), Channel("y", t, y), t, y,
                           8.0, None, explained) for explained in (False, True)]
         errors.append([np.mean(np.log(level.sigma**2 * (1 - level.rho**2) / (
             1 - 2 * level.rho * np.cos(low) + level.rho**2))) - true for level in levels])
@@ -130,7 +135,7 @@ def test_a_short_recording_without_a_quiet_stretch_states_its_doubt(rho: float) 
     true = (1 - rho**2) * np.mean(1 / (1 - 2 * rho * np.cos(low) + rho**2))
     for seed in range(150):
         y = coloured(rho, 3000 + seed)[:501]
-        level = refined(Level(1.0, 0.0, 0.0, 0.01, ""), Channel("y", t, y), t, y, 14.4, None)
+        level = refined(WHITE, Channel("y", t, y), t, y, 14.4, None)
         power = level.sigma**2 * (1 - level.rho**2) * np.mean(
             1 / (1 - 2 * level.rho * np.cos(low) + level.rho**2))
         scores.append(np.log(power / true) / level.spread)
@@ -145,7 +150,7 @@ def test_what_explains_all_tells_a_colour_that_high_frequencies_hide() -> None:
     found = []
     for seed in range(60):
         y = coloured(0.65, 5000 + seed)[:501]
-        before, after = (refined(Level(1.0, 0.0, 0.0, 0.01, ""), Channel("y", t, y), t, y, 14.4,
+        before, after = (refined(WHITE, Channel("y", t, y), t, y, 14.4,
                                  None, explained) for explained in (False, True))
         found.append((before.rho, after.rho))
     rho = np.array(found)
@@ -157,7 +162,7 @@ def test_no_explanation_makes_sure_noise_louder() -> None:
     """White noise, and a slow misfit of the same power that is said to be none."""
     t = np.arange(2001) * 0.01
     y = coloured(0.0, 11) + np.sin(2 * t) + np.sin(3.1 * t) + np.sin(4.3 * t)
-    level = refined(Level(1.0, 0.0, 0.0, 0.01, ""), Channel("y", t, y), t, y, 8.0, None, True)
+    level = refined(WHITE, Channel("y", t, y), t, y, 8.0, None, True)
     assert (level.sigma, level.rho) == (pytest.approx(1.0, abs=0.05), 0.0)
 
 
@@ -166,7 +171,7 @@ def test_whitening_is_the_inverse_covariance_over_gaps_too(rho: float) -> None:
     """wᵀw = rᵀΣ⁻¹r with Σ_jk = σ²·ρ^|j - k|, j and k the samples' numbers on the grid."""
     at = np.delete(np.arange(40), [3, 11, 12, 13, 30])
     sigma, r = 0.3, np.random.default_rng(0).normal(size=(35, 3))
-    level = Level(sigma, rho, 0.1, 0.01, "")
+    level = NoiseModel(sigma, rho, 0.1, 0.01, "")
     covariance = sigma**2 * np.sign(rho) ** np.abs(np.subtract.outer(at, at)) * np.abs(rho) ** (
         np.abs(np.subtract.outer(at, at)))
     white = level.whiten(r, 5.0 + 0.01 * at)
@@ -177,7 +182,7 @@ def test_whitening_is_the_inverse_covariance_over_gaps_too(rho: float) -> None:
 @pytest.mark.parametrize("rho", [0.0, 0.7])
 def test_a_sigma_that_is_given_stays_and_its_colour_is_read(rho: float) -> None:
     t = np.arange(2001) * 0.01
-    level = Level(1.0, 0.0, 0.0, 0.01, "given")
+    level = NoiseModel(1.0, 0.0, 0.0, 0.01, "given")
     found = refined(level, Channel("y", t, t), t, coloured(rho, 1), 5.0, None)
     assert (found.sigma, found.source) == (1.0, "given")
     assert found.rho == pytest.approx(rho, abs=0.15)

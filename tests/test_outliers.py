@@ -9,10 +9,11 @@ from scipy.signal import lfilter
 from pikanid import Model, Recording
 from pikanid.mismatch.catalogue.friction import coulomb_friction
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level, bridged, refined
+from pikanid.mismatch.data.noise_level import bridged, refined
 from pikanid.mismatch.data.outliers import lone, without_lone, without_outliers
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.noise.level import NoiseModel
 
 SIGMA = 0.002
 
@@ -89,8 +90,8 @@ def test_dropouts_do_not_lower_the_noise() -> None:
         kept = rng.random(2000) > 0.08
         channel = Recording.from_arrays(t, {"y": np.where(kept, 0.2 * np.sin(14 * t) + e, np.nan)},
                                         {"y": "rad"})["y"]
-        level = refined(Level(SIGMA, 0.0, 0.1, 0.01, "the start"), channel, t[kept], e[kept], 14.0,
-                        None)
+        level = refined(NoiseModel(SIGMA, 0.0, 0.1, 0.01, "the start"), channel, t[kept],
+                        e[kept], 14.0, None)
         found.append(level.sigma)
     assert np.mean(found) == pytest.approx(SIGMA, rel=0.02)
 
@@ -111,7 +112,7 @@ def test_friction_is_found_beyond_the_hills_between() -> None:
         sign = 1 if half % 2 == 0 else -1
         y[k] = sign * rest + a * np.cos(w * time) if a > 0 else y[k - 1]
     records = Records((Recording.from_arrays(t, {"q": y + SIGMA * noise(300)}),),
-                      ({"q": Level(SIGMA, 0.0, 0.0, 0.01, "given")},))
+                      ({"q": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "given")},))
     entry = coulomb_friction(sites(model, records.recordings)[0])[0]
     size = entry.parameters[0].name
     for start in (2.0, 4.5, 14.0):
@@ -140,7 +141,7 @@ def test_a_clipped_peak_is_no_run_of_outliers() -> None:
     alone = np.array([200, 700, 701, 1500])
     r[alone] += SIGMA * np.array([30.0, 30.0, -40.0, 25.0])
     recording = Recording.from_arrays(t, {"y": r}, {"y": "rad"})
-    records = Records((recording,), ({"y": Level(SIGMA, 0.4, 0.0, 0.01, "")},))
+    records = Records((recording,), ({"y": NoiseModel(SIGMA, 0.4, 0.0, 0.01, "")},))
     kept, count = without_lone(records, [(0, "y", t, r)])
     gone = np.flatnonzero(np.isnan(kept.recordings[0]["y"].values))
     assert set(alone) <= set(gone) and not set(hump) & set(gone)

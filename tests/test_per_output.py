@@ -11,13 +11,13 @@ import pikanid as pk
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.hypothesis import fitted
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.report.findings import OutputError, Proof
 from pikanid.mismatch.report.locate import affected, loud_windows
 from pikanid.model.parts import Output
+from pikanid.noise.level import NoiseModel
 from pikanid.reporting import strict_json
 
 SIGMA = {"theta": 0.002, "swing": 0.3}  # rad, mm
@@ -53,8 +53,8 @@ def test_an_estimate_states_the_error_of_each_output() -> None:
 def predicted(unit: str) -> HeldOut:
     """The nominal model's prediction of a motion with a stiffer liquid, in either unit."""
     factor = {"mm": 1.0, "m": 1e-3}[unit]
-    levels = {"theta": Level(SIGMA["theta"], 0.0, 0.0, 0.01, "given"),
-              "swing": Level(factor * SIGMA["swing"], 0.0, 0.0, 0.01, "given")}
+    levels = {"theta": NoiseModel(SIGMA["theta"], 0.0, 0.0, 0.01, "given"),
+              "swing": NoiseModel(factor * SIGMA["swing"], 0.0, 0.0, 0.01, "given")}
 
     def records(seed: int, times: float = 1.0) -> Records:
         seen = moved(seed)
@@ -101,7 +101,7 @@ def test_what_is_missing_in_the_second_coordinate_is_found_there() -> None:
     plan = pk.excitation.two_pulse()
     recording = pk.simulate(truth, plan.with_channels(replace(plan["u_x"], name="u_y")),
                             sigma=SIGMA, seed=3)
-    levels = {o: Level(s, 0.0, 0.0, 0.01, "given") for o, s in SIGMA.items()}
+    levels = {o: NoiseModel(s, 0.0, 0.0, 0.01, "given") for o, s in SIGMA.items()}
     # one parameter for each, so that the first coordinate keeps what it needs
     base = fitted(swinging().fix("l_theta", "d_theta").free("m"), (),
                   Records((recording,), (levels,)), [{}], 1)

@@ -8,11 +8,11 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.forces import wall_impact
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.hypothesis import extended
 from pikanid.mismatch.fitting.least_squares import minimise
 from pikanid.mismatch.fitting.progressive_horizon import grown, rough
+from pikanid.noise.level import NoiseModel
 
 SIGMA = 0.002
 TRUE = {"wall": 0.1, "k_wall": 20000.0}
@@ -24,7 +24,7 @@ def opened(seed: int, wall: float) -> tuple[Whitened, np.ndarray]:
     truth = model.with_term("theta_dot", "-20000*max(theta - 0.1, 0)")
     driven = pk.excitation.multisine(np.arange(1.0, 4.0, 0.17), 20.0, seed=seed)
     recording = pk.simulate(truth, driven, sigma=SIGMA, seed=seed)
-    records = Records((recording,), ({"theta": Level(SIGMA, 0.0, 0.0, 0.01, "")},))
+    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},))
     effect = wall_impact(sites(model, records.recordings)[0])[0]
     whitened = Whitened(extended(model, [effect]), records)
     problem = whitened.problem
@@ -58,7 +58,7 @@ def test_a_wall_is_found_where_the_motion_begins_late_and_gently() -> None:
     u = np.interp(t, driven["u_x"].time, driven["u_x"].values) * np.clip((t - 2) / 6, 0, 1)
     recording = pk.simulate(truth, pk.Recording.from_arrays(t, {"u_x": u}, {"u_x": "m/s^2"}),
                             sigma=SIGMA, seed=4)
-    records = Records((recording,), ({"theta": Level(SIGMA, 0.0, 0.0, 0.01, "")},))
+    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},))
     effect = wall_impact(sites(model, records.recordings)[0])[0]
     whitened = Whitened(extended(model, [effect]), records)
     # as the nominal model's fit, misled by the impacts, may have left it

@@ -8,8 +8,8 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 import pikanid as pk
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside, same_experiment
+from pikanid.noise.level import NoiseModel
 
 T = np.arange(60) / 15
 START = np.vander(T, 2)  # what a start that is estimated takes up
@@ -59,7 +59,7 @@ def test_what_differs_is_the_noise() -> None:
     noise = 0.2 * slow(3, 200, "white").reshape(100, 2, -1)
     white = [spectra(each) for each in noise]
     assert np.mean([s.apart for s in white]) == pytest.approx(0.2, rel=0.05)
-    right, wrong = (Level(sigma, 0.0, 0.1, 1 / 15, "") for sigma in (0.2, 0.1))
+    right, wrong = (NoiseModel(sigma, 0.0, 0.1, 1 / 15, "") for sigma in (0.2, 0.1))
     assert np.mean([s.beyond(right) < 0.05 for s in white]) <= 0.12
     assert all(s.beyond(wrong) < 0.05 for s in white)
     wandering = [spectra(each).level(right) for each in 0.2 * slow(

@@ -7,15 +7,15 @@ import numpy as np
 import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.tangent import Directions, directions
+from pikanid.noise.level import NoiseModel
 
 MODEL = pk.systems.sloshing()
 THETA = np.array([0.045, 0.15])
 MOVED = pk.simulate(MODEL, pk.excitation.two_pulse())
 LISTED = [c for c in candidates(sites(MODEL, (MOVED,))) if not c.per_recording]
-LEVEL = {"theta": Level(0.002, 0.0, 0.0, 0.01, "")}
+LEVEL = {"theta": NoiseModel(0.002, 0.0, 0.0, 0.01, "")}
 
 
 def found(*recordings: pk.Recording) -> Directions:

@@ -14,11 +14,11 @@ from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.design.response import Watched
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.model.parts import Output
+from pikanid.noise.level import NoiseModel
 from pikanid.objective.shooting import Shooting
 from pikanid.problem.problem import Problem
 
@@ -87,7 +87,8 @@ class Rig:
         self.model, self.recording = model, pk.simulate(model, plan)
         # one thousandth of each output's range: units do not count
         self.records = Records((self.recording,), ({
-            o.name: Level(1e-3 * float(np.ptp(self.recording[o.name].values)), 0.0, 0.0, STEP, "")
+            o.name: NoiseModel(
+                1e-3 * float(np.ptp(self.recording[o.name].values)), 0.0, 0.0, STEP, "")
             for o in model.outputs},))
         self.sites = sites(model, (self.recording,))
         self.at = Whitened(model, self.records)

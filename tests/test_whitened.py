@@ -11,16 +11,16 @@ from scipy.optimize import least_squares
 import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.search.screen import Screen
 from pikanid.model import Model
+from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
 
 SIGMA, RHO = 0.002, 0.4
-LEVEL = Level(SIGMA, RHO, 0.0, 0.01, "given")
+LEVEL = NoiseModel(SIGMA, RHO, 0.0, 0.01, "given")
 
 
 def model(free_start: bool = False) -> Model:

@@ -57,13 +57,6 @@ def noise_none(name: str) -> str:
     return f"Channel '{name}' shows no noise to estimate sigma from; give it yourself."
 
 
-def noise_interval(model: float, given: float) -> str:
-    return (
-        f"The noise model belongs to samples every {model:g} s, not every {given:g} s: estimate "
-        "it from the thinned signal."
-    )
-
-
 def bad_grid(duration: float, dt: float) -> str:
     return f"duration = {duration:g} s and dt = {dt:g} s make no grid: both positive, dt smaller."
 

@@ -1,148 +1,101 @@
 """How noisy is a signal, and how is its noise coloured?
 
 The noise is best seen where nothing else happens: a quiet stretch gives its standard deviation
-and an autoregressive model AR(p), each with its own uncertainty, since 20 samples leave a
-correlation of ±0.2.  Where a recording has no quiet stretch, the highest frequencies give a
-standard deviation only, under the assumption that the noise is white.  `estimate` says which of
-the two was used.
+and the correlation of neighbours, with an uncertainty.  Where a recording has no quiet stretch, the
+highest frequencies give a standard deviation only, under the assumption that the noise is white.
+`estimate` says which of the two was used.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.noise.autoregressive import AR, autocorrelation, fit
+from pikanid.noise.autoregressive import autocorrelation, fit
 from pikanid.noise.floor import rounding_noise
-from pikanid.noise.quiet import SHORTEST, even_parts, find_quiet
-from pikanid.recording import Recording
+from pikanid.noise.quiet import SHORTEST, even_parts, find_quiet, without_moves
 from pikanid.recording.channel import Array, Channel, check_times, check_values
+
+QUIET = 100  # samples of a quiet stretch that say something about low frequencies
+STEEPEST = 0.98  # correlation of neighbours that a quiet stretch can show: beyond it, it drifts
 
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Noise of one signal: ε_t = Σ a_k ε_{t-k} + e_t with white Gaussian e_t.
+    """Noise of one output: ε_t = ρ ε_{t-1} + e_t with white Gaussian e_t.
 
     Attributes:
-        sigma: Standard deviation of ε, in the signal's unit.
-        sigma_std: Standard error of `sigma`.
-        ar: (p,) coefficients a_k; empty for white noise.
-        ar_covariance: (p, p) covariance of their estimates.
-        innovation: Standard deviation of e.
-        interval: Sampling interval that the coefficients belong to [s].
-        source: ``"quiet stretch"`` or ``"highest frequencies"``.
-        start: Of the samples used [s].
-        stop: Of the samples used [s].
-        n: Number of samples used.
+        sigma: Standard deviation of ε, in the output's unit.
+        rho: Correlation of neighbours; 0 for white noise.
+        spread: Relative standard error of its power at low frequencies, on average; 0 if given.
+        interval: Between neighbours [s].
+        source: In words; "given" where σ was not estimated.
+        stretch: Start and stop [s] of a quiet stretch long enough to tell low frequencies.
     """
 
     sigma: float
-    sigma_std: float
-    ar: Array
-    ar_covariance: Array
-    innovation: float
+    rho: float
+    spread: float
     interval: float
-    source: Literal["quiet stretch", "highest frequencies"]
-    start: float
-    stop: float
-    n: int
+    source: str
+    stretch: tuple[float, float] | None = None
 
-    @property
-    def white(self) -> bool:
-        """Whether no correlation is modelled."""
-        return len(self.ar) == 0
+    def sentence(self, output: str) -> str:
+        """What was found."""
+        colour = f"correlation {self.rho:.2f} between neighbours" if self.rho else "white"
+        source = "as given" if self.source == "given" else f"from {self.source}"
+        return f"Noise of '{output}': sigma = {self.sigma:.3g}, {colour}, {source}."
 
-    def autocovariance(self, n: int) -> Array:
-        """(n,) autocovariances at lags 0 to n-1 samples.
+    def whiten(self, rows: Array, t: Array) -> Array:
+        """Rows (N,) or (N, k) at times t as white noise of unit variance.
 
-        >>> model = estimate(_example())
-        >>> bool(np.isclose(model.autocovariance(3)[0], model.sigma**2))
-        True
+        The result w has wᵀw = rᵀΣ⁻¹r with Σ the covariance of the noise.  That is exact over gaps:
+        the correlation over m intervals is ρ^m.
+
+        >>> model = NoiseModel(2.0, 0.5, 0.0, 0.1, "given")
+        >>> [round(float(w), 3) for w in model.whiten(np.array([2.0, 1.0, 0.5]),
+        ...                                           np.array([0.0, 0.1, 0.3]))]
+        [1.0, 0.0, 0.129]
         """
-        return self.sigma**2 * autocorrelation(self.ar, n)
-
-    def whiten(self, residuals: Array, time: Array | None = None) -> Array:
-        """Residuals, or the columns of their Jacobian, as white noise of unit variance.
-
-        The result w has wᵀw = rᵀΣ⁻¹r with Σ the covariance of the noise.  The filter starts anew
-        after every gap in `time`.
-
-        Args:
-            residuals: (N,) or (N, k).
-            time: (N,) sample times [s]; without them the residuals are taken as one stretch.
-
-        Returns:
-            Array shaped as `residuals`.
-
-        Raises:
-            BadRecording: If `time` is sampled at another interval than the model.
-
-        >>> model = estimate(_example())
-        >>> w = model.whiten(_example().values[-300:])
-        >>> bool(abs(np.std(w) - 1) < 0.1)
-        True
-        """
-        r = np.asarray(residuals, dtype=float)
-        if self.white:
-            return r / self.sigma
-        ends = [0, len(r)] if time is None else self._stretches(np.asarray(time, dtype=float))
-        out = np.empty_like(r)
-        for a, b in itertools.pairwise(ends):
-            out[a:b] = self._whitened(r[a:b])
-        return out
-
-    def _stretches(self, time: Array) -> list[int]:
-        steps = np.diff(time)
-        if len(steps) and abs(float(np.median(steps)) / self.interval - 1) > 0.01:
-            raise errors.BadRecording(errors.noise_interval(self.interval, float(np.median(steps))))
-        jumps = np.flatnonzero(np.abs(steps / self.interval - 1) > 0.5) + 1
-        return [0, *jumps.tolist(), len(time)]
-
-    def _whitened(self, r: Array) -> Array:
-        from scipy.signal import lfilter
-
-        p = len(self.ar)
-        taps = np.concatenate([[1.0], -self.ar])
-        white = np.asarray(lfilter(taps, [1.0], r, axis=0), dtype=float) / self.innovation
-        # The first p samples have no full past: whiten them by the stationary covariance.
-        head = min(p, len(r))
-        lags = np.abs(np.subtract.outer(np.arange(head), np.arange(head)))
-        factor = np.linalg.cholesky(self.autocovariance(max(head, 1))[lags])
-        white[:head] = np.linalg.solve(factor, r[:head])
-        return white
-
-    def __str__(self) -> str:
-        colour = "white" if self.white else f"AR({len(self.ar)})"
-        return (
-            f"sigma = {self.sigma:.4g} ± {self.sigma_std:.1g}, {colour}, from the {self.source} "
-            f"({self.n} samples, {self.start:g} s to {self.stop:g} s)"
-        )
+        if self.rho == 0:
+            return rows / self.sigma
+        steps = np.maximum(np.rint(np.diff(t) / self.interval), 1.0)
+        keep = self.rho ** steps
+        left = np.sqrt(1 - keep**2)
+        if rows.ndim == 2:
+            keep, left = keep[:, None], left[:, None]
+        rest = (rows[1:] - keep * rows[:-1]) / left
+        return np.concatenate([rows[:1], rest]) / self.sigma
 
 
-def estimate(channel: Channel, quiet: tuple[float, float] | None = None) -> NoiseModel:
+def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
+             drives: Sequence[Channel] = ()) -> NoiseModel:
     """The noise of a signal, from a quiet stretch if it has one.
 
     Args:
         channel: Samples may be missing.
         quiet: Start and stop [s] of a stretch known to be quiet; looked for if None.
+        drives: Inputs; a stretch that is looked for is quiet while none of them moves.
 
     Raises:
         BadRecording: If there are fewer than `SHORTEST` samples (in `quiet`), or none vary.
 
-    >>> print(estimate(_example()).source)
-    quiet stretch
+    >>> t = np.arange(1000) / 100.0
+    >>> noise = 0.002 * np.random.default_rng(1).standard_normal(1000)
+    >>> swing = Channel("theta", t, 0.2 * np.exp(-1.5 * t) * np.cos(14 * t) + noise, "rad")
+    >>> print(estimate(swing).sentence("theta"))
+    Noise of 'theta': sigma = 0.00206, white, from the quiet stretch (2.8 s to 8.41 s).
     """
     check_times(channel, channel.name)
     check_values(channel, channel.name, missing_allowed=True)
     stretch = find_quiet(channel) if quiet is None else quiet
     if stretch is None:
         return _from_highest(channel)
-    return _from_quiet(channel, *stretch)
+    return _from_quiet(channel, *(without_moves(channel, drives, *stretch)
+                                  if quiet is None else stretch))
 
 
 def high_band_sigma(channel: Channel) -> tuple[float, float]:
@@ -178,81 +131,28 @@ def high_band_sigma(channel: Channel) -> tuple[float, float]:
     return sigma, float(spread)
 
 
-def with_estimated_sigma(recording: Recording, names: Iterable[str] | None = None) -> Recording:
-    """A recording whose channels without a sigma get an estimated one; a note says from what.
-
-    Args:
-        recording: Any.
-        names: Of the channels; by default all without a sigma and without a declared hold.
-
-    >>> rec = with_estimated_sigma(Recording({"y": _example()}))
-    >>> rec["y"].sigma is not None
-    True
-    """
-    chosen = (
-        names
-        if names is not None
-        else [key for key, ch in recording.channels.items() if ch.sigma is None and ch.hold is None]
-    )
-    for key in chosen:
-        model = estimate(recording[key])
-        recording = replace(
-            recording.with_sigma({key: model.sigma}),
-            notes=(*recording.notes, f"Noise of '{key}': {model}."),
-        )
-    return recording
-
-
 def _from_quiet(channel: Channel, start: float, stop: float) -> NoiseModel:
     inside = (channel.time >= start) & (channel.time <= stop) & np.isfinite(channel.values)
     time, values = channel.time[inside], channel.values[inside]
-    if len(values) < SHORTEST:
-        raise errors.BadRecording(errors.noise_short(channel.name, len(values)))
-    centred, least = values - values.mean(), rounding_noise(channel.values)
-    if not np.any(centred) and not least:
+    n = len(values)
+    if n < SHORTEST:
+        raise errors.BadRecording(errors.noise_short(channel.name, n))
+    least = rounding_noise(channel.values)
+    if np.ptp(values) == 0 and not least:
         raise errors.BadRecording(errors.noise_none(channel.name))
-    # a rounded signal at rest: all that is known of its noise is that rounding hides it
-    found = fit(centred) if np.ptp(values) > 0 else _hidden(least, len(values))
-    sigma = max(found.sigma, least)
-    scale = sigma / found.sigma
-    return NoiseModel(
-        sigma,
-        found.sigma_std * scale,
-        found.coefficients,
-        found.covariance,
-        found.innovation * scale,
-        float(np.median(np.diff(time))),
-        "quiet stretch",
-        float(time[0]),
-        float(time[-1]),
-        len(values),
-    )
+    sigma, rho, spread = least, 0.0, 2 / float(np.sqrt(2 * n))
+    if np.ptp(values) > 0:  # else all that is known of the noise is that rounding hides it
+        found = fit(values - values.mean())
+        sigma, spread = max(found.sigma, least), 2 * found.sigma_std / found.sigma
+        rho = float(np.clip(autocorrelation(found.coefficients, 2)[1], 0.0, STEEPEST))
+    first, last = float(time[0]), float(time[-1])
+    return NoiseModel(sigma, rho if n >= QUIET else 0.0, spread, channel.interval,
+                      f"the quiet stretch ({first:g} s to {last:g} s)",
+                      (first, last) if n >= QUIET else None)
 
 
 def _from_highest(channel: Channel) -> NoiseModel:
-    sigma, spread = high_band_sigma(channel)
+    sigma, error = high_band_sigma(channel)
     seen = channel.time[np.isfinite(channel.values)]
-    return NoiseModel(
-        sigma,
-        spread,
-        np.empty(0),
-        np.empty((0, 0)),
-        sigma,
-        channel.interval,
-        "highest frequencies",
-        float(seen[0]),
-        float(seen[-1]),
-        len(seen),
-    )
-
-
-def _hidden(sigma: float, n: int) -> AR:
-    """White noise of σ, as well known as from n samples."""
-    return AR(np.empty(0), sigma, np.empty((0, 0)), sigma, sigma / float(np.sqrt(2 * n)))
-
-
-def _example() -> Channel:
-    """A decayed swing with noise: what the examples above look at."""
-    t: Array = np.arange(1000) / 100.0
-    noise = 0.002 * np.random.default_rng(1).standard_normal(1000)
-    return Channel("theta", t, 0.2 * np.exp(-1.5 * t) * np.cos(14 * t) + noise, "rad")
+    return NoiseModel(sigma, 0.0, 2 * error / sigma, channel.interval,
+                      f"the highest frequencies ({seen[0]:g} s to {seen[-1]:g} s)")

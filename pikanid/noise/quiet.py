@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ SHORTEST = 20  # samples in a quiet stretch
 # A correlation time must fit this often into a quiet stretch.
 _MEMORIES = 10.0
 _POSITIONS = 200  # windows tried of each length
+MOVES, JITTER = 0.01, 4.0  # of an input's range, and times its noise: a move
 
 
 def find_quiet(channel: Channel) -> tuple[float, float] | None:
@@ -37,6 +38,27 @@ def find_quiet(channel: Channel) -> tuple[float, float] | None:
         if best is None or span[1] - span[0] > best[1] - best[0]:
             best = span
     return best
+
+
+def without_moves(channel: Channel, drives: Sequence[Channel], start: float, stop: float
+                  ) -> tuple[float, float]:
+    """The longest part of a stretch [s] in which no input leaves the value that it has for most of
+    it: what is driven at random can look like coloured noise.  The stretch where that is too short.
+    """
+    t = channel.time[(channel.time >= start) & (channel.time <= stop)]
+    moves = np.zeros(len(t), bool)
+    for drive in drives:
+        u = drive.values[np.isfinite(drive.values)]
+        if len(u) < len(drive.values) or len(u) < 5 or np.ptp(u) == 0:
+            continue
+        here = np.interp(t, drive.time, u)
+        # fourth differences show the noise of what is well sampled, and nothing else
+        noisy = float(np.median(np.abs(np.diff(u, 4)))) / 0.6745 / np.sqrt(70.0)
+        moves |= np.abs(here - np.median(here)) > max(MOVES * np.ptp(u), JITTER * noisy)
+    ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
+    longest = int(np.argmax(np.diff(ends)))
+    first, last = int(ends[longest]), int(ends[longest + 1]) - 2
+    return (float(t[first]), float(t[last])) if last - first + 1 >= SHORTEST else (start, stop)
 
 
 def even_parts(channel: Channel) -> Iterator[tuple[Array, Array]]:

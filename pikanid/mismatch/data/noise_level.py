@@ -8,19 +8,16 @@ AR(1) model by Whittle's likelihood (P. Whittle, Ark. Mat. 2, 1953).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pikanid.noise import level as noise
 from pikanid.noise.floor import rounding_noise
-from pikanid.noise.quiet import SHORTEST
+from pikanid.noise.level import QUIET, NoiseModel, estimate
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
 LONGEST = 50  # samples of a gap that a line across it is followed over
-MOVES, JITTER = 0.01, 4.0  # of an input's range, and times its noise: a move
-QUIET = 100  # samples of a quiet stretch that say something about low frequencies
 ABOVE = 6.0  # natural frequencies from which on a residual is noise
 BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
 BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
@@ -32,50 +29,8 @@ Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, wei
 CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
-@dataclass(frozen=True)
-class Level:
-    """Noise of one output: ε_t = ρ ε_{t-1} + e_t.
-
-    Attributes:
-        sigma: Standard deviation of ε.
-        rho: Correlation of neighbours.
-        spread: Relative standard error of its power at low frequencies, on average.
-        interval: Between samples [s].
-        source: In words.
-        stretch: Start and stop [s] of a quiet stretch long enough to tell low frequencies.
-    """
-
-    sigma: float
-    rho: float
-    spread: float
-    interval: float
-    source: str
-    stretch: tuple[float, float] | None = None
-
-    def sentence(self, output: str) -> str:
-        """What was found."""
-        colour = f"correlation {self.rho:.2f} between neighbours" if self.rho else "white"
-        source = "as given" if self.source == "given" else f"from {self.source}"
-        return f"Noise of '{output}': sigma = {self.sigma:.3g}, {colour}, {source}."
-
-    def whiten(self, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Rows (N,) or (N, k) at times t as white noise of unit variance.
-
-        Exact over gaps: the correlation over m intervals is ρ^m.
-        """
-        if self.rho == 0:
-            return rows / self.sigma
-        steps = np.maximum(np.rint(np.diff(t) / self.interval), 1.0)
-        keep = self.rho ** steps
-        left = np.sqrt(1 - keep**2)
-        if rows.ndim == 2:
-            keep, left = keep[:, None], left[:, None]
-        rest = (rows[1:] - keep * rows[:-1]) / left
-        return np.concatenate([rows[:1], rest]) / self.sigma
-
-
 def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None,
-                inputs: Sequence[str] = ()) -> Level:
+                inputs: Sequence[str] = ()) -> NoiseModel:
     """What the recording alone says, before any fit; a stretch is quiet while no input moves.
 
     Raises:
@@ -83,45 +38,12 @@ def first_level(recording: Recording, output: str, quiet: tuple[float, float] | 
     """
     channel = recording[output]
     if channel.sigma is not None:
-        sigma = float(np.median(channel.sigma))
-        return Level(sigma, 0.0, 0.0, channel.interval, "given")
-    model = noise.estimate(channel, quiet)
-    if quiet is None and model.source == "quiet stretch":
-        drives = [recording[u] for u in inputs if u in recording]
-        still = _still(channel, drives, model.start, model.stop)
-        if still[1] - still[0] < model.stop - model.start:
-            model = noise.estimate(channel, still)
-    rho = float(np.clip(model.autocovariance(2)[1] / model.sigma**2, 0.0, 0.98))
-    long = model.source == "quiet stretch" and model.n >= QUIET
-    return Level(model.sigma, rho if model.n >= QUIET and not model.white else 0.0,
-                 2 * model.sigma_std / model.sigma, channel.interval,
-                 f"the {model.source} ({model.start:g} s to {model.stop:g} s)",
-                 (model.start, model.stop) if long else None)
+        return NoiseModel(float(np.median(channel.sigma)), 0.0, 0.0, channel.interval, "given")
+    return estimate(channel, quiet, [recording[u] for u in inputs if u in recording])
 
 
-def _still(channel: Channel, drives: Sequence[Channel], start: float, stop: float
-           ) -> tuple[float, float]:
-    """The longest part of a stretch [s] in which no input leaves the value that it has for most of
-    it: what is driven at random can look like coloured noise.  The stretch where that is too short.
-    """
-    t = channel.time[(channel.time >= start) & (channel.time <= stop)]
-    moves = np.zeros(len(t), bool)
-    for drive in drives:
-        u = drive.values[np.isfinite(drive.values)]
-        if len(u) < len(drive.values) or len(u) < 5 or np.ptp(u) == 0:
-            continue
-        here = np.interp(t, drive.time, u)
-        # fourth differences show the noise of what is well sampled, and nothing else
-        noisy = float(np.median(np.abs(np.diff(u, 4)))) / 0.6745 / np.sqrt(70.0)
-        moves |= np.abs(here - np.median(here)) > max(MOVES * np.ptp(u), JITTER * noisy)
-    ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
-    longest = int(np.argmax(np.diff(ends)))
-    first, last = int(ends[longest]), int(ends[longest + 1]) - 2
-    return (float(t[first]), float(t[last])) if last - first + 1 >= SHORTEST else (start, stop)
-
-
-def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
-            quiet: tuple[float, float] | None, explained: bool = False) -> Level:
+def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
+            quiet: tuple[float, float] | None, explained: bool = False) -> NoiseModel:
     """The level again, now that a fit has taken the motion away.
 
     Args:
@@ -174,7 +96,8 @@ def refined(level: Level, channel: Channel, t: np.ndarray, residual: np.ndarray,
     if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)
     # a fit leaves nothing of a rounded signal at rest: where it moves there is more
-    return Level(max(sigma, rounding_noise(channel.values)), rho, spread, h, source, level.stretch)
+    return replace(level, sigma=max(sigma, rounding_noise(channel.values)), rho=rho, spread=spread,
+                   source=source)
 
 
 def bridged(grid: np.ndarray) -> np.ndarray:

@@ -9,11 +9,12 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.estimate import Estimate
-from pikanid.mismatch.data.noise_level import Level, first_level, refined
+from pikanid.mismatch.data.noise_level import first_level, refined
 from pikanid.mismatch.data.outliers import without_lone, without_outliers
 from pikanid.mismatch.data.whitened import Records
 from pikanid.model import Model
 from pikanid.noise.floor import repeated
+from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
@@ -27,7 +28,7 @@ LEAST = 300  # samples of an output that must be there for that
 
 
 def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float, float] | None,
-             notes: list[str], together: int = 1, levels: Mapping[str, Level] | None = None
+             notes: list[str], together: int = 1, levels: Mapping[str, NoiseModel] | None = None
              ) -> Records:
     """Recordings in the model's units without outliers, each output with a first noise level, or
     with the one that is known.
@@ -36,7 +37,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
     """
     done, every = [], []
     for recording in recordings:
-        found: dict[str, Level] = {}
+        found: dict[str, NoiseModel] = {}
         for output in model.outputs:
             channel = recording.as_output(output.name, output.unit or None)
             recording, count = without_outliers(recording.with_channels(channel), output.name)
@@ -89,7 +90,7 @@ def beginnings(model: Model, recordings: tuple[Recording, ...], what: str, notes
     return tuple(r.window(r.start, r.start + share * (r.stop - r.start)) for r in recordings)
 
 
-def loud_enough(level: Level, channel: Channel) -> Level:
+def loud_enough(level: NoiseModel, channel: Channel) -> NoiseModel:
     """The level, or that of the least noise that a simulation can be compared with.
 
     Recordings without noise, or with a given σ that nothing measured has, would ask for more digits

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pikanid import errors
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.model import Model
+from pikanid.noise.level import NoiseModel
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.simulation.simulator import Response, Steps
@@ -26,7 +26,7 @@ class Records:
     """Recordings as they are judged: without outliers, each output with its noise level."""
 
     recordings: tuple[Recording, ...]
-    levels: tuple[dict[str, Level], ...]
+    levels: tuple[dict[str, NoiseModel], ...]
 
     @property
     def spread(self) -> float:
@@ -48,7 +48,7 @@ class Records:
             cut.append(_cut(r, max(float(t[int(share * (len(t) - 1))]), *moved)))
         return Records(tuple(cut), self.levels)
 
-    def with_levels(self, levels: dict[str, Level]) -> Records:
+    def with_levels(self, levels: dict[str, NoiseModel]) -> Records:
         """The same with one noise level of each output for all recordings."""
         return Records(self.recordings, tuple(levels for _ in self.recordings))
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.noise_level import Level
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.design.response import Sigma
 from pikanid.mismatch.detect.residual_tests import project
@@ -17,6 +16,7 @@ from pikanid.mismatch.fitting.descent import start_from
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.search.screen import Screen
 from pikanid.model import Model
+from pikanid.noise.level import NoiseModel
 from pikanid.recording import Channel, Recording
 from pikanid.simulation.synthetic import with_outputs
 
@@ -63,7 +63,8 @@ def recorded(model: Model, excitation: Recording, sigma: Sigma) -> Records:
         known = o.sigma if known is None else known
         if known is None:
             raise errors.BadSetting(errors.sigma_unknown(o.name))
-        levels[o.name] = Level(float(np.median(known)), 0.0, 0.0, full[o.name].interval, "given")
+        levels[o.name] = NoiseModel(
+            float(np.median(known)), 0.0, 0.0, full[o.name].interval, "given")
     whitened = Whitened(model, Records((full,), (levels,)))
     theta = whitened.problem.guess
     if not whitened.choose_steps(theta, 0.01):

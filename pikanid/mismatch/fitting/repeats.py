@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pikanid.formula.expressions import TIME
-from pikanid.mismatch.data.noise_level import GRID, Level, likeliest
+from pikanid.mismatch.data.noise_level import GRID, likeliest
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.detect.remainder import condensed
 from pikanid.mismatch.fitting.hypothesis import fitted
 from pikanid.model import Model
+from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 
@@ -43,7 +44,7 @@ class Repeats:
     """
 
     p_value: float
-    levels: dict[str, Level]
+    levels: dict[str, NoiseModel]
     notes: tuple[str, ...]
 
 
@@ -63,7 +64,7 @@ def repeats(model: Model, records: Records, later: Records | None) -> Repeats | 
     fits = [_residuals(model, r, records.levels[0]) for r in recordings]
     if any(fit is None for fit in fits):
         return None
-    found: dict[str, Level] = {}
+    found: dict[str, NoiseModel] = {}
     notes, p_values, refused = [], [], False
     for k, output in enumerate(model.outputs):
         own = [fit[k] for fit in fits if fit is not None]
@@ -140,7 +141,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _residuals(model: Model, recording: Recording, levels: dict[str, Level]
+def _residuals(model: Model, recording: Recording, levels: dict[str, NoiseModel]
                ) -> list[tuple[Array, Array, Array]] | None:
     """Of every output, times (N,) from the start, residual (N,) and Jacobian (N, n) of the
     recording's own fit; None where it cannot be fitted.
@@ -241,7 +242,7 @@ class Spectra:
         joined = float(gamma.sf(-np.sum(np.log(np.maximum(each, 1e-300))), len(each)))
         return min(1.0, 2 * min(whole, joined))
 
-    def beyond(self, level: Level) -> float:
+    def beyond(self, level: NoiseModel) -> float:
         """p-value of the differences, if the noise has this level."""
         from scipy.stats import f
 
@@ -251,7 +252,7 @@ class Spectra:
         each = np.asarray(f.sf(power / sizes, self.freedom * sizes, known))
         return min(1.0, len(each) * float(np.min(each)))
 
-    def level(self, old: Level) -> Level:
+    def level(self, old: NoiseModel) -> NoiseModel:
         """The noise of the differences, as AR(1); every octave counts the same, since a law that
         is missing shows where the modes are few.
         """
@@ -268,7 +269,7 @@ class Spectra:
             curve = (costs[best + 1] - 2 * costs[best] + costs[best - 1]) / step**2
         rho_std = 1.0 / np.sqrt(curve) if curve > 0 else 0.0
         spread = float(np.hypot(1.0 / np.sqrt(total), 2 * rho_std / (1 - rho) if rho else 0.0))
-        return Level(float(np.sqrt(scales[best] / (1 - rho**2))), rho, spread, old.interval,
+        return NoiseModel(float(np.sqrt(scales[best] / (1 - rho**2))), rho, spread, old.interval,
                      "what differs between repeats", old.stretch)
 
     def _by_block(self, weights: Array) -> tuple[Array, Array, Array]:
