@@ -13,7 +13,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from pikanid.version import __version__
+from pikanid.storage.version import __version__
 
 if TYPE_CHECKING:
     from pikanid import symbolic, uncertainty

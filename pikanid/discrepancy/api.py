@@ -25,9 +25,9 @@ from pikanid.objective.adequacy import judge
 from pikanid.problem.arguments import a_model
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
+from pikanid.storage.version import __version__
 from pikanid.strategies.finish import evaluate
 from pikanid.strategies.nls import NLS
-from pikanid.version import __version__
 
 GRID = (10, 20, 40)
 POINTS = 401

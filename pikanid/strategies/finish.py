@@ -13,12 +13,12 @@ from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
 from pikanid.objective.shooting import Shooting
 from pikanid.problem.problem import Problem
+from pikanid.storage.version import __version__
 from pikanid.uncertainty.information import (
     covariance,
     identifiability_warnings,
     undetermined_warnings,
 )
-from pikanid.version import __version__
 
 
 def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarray, *,

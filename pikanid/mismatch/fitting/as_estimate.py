@@ -9,7 +9,7 @@ from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.objective.adequacy import judge
-from pikanid.version import __version__
+from pikanid.storage.version import __version__
 
 
 def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
