@@ -48,7 +48,7 @@ mutants: $(STAMP) ## wrong lines that the tests see: mutmut on a sample, to repo
 	$(BIN)/python benchmarks/mutants.py report reports
 
 # The number of commits decides: the same commit runs the same part, the next one the next.
-SLOW_PARTS ?= 4
+SLOW_PARTS ?= 8
 SLOW_PART ?= $(shell echo $$(( $$(git rev-list --count HEAD 2>/dev/null || echo 0) \
 	% $(SLOW_PARTS) + 1 )))
 
