@@ -181,7 +181,7 @@ def diagnosed(train: pk.Recording, other: pk.Recording, memory: Memory) -> dict[
         except PikanidError as failure:
             return {"verdict": f"failed: {failure}", "mismatch": False, "hypotheses": []}
     return {"verdict": dx.verdict, "mismatch": dx.mismatch, "hypotheses": [
-        {"effects": [{"ids": list(e.ids)} for e in h.effects], "relative_weight": h.relative_weight}
+        {"effects": [{"ids": list(e.ids)} for e in h.effects], "probability": h.relative_weight}
         for h in dx.hypotheses]}
 
 

@@ -187,7 +187,7 @@ CASE: dict[str, Any] = {
                    "best_rival_distance": 9.0}}
 ANSWER: dict[str, Any] = {
     "verdict": "named", "mismatch": True, "held_out": {"rmse_after": 0.1, "noise": 0.1},
-    "hypotheses": [{"effects": [{"ids": ["sensor_delay"]}], "relative_weight": 0.97}],
+    "hypotheses": [{"effects": [{"ids": ["sensor_delay"]}], "probability": 0.97}],
     "parameters": {"after": {"l_theta": {"value": 0.044, "std": 0.001}}}}
 TRUTH = {"schema_version": 1, "sealed": False, "seed": "1", "nonce": "ab", "settings": {},
          "cases": [{"sha256": {"001.csv": "0"}}]}

@@ -32,7 +32,7 @@ def answer(*hypotheses: list[str], verdict: str = "", mismatch: bool | None = No
     verdict = verdict or ("none" if not hypotheses else "named" if len(hypotheses) == 1 else "set")
     return {"verdict": verdict, "mismatch": verdict != "none" if mismatch is None else mismatch,
             "hypotheses": [{"effects": [{"ids": e.split("/")} for e in h],
-                            "relative_weight": 0.9 / 2**k}
+                            "probability": 0.9 / 2**k}
                            for k, h in enumerate(hypotheses)], **more}
 
 
@@ -139,7 +139,7 @@ def test_reliability_of_calibrated_answers() -> None:
     scores = []
     for p in rng.uniform(0.5, 1.0, 4000):
         given = answer(["coulomb_friction" if rng.random() < p else "quadratic_drag"])
-        given["hypotheses"][0]["relative_weight"] = float(p)
+        given["hypotheses"][0]["probability"] = float(p)
         scores.append(judge(FRICTION, given))
     scores += [judge(FRICTION, answer())]
     rows = reliability(scores)

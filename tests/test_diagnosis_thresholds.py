@@ -69,7 +69,7 @@ def test_a_memory_tells_arguments_apart_by_content():
 def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
     def answer(identifier):
         return {"verdict": "named", "mismatch": True, "hypotheses": [
-            {"effects": [{"ids": [identifier]}], "relative_weight": 1.0}]}
+            {"effects": [{"ids": [identifier]}], "probability": 1.0}]}
 
     truth = {"id": "001", "class": "single", "nameable": True, "base": {},
              "effects": [{"id": "input_delay", "twins": ["sensor_delay"], "near": ""}],

@@ -174,8 +174,8 @@ CASE: dict[str, Any] = {
 ANSWER: dict[str, Any] = {
     "verdict": "set", "mismatch": True,
     "hypotheses": [{"effects": [{"ids": ["sensor_delay"]}, {"ids": ["symbolic:sign(theta_dot)"]}],
-                    "relative_weight": 0.6},
-                   {"effects": [{"ids": ["input_delay"]}], "relative_weight": 0.3}],
+                    "probability": 0.6},
+                   {"effects": [{"ids": ["input_delay"]}], "probability": 0.3}],
     "parameters": {"before": {}, "after": {"l_theta": {"value": 0.044, "std": 0.001}}},
     "held_out": {"rmse_after": 0.1, "noise": 0.1}}
 
@@ -212,7 +212,7 @@ def test_many_effects_are_compared_at_once() -> None:
     effects = [{"id": f"e{k}", "twins": [], "near": ""} for k in range(20)]
     case = {**CASE, "effects": effects, "visibility": {**CASE["visibility"], "effects": [9.0] * 20}}
     ids = [{"ids": [f"e{k}", f"e{k + 1}"]} for k in range(19)] + [{"ids": ["other"]}]
-    answer = {**ANSWER, "hypotheses": [{"effects": ids, "relative_weight": 0.5}]}
+    answer = {**ANSWER, "hypotheses": [{"effects": ids, "probability": 0.5}]}
     assert judge(case, answer).outcome == "wrong"
     ids[-1] = {"ids": ["e19"]}
     assert judge(case, answer).outcome == "right"

@@ -14,9 +14,9 @@ ANSWER: dict[str, Any] = {
     "verdict": "set",
     "hypotheses": [
         {"effects": [{"ids": ["a", "b"], "parameters": {"k": {"value": 2.0, "std": 0.1}}},
-                     {"ids": ["c"], "parameters": {}}], "relative_weight": 0.7},
+                     {"ids": ["c"], "parameters": {}}], "probability": 0.7},
         {"effects": [{"ids": ["d"], "parameters": {"q": {"value": 1.0, "std": None}}}],
-         "relative_weight": 0.3}],
+         "probability": 0.3}],
     "parameters": {"before": {"l": {"value": 0.045, "std": 1e-5}},
                    "after": {"l": {"value": 0.046, "std": 1e-5}}},
     "held_out": {"rmse_before": 0.03, "rmse_after": 0.01}}
@@ -37,7 +37,7 @@ def changed(**places: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(("path", "within", "beyond"), [
     ("hypotheses/0/effects/0/parameters/k/value", 2.0049, 2.0051),
     ("hypotheses/1/effects/0/parameters/q/value", 1.0 + 9e-7, 1.0 + 2e-6),
-    ("hypotheses/0/relative_weight", 0.719, 0.721),
+    ("hypotheses/0/probability", 0.719, 0.721),
     ("parameters/before/l/value", 0.045 + 4e-7, 0.045 + 6e-7),
     ("parameters/after/l/value", 0.046 - 4e-7, 0.046 - 6e-7),
     ("held_out/rmse_before", 0.03 * 1.0009, 0.03 * 1.0011),

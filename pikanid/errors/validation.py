@@ -61,5 +61,5 @@ def truth_case(detail: str) -> str:
 def diagnosis_unreadable(case: str, detail: object) -> str:
     return (
         f"The diagnosis of case '{short(case)}' cannot be scored: {short(str(detail))} (wanted: "
-        "verdict, mismatch, and hypotheses with effects' ids and a relative_weight)."
+        "verdict, mismatch, and hypotheses with effects' ids and a probability)."
     )

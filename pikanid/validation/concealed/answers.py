@@ -87,11 +87,11 @@ def check_case(case: Any) -> None:
 
 
 def _hypothesis(entry: Entry) -> tuple[list[set[str]], float]:
-    get = entry.table(("effects", "relative_weight"), None)
+    get = entry.table(("effects", "probability"), None)
     effects = [effect.table(("ids",), None)["ids"].items(most=MOST)
                for effect in get["effects"].items(most=MOST)]
     return ([{identifier.text(longest=LONGEST_ID) for identifier in ids} for ids in effects],
-            get["relative_weight"].number(0.0, 1.0))
+            get["probability"].number(0.0, 1.0))
 
 
 def _after(parameters: Entry | None) -> dict[str, tuple[float, float]]:

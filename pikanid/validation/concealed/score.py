@@ -137,7 +137,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
     ...          "visibility": {"nominal": 40.0, "effects": [40.0],
     ...                         "best_rival": [], "best_rival_distance": 9.0}}
     >>> answer = {"verdict": "named", "mismatch": True, "hypotheses": [
-    ...     {"effects": [{"ids": ["sensor_delay"]}], "relative_weight": 0.97}]}
+    ...     {"effects": [{"ids": ["sensor_delay"]}], "probability": 0.97}]}
     >>> judge(truth, answer).outcome
     'right'
     """
