@@ -37,9 +37,10 @@ STUDY = """
 import sys
 from pathlib import Path
 from pikanid.reporting.study_report import write
+from pikanid.strategies import PDA
 from pikanid.study import run
 if __name__ == "__main__":
-    run.SLOW = ("pda",)
+    PDA.slow = True
     write(run.run(0, ("nls", "pda")), Path(sys.argv[1]))
 """
 MODEL = ["--model", "sloshing", "--sigma", "0.1deg", "--quiet"]

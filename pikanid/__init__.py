@@ -13,6 +13,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from pikanid import strategies
 from pikanid.storage.version import __version__
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from pikanid.model import Input, Model, Output, Parameter, State, systems
     from pikanid.recording import Channel, Recording, datasets, excitation
     from pikanid.simulation import simulate
-    from pikanid.strategies import IPDA, NLS, PDA, PIKAN, PINN
+    from pikanid.strategies import *  # noqa: F403 - all that are listed there
 
 
 # Name -> the module that defines it.
@@ -39,11 +40,7 @@ _HOMES = {
     "Recording": "pikanid.recording",
     "Channel": "pikanid.recording",
     "Estimate": "pikanid.estimate",
-    "NLS": "pikanid.strategies",
-    "PDA": "pikanid.strategies",
-    "IPDA": "pikanid.strategies",
-    "PINN": "pikanid.strategies",
-    "PIKAN": "pikanid.strategies",
+    **dict.fromkeys(strategies.__all__, "pikanid.strategies"),
     "kan_discrepancy": "pikanid.discrepancy",
     "diagnose": "pikanid.mismatch.diagnose",
     "Diagnosis": "pikanid.mismatch.report.diagnosis",
@@ -71,11 +68,6 @@ __all__ = [
     "Recording",
     "Channel",
     "Estimate",
-    "NLS",
-    "PDA",
-    "IPDA",
-    "PINN",
-    "PIKAN",
     "kan_discrepancy",
     "diagnose",
     "Diagnosis",
@@ -90,6 +82,7 @@ __all__ = [
     "datasets",
     "__version__",
 ]
+__all__ += strategies.__all__
 
 
 def __getattr__(name: str) -> object:

@@ -25,14 +25,21 @@ Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 
 
 def _names_for_type_checkers() -> set[str]:
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    block = next(node for node in tree.body if isinstance(node, ast.If))
-    return {
-        alias.asname or alias.name
-        for node in ast.walk(block)
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
+    def shown(file: Path) -> set[str]:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        block = next(node for node in tree.body if isinstance(node, ast.If))
+        return {
+            alias.asname or alias.name
+            for node in ast.walk(block)
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+
+    own = shown(PACKAGE / "__init__.py")
+    assert "*" in own  # the strategies, all that their own list names
+    behind = shown(PACKAGE / "strategies" / "__init__.py") - {"Strategy"}
+    assert behind == set(pk.strategies.__all__)
+    return (own - {"*"}) | behind
 
 
 def _public(body: Iterable[ast.stmt]) -> Iterator[Definition]:

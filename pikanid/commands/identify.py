@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from pikanid.estimate import Estimate
     from pikanid.model import Model
     from pikanid.recording import Recording
+    from pikanid.strategies.strategy import Strategy
 
 ALL = "all"
 EXAMPLES = """Examples:
@@ -154,11 +155,11 @@ def _with_sigma(rec: Recording, model: Model, texts: Sequence[str]) -> Recording
     return rec.with_sigma(made)
 
 
-def _make(name: str, protocol: str, seed: int) -> Any:
+def _make(name: str, protocol: str, seed: int) -> Strategy:
     from pikanid.strategies import strategy
 
-    kind = strategy(name)
-    known = {f.name for f in fields(kind)}
+    kind: Callable[..., Strategy] = strategy(name)
+    known = {f.name for f in fields(strategy(name))}
     options = {"protocol": protocol, "seed": seed}
     return kind(**{key: value for key, value in options.items() if key in known})
 

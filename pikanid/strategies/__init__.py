@@ -1,13 +1,13 @@
 """The identification strategies: one method a file, one result type.
 
-NLS shoots (Eq. 1); PDA, iPDA, PINN and PIKAN relax the ODE (Eq. 2, Table I).  Classes are imported
-when they are first used.
+NLS shoots (Eq. 1); PDA, iPDA, PINN and PIKAN relax the ODE (Eq. 2, Table I).  The package, the
+command line and the study read the list below.  Classes are imported when they are first used.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pikanid.strategies.ipda import IPDA
@@ -15,14 +15,22 @@ if TYPE_CHECKING:
     from pikanid.strategies.pda import PDA
     from pikanid.strategies.pikan import PIKAN
     from pikanid.strategies.pinn import PINN
+    from pikanid.strategies.strategy import Strategy
 
-__all__ = ["IPDA", "NLS", "PDA", "PIKAN", "PINN", "STRATEGIES", "strategy"]
+# in the order of the paper's tables
+__all__ = [
+    "NLS",
+    "PDA",
+    "IPDA",
+    "PINN",
+    "PIKAN",
+]
 
-# name on the command line -> class; in the order of the paper's tables
-STRATEGIES = {"nls": "NLS", "pda": "PDA", "ipda": "IPDA", "pinn": "PINN", "pikan": "PIKAN"}
+# name on the command line, which is that of the file -> class
+STRATEGIES = {name.lower(): name for name in __all__}
 
 
-def strategy(name: str) -> Any:
+def strategy(name: str) -> type[Strategy]:
     """The class of a strategy by its short name.
 
     >>> strategy("nls").__name__
@@ -31,8 +39,8 @@ def strategy(name: str) -> Any:
     return __getattr__(STRATEGIES[name])
 
 
-def __getattr__(name: str) -> Any:
-    for short, found in STRATEGIES.items():
-        if found == name:
-            return getattr(import_module(f"pikanid.strategies.{short}"), name)
-    raise AttributeError(f"module 'pikanid.strategies' has no attribute {name!r}")
+def __getattr__(name: str) -> type[Strategy]:
+    if name not in __all__:
+        raise AttributeError(f"module 'pikanid.strategies' has no attribute {name!r}")
+    found: type[Strategy] = getattr(import_module(f"pikanid.strategies.{name.lower()}"), name)
+    return found

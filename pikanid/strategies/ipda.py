@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pikanid import errors
 from pikanid.estimate import Estimate
@@ -63,6 +63,8 @@ class IPDA:
     0.045
     """
 
+    name: ClassVar[str] = "ipda"
+    slow: ClassVar[bool] = False
     protocol: Literal["default", "paper"] = "default"
     form: Form = "second_order"
     degree: int | None = None
@@ -81,7 +83,7 @@ class IPDA:
         """
         begun = time.perf_counter()
         fit = fit_relaxed(Problem(model, recordings), self)
-        return relaxed_estimate("ipda", fit, asdict(self), begun)
+        return relaxed_estimate(self.name, fit, asdict(self), begun)
 
 
 def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:

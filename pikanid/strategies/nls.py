@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -49,6 +49,8 @@ class NLS:
     0.045
     """
 
+    name: ClassVar[str] = "nls"
+    slow: ClassVar[bool] = False
     starts: int | Literal["auto"] = "auto"
     protocol: Literal["default", "paper"] = "default"
     tolerance: float = 1e-9
@@ -91,7 +93,7 @@ class NLS:
                     "method": shooting.steps[0].method, "segments": self.segments,
                     "tried": len(history)}
         return finish(
-            "nls", problem, shooting, best.theta, converged=best.converged, history=history,
+            self.name, problem, shooting, best.theta, converged=best.converged, history=history,
             settings=settings, seed=self.seed, begun=begun)
 
     def one_start(self, shooting: Shooting, start: np.ndarray) -> Optimum | None:

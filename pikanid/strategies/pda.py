@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -61,6 +61,8 @@ class PDA:
     0.05
     """
 
+    name: ClassVar[str] = "pda"
+    slow: ClassVar[bool] = False
     protocol: Literal["default", "paper"] = "default"
     form: Form = "second_order"
     degree: int | None = None
@@ -79,7 +81,7 @@ class PDA:
         """
         begun = time.perf_counter()
         fit = fit_decoupled(Problem(model, recordings), self)
-        return relaxed_estimate("pda", fit, asdict(self), begun)
+        return relaxed_estimate(self.name, fit, asdict(self), begun)
 
 
 def fit_decoupled(problem: Problem, settings: PDA) -> RelaxedFit:

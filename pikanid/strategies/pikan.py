@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -74,6 +74,8 @@ class PIKAN:
     (0.045, 'MultKAN')
     """
 
+    name: ClassVar[str] = "pikan"
+    slow: ClassVar[bool] = False
     protocol: Literal["default", "paper"] = "default"
     width: Sequence[int | Sequence[int]] = SHALLOW
     base: Base = "zero"
@@ -114,7 +116,7 @@ class PIKAN:
             else:
                 fit = self._default(problem)
                 settings["lam_rule"] = "given" if self.lam else LAMBDA_RULE
-            found = relaxed_estimate("pikan", fit, settings, begun,
+            found = relaxed_estimate(self.name, fit, settings, begun,
                                      KanTrajectories.of(fit, self.device))
         if found.adequacy.verdict == "misfit" and fit.effective > 2 * fit.theta.size + 2:
             note = errors.curve_follows_data(fit.effective, fit.theta.size, fit.lam)

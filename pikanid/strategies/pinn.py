@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
 
 from pikanid.estimate import Estimate
 from pikanid.model import Model
@@ -58,6 +59,9 @@ class PINN(PinnSettings):
     (2, 2)
     """
 
+    name: ClassVar[str] = "pinn"
+    slow: ClassVar[bool] = True
+
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
 
@@ -72,4 +76,5 @@ class PINN(PinnSettings):
         fit, curves = fit_network(Problem(model, recordings), self)
         settings = asdict(replace(self, progress=None))
         del settings["progress"]
-        return assemble("pinn", fit, {**settings, **fit.settings}, list(fit.history), begun, curves)
+        return assemble(self.name, fit, {**settings, **fit.settings}, list(fit.history), begun,
+                        curves)

@@ -21,6 +21,7 @@ from pikanid.model import Model, systems
 from pikanid.recording import Recording, datasets
 from pikanid.simulation import simulate
 from pikanid.strategies import strategy
+from pikanid.strategies.nls import NLS
 
 # The recording itself gives the guess of the initial state, so that one start is enough for NLS.
 SETTINGS: dict[str, dict[str, Any]] = {"nls": {"starts": 1}}
@@ -68,7 +69,7 @@ def guess(recording: Recording) -> Model:
 def warm_up(swing: Swing) -> None:
     """Compile the model, so that timed fits are warm."""
     short = swing.train.window(swing.train.start, swing.train.start + FIRST)
-    strategy("nls")(starts=1).fit(guess(short), short)
+    NLS(starts=1).fit(guess(short), short)
 
 
 def fit(swing: Swing, name: str) -> Result:
@@ -103,7 +104,7 @@ def restarted(found: Estimate, held_out: Recording) -> float:
                if p.free and p.scope == "shared"}
     start = guess(held_out).fix(**physics)
     head = held_out.window(held_out.start, held_out.start + FIRST)
-    model = strategy("nls")(starts=1).fit(start, head).fitted_model
+    model = NLS(starts=1).fit(start, head).fitted_model
     return rms(simulate(model, held_out)["theta"].values - held_out["theta"].values)
 
 

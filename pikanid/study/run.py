@@ -14,14 +14,12 @@ from multiprocessing.pool import AsyncResult
 from pikanid import errors
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.storage.workers import begin
-from pikanid.strategies import STRATEGIES
+from pikanid.strategies import STRATEGIES, strategy
 from pikanid.study import pendulum, slosh
 
 SEED = 0
 # Only what is quick is repeated: the study is to stay a matter of minutes.
 REPEATABLE = 1.0  # [s] a fit
-# A fit of these takes half a minute, and on the long real recording many: only Table III has them.
-SLOW = ("pinn",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +57,8 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
     # Timed fits are warm; without noise NLS tries starts that are stiff, which is code of its own.
     for scenario in (slosh.SCENARIOS[1], slosh.SCENARIOS[3]):
         slosh.fit(scenario, "nls", SEED)
-    quick, slow = ([n for n in strategies if (n in SLOW) is late] for late in (False, True))
+    # A slow fit takes half a minute, and on the long real recording many: only Table III has them.
+    quick, slow = ([n for n in strategies if strategy(n).slow is late] for late in (False, True))
     with _meanwhile([(scenario, name) for name in slow for scenario in slosh.SCENARIOS
                      if scenario.stride == 1]) as pending:
         singles = []
@@ -78,7 +77,7 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
         for name in strategies:
             step(f"real pendulum, {name}")
             real.append(pendulum.Result(name, None, errors.left_out_as_slow())
-                        if name in SLOW else pendulum.fit(swing, name))
+                        if name in slow else pendulum.fit(swing, name))
         for scenario, name in product(slosh.SCENARIOS, slow):
             step(f"slosh, {scenario.label}, {name}")
             task = pending.get((scenario, name))
