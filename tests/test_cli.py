@@ -22,6 +22,7 @@ import pytest
 import pikanid as pk
 from pikanid.cli import main
 from pikanid.commands.options import adjusted, check_outputs, quantity
+from pikanid.recording.excitation import EXCITATIONS
 from pikanid.reporting import strict_json
 
 Run = Callable[..., tuple[int, str, str]]
@@ -210,7 +211,7 @@ def test_simulate_is_repeatable_and_exact_about_units(run: Run, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("model", ["linear_oscillator", "pendulum", "sloshing_2d"])
-@pytest.mark.parametrize("excitation", ["two_pulse", "free_decay", "move", "planar_moves"])
+@pytest.mark.parametrize("excitation", EXCITATIONS)
 def test_every_excitation_drives_every_model(run: Run, model: str, excitation: str) -> None:
     code, _, err = run("simulate", "-m", model, "-e", excitation, "--duration", "20", "-o", "a.csv")
     assert (code, err) == (0, "")

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import pikanid as pk
+from pikanid.cli import main
 from pikanid.errors import BadSetting
 from pikanid.recording import Recording, excitation, resampling
+from pikanid.recording.excitation import EXCITATIONS
 
 
 def motion(rec: Recording, channel: str = "u_x") -> tuple[np.ndarray, np.ndarray]:
@@ -135,3 +141,28 @@ def test_moves_that_do_not_fit() -> None:
 def test_the_same_seed_gives_the_same_moves() -> None:
     assert excitation.planar_moves(seed=4) == excitation.planar_moves(seed=4)
     assert excitation.planar_moves(seed=4) != excitation.planar_moves(seed=5)
+
+
+@pytest.mark.parametrize("name", EXCITATIONS)
+def test_python_and_the_command_line_read_one_list(name: str, tmp_path: Path) -> None:
+    function = getattr(pk.excitation, name)
+    assert name in pk.excitation.__all__ and inspect.getdoc(function)
+    out = tmp_path / "run.csv"
+    words = ["simulate", "--model", "sloshing", "--duration", "8", "--rate", "50", "--quiet"]
+    assert main([*words, "--excitation", name, "--out", str(out)]) == 0
+    made = function(duration=8.0, dt=0.02)
+    read = Recording.read(out)["u_x"]
+    assert read.unit == "m/s^2"
+    np.testing.assert_array_equal(read.values, made["u_x"].values)
+    np.testing.assert_array_equal(read.time, made.t)
+
+
+def test_help_and_the_sentence_about_an_unknown_name_list_all(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("simulate", "confusable"):
+        assert main([command, "--help"]) == 0
+        told = "".join(capsys.readouterr().out.split())
+        assert all(name in told.replace("│", "") for name in EXCITATIONS), command
+    assert main(["simulate", "--model", "sloshing", "--out", "a.csv", "-e", "chrip"]) == 2
+    sentence = capsys.readouterr().err
+    assert all(name in sentence for name in EXCITATIONS) and "chirp'?" in sentence

@@ -8,6 +8,7 @@ import typer
 
 from pikanid.commands.options import (
     Duration,
+    Excitation,
     ModelName,
     Quiet,
     Rate,
@@ -27,10 +28,7 @@ EXAMPLES = """Examples:
 
 def confusable(
     model: ModelName,
-    excitation: Annotated[str, typer.Option(
-        "--excitation", "-e", metavar="NAME|FILE",
-        help="the experiment: two_pulse, free_decay, move, planar_moves, or a recording of inputs",
-    )] = "two_pulse",
+    excitation: Excitation = "two_pulse",
     sigma: Sigma = [],  # noqa: B006
     set_: Values = [],  # noqa: B006
     duration: Duration = 5.0,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pikanid import errors
+from pikanid.recording.excitation import EXCITATIONS
 
 if TYPE_CHECKING:
     from pikanid.model import Model
@@ -33,6 +34,9 @@ Units = Annotated[list[str], typer.Option(
     help="unit of a signal, where the file does not say")]
 Stride = Annotated[int, typer.Option(
     "--decimate", metavar="N", min=1, help="use every N-th sample of the outputs")]
+Excitation = Annotated[str, typer.Option(
+    "--excitation", "-e", metavar="NAME|FILE",
+    help=f"what drives the model: {', '.join(EXCITATIONS)}, or a recording of its inputs")]
 Duration = Annotated[float, typer.Option(
     "--duration", metavar="S", help="of a built-in excitation [s]")]
 Rate = Annotated[float, typer.Option(

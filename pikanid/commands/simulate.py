@@ -10,6 +10,7 @@ from pikanid import errors
 from pikanid.commands.options import (
     Columns,
     Duration,
+    Excitation,
     ModelName,
     Quiet,
     Rate,
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     from pikanid.model import Model
     from pikanid.recording import Recording
 
-BUILT_IN = ("two_pulse", "free_decay", "move", "planar_moves")
-DISTANCE = 0.1  # [m] of "move"
 EXAMPLES = """Examples:
 
   pikanid simulate --model sloshing --sigma 0.1deg --out run.csv
@@ -43,9 +42,7 @@ def simulate(
     out: Annotated[str, typer.Option(
         "--out", "-o", metavar="FILE", show_default=False,
         help="recording to write (.csv, .csv.gz, .tsv, .parquet)")],
-    excitation: Annotated[str, typer.Option(
-        "--excitation", "-e", metavar=f"{'|'.join(BUILT_IN)}|FILE",
-        help="what drives the model")] = "two_pulse",
+    excitation: Excitation = "two_pulse",
     sigma: Sigma = [],  # noqa: B006
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the noise")] = 0,
     set_: Values = [],  # noqa: B006
@@ -80,14 +77,16 @@ def excited(model: Model, name: str, duration: float, rate: float,
     """The inputs to simulate under: the built-in excitation `name`, or the recording it names."""
     from pathlib import Path
 
-    from pikanid.recording import Recording, excitation
+    from pikanid.recording import Recording
+    from pikanid.recording.excitation import EXCITATIONS, built_in
 
-    if name not in BUILT_IN:
+    if name not in EXCITATIONS:
         import difflib
 
         if "." not in name and not Path(name).exists():
-            close = difflib.get_close_matches(name, BUILT_IN, 1)
-            raise errors.BadSetting(errors.unknown_excitation(name, BUILT_IN, close))
+            known = list(EXCITATIONS)
+            close = difflib.get_close_matches(name, known, 1)
+            raise errors.BadSetting(errors.unknown_excitation(name, known, close))
         rec = Recording.read(name, assignments("--column", column, "u_x=acceleration"))
         rec = rec.with_hold(**{i.name: i.hold for i in model.inputs
                                if i.name in rec and rec[i.name].hold is None})
@@ -98,17 +97,7 @@ def excited(model: Model, name: str, duration: float, rate: float,
         raise errors.BadSetting(errors.bad_rate(rate))
     # The profile drives the model's own inputs, in their own units.
     required = [i for i in model.inputs if i.default is None] or list(model.inputs)
-    driven = required[:1]
-    channel = driven[0].name if driven else "u"
-    channels, dt = [i.name for i in required] or [channel], 1 / rate
-    if name == "two_pulse":
-        rec = excitation.two_pulse(duration, dt, channel=channel)
-    elif name == "move":
-        rec = excitation.move(DISTANCE, duration, dt, channel=channel)
-    elif name == "free_decay":
-        rec = excitation.free_decay(duration, dt, channels)
-    else:
-        rec = excitation.planar_moves(duration=duration, dt=dt, channels=channels)
+    rec = built_in(name, duration, 1 / rate, [i.name for i in required] or ["u"])
     for item in required:
         if item.name in rec and item.unit:
             rec = rec.with_unit(item.name, item.unit)

@@ -13,7 +13,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
-from pikanid.recording.excitation import grid
+from pikanid.recording.excitation.sampling import grid
 
 DIGITS = 6  # of a profile's values: a file of decimals is run as it was designed
 
