@@ -11,6 +11,7 @@ from scipy.optimize import lsq_linear
 
 import pikanid as pk
 from pikanid.objective.functional import Functional
+from pikanid.optimise.box import box_minimum
 from pikanid.optimise.covariance import (
     effective_parameters,
     error_bound,
@@ -18,7 +19,7 @@ from pikanid.optimise.covariance import (
     respond,
     theta_covariance,
 )
-from pikanid.optimise.gauss_newton import BandedSystem, Point, box_minimum, gauss_newton
+from pikanid.optimise.gauss_newton import BandedSystem, Point, gauss_newton
 from pikanid.optimise.schedules import Continuation, Fixed, Stage
 from pikanid.optimise.small_matrices import inverse_diagonal
 from pikanid.optimise.smoothing import multiply, smooth

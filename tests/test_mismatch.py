@@ -25,10 +25,10 @@ from pikanid.mismatch.detect.residual_tests import (
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.fitting.hypothesis import extended
-from pikanid.mismatch.fitting.least_squares import minimise
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.model import Model, systems
 from pikanid.noise.level import NoiseModel
+from pikanid.optimise.levenberg_marquardt import minimise
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording, excitation
 from pikanid.simulation import simulate

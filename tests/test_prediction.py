@@ -11,10 +11,10 @@ import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.hypothesis import extended, fitted
-from pikanid.mismatch.fitting.least_squares import minimise
 from pikanid.mismatch.judge.prediction import _from_levels, held_out
 from pikanid.mismatch.judge.prior import Prior, room
 from pikanid.mismatch.steps.opening import open_case
+from pikanid.optimise.levenberg_marquardt import minimise
 
 
 def prior(root: np.ndarray) -> Prior:

@@ -10,9 +10,9 @@ from pikanid.mismatch.catalogue.forces import wall_impact
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.hypothesis import extended
-from pikanid.mismatch.fitting.least_squares import minimise
-from pikanid.mismatch.fitting.progressive_horizon import grown, rough
+from pikanid.mismatch.fitting.progressive_horizon import progressive_horizon, rough
 from pikanid.noise.level import NoiseModel
+from pikanid.optimise.levenberg_marquardt import minimise
 
 SIGMA = 0.002
 TRUE = {"wall": 0.1, "k_wall": 20000.0}
@@ -37,7 +37,7 @@ def opened(seed: int, wall: float) -> tuple[Whitened, np.ndarray]:
 def test_a_wall_is_found_from_far_off(seed: int, wall: float) -> None:
     whitened, theta = opened(seed, wall)
     effect = wall_impact(sites(pk.systems.sloshing(), whitened.records.recordings)[0])[0]
-    found = grown(whitened, [effect], theta)
+    found = progressive_horizon(whitened, [effect], theta)
     assert found is not None
     assert found.chi2 == pytest.approx(whitened.rows, abs=4 * np.sqrt(2 * whitened.rows))
     values = dict(zip([f.name for f in whitened.problem.free], found.theta, strict=True))
@@ -64,7 +64,7 @@ def test_a_wall_is_found_where_the_motion_begins_late_and_gently() -> None:
     # as the nominal model's fit, misled by the impacts, may have left it
     begin = {"wall": 0.08, "k_wall": 10000.0, "l_theta": 0.047, "d_theta": 0.5}
     theta = np.array([begin.get(f.name, f.guess) for f in whitened.problem.free])
-    found = grown(whitened, [effect], theta)
+    found = progressive_horizon(whitened, [effect], theta)
     assert found is not None
     assert found.chi2 == pytest.approx(whitened.rows, abs=4 * np.sqrt(2 * whitened.rows))
     values = dict(zip([f.name for f in whitened.problem.free], found.theta, strict=True))
@@ -82,7 +82,7 @@ def test_what_is_known_besides_counts() -> None:
         row[0, k] = 1e9
         return row[:, k] * (at[k] - 0.12), row
 
-    assert grown(whitened, [effect], theta, known) is None
+    assert progressive_horizon(whitened, [effect], theta, known) is None
 
 
 def test_only_laws_with_hills_are_rough() -> None:

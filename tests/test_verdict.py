@@ -13,12 +13,12 @@ from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.fitting.least_squares import Minimum
 from pikanid.mismatch.judge.doubt import POWER, least_proof
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.verdict import Answer, criterion, settle, with_formulas
 from pikanid.model.parts import Parameter
 from pikanid.model.systems import sloshing
+from pikanid.optimise.levenberg_marquardt import Minimum
 
 SITE = SimpleNamespace(suffix="", swing=1.0)
 ROWS = 1000

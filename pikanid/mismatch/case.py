@@ -18,13 +18,13 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.fitting.least_squares import minimise
 from pikanid.mismatch.fitting.parallel import side_by_side
 from pikanid.mismatch.fitting.repeats import Repeats
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.judge.verdict import ADEQUATE, WORTH
 from pikanid.mismatch.search.search import Search
 from pikanid.model import Model
+from pikanid.optimise.levenberg_marquardt import minimise
 
 SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
 EXPLAINED = 0.05  # p-value above which a search need not go on

@@ -18,8 +18,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from pikanid.approximators import Array
 from pikanid.objective.functional import Functional, Rows
+from pikanid.optimise.box import box_minimum
 from pikanid.optimise.cholesky import factor_band, solve_band
-from pikanid.optimise.gauss_newton import Point, box_minimum
+from pikanid.optimise.gauss_newton import Point
 from pikanid.optimise.local_rows import Family, Layout
 from pikanid.optimise.smoothing import multiply
 

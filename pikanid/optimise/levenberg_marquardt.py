@@ -1,94 +1,154 @@
-"""Bounded nonlinear least squares on exact Jacobians: MINPACK inside the bounds, TRF at them.
+"""Levenberg-Marquardt within bounds, that stops where statistics do: at a hundredth of χ².
 
-MINPACK costs a tenth of SciPy's bounded "trf" a step but knows no bounds; a step outside them is
-answered with huge residuals, which Levenberg-Marquardt takes as a reason to turn back.  Only a
-start that ends beside a bound is finished by "trf".
+A step minimises the damped quadratic model inside the box, so that bounds hold exactly and a
+parameter may be held by two equal ones.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
-Vector = Callable[[np.ndarray], np.ndarray]
-REFUSED = 1e10  # a standardised residual that no step towards it survives
+from pikanid.approximators import Array
+from pikanid.optimise.box import box_minimum
+
+TRIES = 8  # dampings of one step
+PATIENCE = 6  # iterations that a fit gets to come near the best one
+SLOW = 0.7  # share of the cost left by one iteration from which on a fit far away is given up
+Evaluate = Callable[[Array], tuple[Array, Array] | None]
+
+
+class Linearised(Protocol):
+    """A sum of squares |r|² at some θ, to second order."""
+
+    @property
+    def cost(self) -> float:
+        """|r|²."""
+
+    def normal(self) -> tuple[Array, Array]:
+        """JᵀJ (n, n) and Jᵀr (n,)."""
+
+
+At = TypeVar("At", bound=Linearised)
 
 
 @dataclass(frozen=True)
-class Optimum:
-    """Where a local fit stopped; cost is half the sum of squared residuals."""
+class Descent(Generic[At]):
+    """Where a descent ended: θ (n,), what was evaluated there, and whether it is a minimum."""
+
+    theta: Array
+    at: At
+    converged: bool
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """θ (n,), residual r (rows,) and Jacobian (rows, n) there; |r|² is χ²."""
 
     theta: np.ndarray
-    cost: float
+    r: np.ndarray
+    J: np.ndarray
     converged: bool
-    evaluations: int
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares."""
+        return float(self.r @ self.r)
 
 
-def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.ndarray,
-             upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100) -> Optimum:
-    """Minimise ½|r(θ)|² within bounds from `start` (n,).
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A residual (rows,) and its Jacobian (rows, n)."""
 
-    Args:
-        residual, jacobian: θ (n,) -> r (rows,) and ∂r/∂θ (rows, n).
-        tolerance: Relative change of θ and of the cost at which to stop.
-        limit: Evaluations allowed.
+    r: Array
+    J: Array
 
-    >>> found = minimise(lambda q: np.array([q[0] - 3.0]), lambda q: np.ones((1, 1)),
-    ...                  np.array([1.0]), np.array([0.0]), np.array([2.0]))
-    >>> round(float(found.theta[0]), 6)
+    @property
+    def cost(self) -> float:
+        """Sum of squares."""
+        return float(self.r @ self.r)
+
+    def normal(self) -> tuple[Array, Array]:
+        """JᵀJ (n, n) and Jᵀr (n,)."""
+        return self.J.T @ self.J, self.J.T @ self.r
+
+
+def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit: int = 30,
+             tolerance: float = 0.02, beyond: Callable[[float], bool] = lambda chi2: False
+             ) -> Minimum | None:
+    """Minimise |r(θ)|² within bounds; None where the start cannot be evaluated.
+
+    What is still `beyond` reach after `PATIENCE` iterations and falls slowly is given up.
+
+    >>> line = lambda q: (np.array([q[0] - 3.0]), np.ones((1, 1)))
+    >>> found = minimise(line, np.array([1.0]), np.array([0.0]), np.array([2.0]))
+    >>> float(found.theta[0])
     2.0
     """
-    from scipy.optimize import least_squares, leastsq
+    def rows(theta: Array) -> Rows | None:
+        at = evaluate(theta)
+        return None if at is None else Rows(*at)
 
-    inside = np.clip(start, lower, upper)
-    if len(start) == 0:
-        r = residual(inside)
-        return Optimum(inside, 0.5 * float(r @ r), True, 1)
-    scale = np.where(inside != 0, np.abs(inside), 1.0)
-    rows = len(residual(inside))
-    box = list(zip(lower.tolist(), upper.tolist(), strict=True))
-
-    def scaled(z: np.ndarray) -> np.ndarray:
-        theta = z * scale
-        # plain numbers: for a few parameters NumPy's overhead is a third of the optimiser's
-        if not all(low <= q <= high for q, (low, high) in zip(theta.tolist(), box, strict=True)):
-            return np.full(rows, REFUSED)
-        return residual(theta)
-
-    def slopes(z: np.ndarray) -> np.ndarray:
-        return jacobian(z * scale) * scale
-
-    def columns(z: np.ndarray) -> np.ndarray:
-        return np.ascontiguousarray(jacobian(z * scale).T) * scale[:, None]
-
-    def boxed(z: np.ndarray) -> np.ndarray:
-        return residual(np.clip(z * scale, lower, upper))
-
-    theta, best, evaluations, status = inside, np.inf, 0, 0
-    if rows >= len(start):
-        # MINPACK directly: least_squares(method="lm") wraps the same code and doubles its cost
-        z, _, info, _, code = leastsq(
-            scaled, inside / scale, Dfun=columns, col_deriv=True, full_output=True, ftol=tolerance,
-            xtol=tolerance, gtol=1e-15, maxfev=limit)
-        theta, best, evaluations = z * scale, 0.5 * float(info["fvec"] @ info["fvec"]), info["nfev"]
-        status = code if code in (1, 2, 3, 4) else 0
-    room = np.minimum(theta - lower, upper - theta)
-    if status == 0 or np.any(room < 1e-3 * np.maximum(np.abs(theta), 1e-12)):
-        found = least_squares(
-            boxed,
-            _strictly_inside(theta, lower, upper) / scale, slopes,
-            bounds=(lower / scale, upper / scale), x_scale="jac", ftol=tolerance, xtol=tolerance,
-            gtol=1e-12, max_nfev=limit)
-        evaluations += found.nfev
-        if found.cost <= best:
-            theta, best = np.clip(found.x * scale, lower, upper), float(found.cost)
-            status = found.status
-    return Optimum(theta, best, status > 0, evaluations)
+    found = descend(
+        rows, start, lower, upper, limit, beyond=beyond,
+        # far from an explanation nobody needs the last digits
+        enough=lambda at: max(tolerance, 2e-5 * at.cost, 0.1 * at.cost / len(at.r)))
+    return None if found is None else Minimum(found.theta, found.at.r, found.at.J, found.converged)
 
 
-def _strictly_inside(theta: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """TRF must start off its bounds."""
-    gap = 1e-8 * np.where(np.isfinite(upper - lower), upper - lower, 1.0)
-    return np.clip(theta, lower + gap, upper - gap)
+def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, upper: Array,
+            limit: int, enough: Callable[[At], float],
+            beyond: Callable[[float], bool] = lambda cost: False) -> Descent[At] | None:
+    """Minimise a sum of squares within bounds; None where the start cannot be evaluated.
+
+    Args:
+        evaluate: θ (n,) -> the sum of squares there, None where there is none.
+        start: (n,).
+        lower: (n,).
+        upper: (n,).
+        limit: Iterations.
+        enough: A decrease that is not worth another step.
+        beyond: Costs that are out of reach after `PATIENCE` iterations that end slowly.
+    """
+    theta = np.clip(start, lower, upper)
+    at, damping = evaluate(theta), 1e-3
+    if at is None or len(theta) == 0:
+        return None if at is None else Descent(theta, at, True)
+    for count in range(limit):
+        gram, slope = at.normal()
+        norms = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
+        matrix, pull = gram / np.outer(norms, norms), slope / norms
+        low, high = (lower - theta) * norms, (upper - theta) * norms
+        there = None
+        for _ in range(TRIES):
+            try:
+                step = box_minimum(matrix + damping * np.eye(len(theta)), pull, low, high)
+            except LinAlgError:  # alike columns, and hardly any damping
+                damping = max(damping * 8, 1e-4)
+                continue
+            expected = -float(step @ (matrix @ step + 2 * pull))
+            if expected < enough(at):
+                return Descent(theta, at, True)
+            # at a wall exactly, not up to rounding
+            new = np.where(step <= low, lower, np.where(step >= high, upper, theta + step / norms))
+            there = evaluate(new)
+            if there is not None and there.cost < at.cost:
+                break
+            damping, there = max(damping * 8, 1e-4), None
+        if there is None:
+            return Descent(theta, at, False)
+        before, gain = at.cost, at.cost - there.cost
+        damping = max(damping * (0.1 if gain > 0.5 * expected else 1.0), 1e-9)
+        theta, at = new, there
+        if count + 1 >= PATIENCE and at.cost > SLOW * before and beyond(at.cost):
+            return Descent(theta, at, False)
+    return Descent(theta, at, False)
+
+
+def held(theta: Array, slope: Array, lower: Array, upper: Array) -> np.ndarray:
+    """(n,) whether a bound holds a parameter that χ² with this slope would push further."""
+    return np.asarray(((theta <= lower) & (slope > 0)) | ((theta >= upper) & (slope < 0)))

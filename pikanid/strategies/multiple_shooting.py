@@ -17,7 +17,7 @@ from pikanid import errors
 from pikanid.formula.expressions import symbol
 from pikanid.model import Model, Output, Parameter
 from pikanid.objective.shooting import Shooting
-from pikanid.optimise.levenberg_marquardt import minimise
+from pikanid.optimise.minpack import minimise
 from pikanid.problem.problem import Experiment, Problem, Samples
 from pikanid.simulation.simulator import Simulator, Steps
 

@@ -18,7 +18,7 @@ from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.model import Model
 from pikanid.objective.shooting import Accuracy, Shooting
-from pikanid.optimise.levenberg_marquardt import Optimum, minimise
+from pikanid.optimise.minpack import Optimum, minimise
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.strategies.finish import finish

@@ -23,7 +23,8 @@ from pikanid.model import Model
 from pikanid.objective.functional import Functional
 from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.covariance import invert
-from pikanid.optimise.gauss_newton import BandedSystem, Point, box_minimum
+from pikanid.optimise.gauss_newton import BandedSystem, Point
+from pikanid.optimise.levenberg_marquardt import descend
 from pikanid.optimise.smoothing import Smoothed, smooth
 from pikanid.problem.chains import Form, find_chains
 from pikanid.problem.problem import Problem
@@ -140,30 +141,18 @@ def regress(functional: Functional, point: Point) -> tuple[Point, bool]:
         BadSetting: A parameter has no influence on the derivatives.
     """
     problem = functional.problem
-    theta, damping = np.clip(point.theta, problem.lower, problem.upper), 0.0
-    lower, upper = problem.lower.copy(), problem.upper.copy()
+    theta, lower, upper = point.theta.copy(), problem.lower.copy(), problem.upper.copy()
     for k, value in _first_states(functional, point).items():
         theta[k] = lower[k] = upper[k] = value
-    cost, gram, slope = _physics_normal(functional, replace(point, theta=theta))
-    idle = [f.label for f, g, fixed in zip(
-        problem.free, np.diag(gram), lower >= upper, strict=True) if g <= 0.0 and not fixed]
+    found = descend(lambda q: _physics(functional, replace(point, theta=q)), theta, lower, upper,
+                    REGRESSION_STEPS, lambda at: 1e-12 * at.cost)
+    assert found is not None
+    idle = [f.label for f, g, fixed in zip(problem.free, np.diag(found.at.gram), lower >= upper,
+                                           strict=True) if g <= 0.0 and not fixed]
     if idle:
         raise errors.BadSetting(errors.relaxation_cannot_see(
             idle, "it does not act on the derivatives of the states"))
-    for _ in range(REGRESSION_STEPS):
-        damped = gram + (damping + 1e-14) * np.diag(np.diag(gram))
-        step = box_minimum(damped, slope, lower - theta, upper - theta)
-        trial = _physics_normal(functional, replace(point, theta=theta + step))
-        if not trial[0] <= cost:
-            damping = max(1e-3, 10.0 * damping)
-            if damping > 1e9:
-                break
-            continue
-        theta, damping = theta + step, 0.1 * damping if damping > 1e-6 else 0.0
-        gain, (cost, gram, slope) = cost - trial[0], trial
-        if gain <= 1e-12 * cost:
-            return replace(point, theta=theta), True
-    return replace(point, theta=theta), damping > 1e9
+    return replace(point, theta=found.theta), found.converged
 
 
 def _first_states(functional: Functional, point: Point) -> dict[int, float]:
@@ -181,7 +170,19 @@ def _first_states(functional: Functional, point: Point) -> dict[int, float]:
     return found
 
 
-def _physics_normal(functional: Functional, point: Point) -> tuple[float, Array, Array]:
+@dataclass(frozen=True, eq=False)
+class _Physics:
+    """Sum of squares of the physics residual, and its normal equations."""
+
+    cost: float
+    gram: Array
+    slope: Array
+
+    def normal(self) -> tuple[Array, Array]:
+        return self.gram, self.slope
+
+
+def _physics(functional: Functional, point: Point) -> _Physics:
     size = point.theta.size
     cost, gram, slope = 0.0, np.zeros((size, size)), np.zeros(size)
     for r, c in enumerate(point.coefficients):
@@ -193,14 +194,14 @@ def _physics_normal(functional: Functional, point: Point) -> tuple[float, Array,
         cost += float(residual @ residual)
         gram[np.ix_(columns, columns)] += jacobian.T @ jacobian
         slope[columns] += jacobian.T @ residual
-    return cost, gram, slope
+    return _Physics(cost, gram, slope)
 
 
 def _covariance(functional: Functional, system: BandedSystem, point: Point, rho: float,
                 noise: list[Array | float]) -> Array:
     """Noise carried through both steps: dθ = -(J_θᵀJ_θ)⁻¹ J_θᵀJ_c A⁻¹ B_dᵀ dε (residuals small)."""
     problem = functional.problem
-    _, gram, _ = _physics_normal(functional, point)
+    gram = _physics(functional, point).gram
     stuck = np.isclose(point.theta, problem.lower, rtol=1e-6, atol=0.0) | np.isclose(
         point.theta, problem.upper, rtol=1e-6, atol=0.0)
     stuck[list(_first_states(functional, point))] = True  # these are not regressed

@@ -11,7 +11,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.objective.shooting import Shooting
-from pikanid.optimise.levenberg_marquardt import minimise
+from pikanid.optimise.minpack import minimise
 from pikanid.problem.problem import Problem
 from pikanid.uncertainty import covariance
 

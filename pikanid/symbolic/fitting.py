@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pikanid.optimise.levenberg_marquardt import descend
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.library import Form
 from pikanid.symbolic.numeric import Array
@@ -141,12 +142,15 @@ def _profile(form: Form, curve: Curve, mesh: Array, x: Array, free: Array,
 
 @dataclass(frozen=True, eq=False)
 class _Projected:
-    """A form at fixed parameters inside: amplitudes (k,) in closed form.
+    """A form at fixed parameters inside, p (q,): amplitudes (k,) in closed form.
 
     `raw` (n, k) are its columns, `phi` (r, k) the same whitened, without constant and free parts,
     `basis` (r, k) orthonormal, `left` (r,) the residual.
     """
 
+    form: Form
+    curve: Curve
+    p: Array
     raw: Array
     phi: Array
     basis: Array
@@ -154,8 +158,15 @@ class _Projected:
     left: Array
 
     @property
-    def rss(self) -> float:
+    def cost(self) -> float:
         return float(self.left @ self.left)
+
+    def normal(self) -> tuple[Array, Array]:
+        J = _inside_jacobian(self.form, self.curve, self.p, self.amplitudes)
+        if not np.isfinite(J).all():  # nothing is known of a way down
+            return np.eye(len(self.p)), np.zeros(len(self.p))
+        J = self.basis @ (self.basis.T @ J) - J
+        return J.T @ J, J.T @ self.left
 
 
 def _linear(form: Form, curve: Curve, p: Array) -> _Projected | None:
@@ -174,42 +185,15 @@ def _linear(form: Form, curve: Curve, p: Array) -> _Projected | None:
         return None
     part = q.T @ curve.centred
     a = np.linalg.solve(r, part) / size if r.size else np.empty(0)
-    return _Projected(raw, phi, q, a, curve.centred - q @ part)
+    return _Projected(form, curve, p, raw, phi, q, a, curve.centred - q @ part)
 
 
 def _descend(form: Form, curve: Curve, start: Array) -> Array:
     """Levenberg-Marquardt on the projected residual, within the parameters' limits."""
-    limits = np.array([k.limits(curve.low, curve.high, len(curve.x)) for k in form.knobs])
-    p = np.clip(start, limits[:, 0], limits[:, 1])
-    at = _linear(form, curve, p)
-    if at is None:
-        return start
-    damping, scale = 1e-3, np.diff(limits, axis=1)[:, 0]
-    tiny = 1e-26 * curve.total
-    for _ in range(ITERATIONS):
-        J = _inside_jacobian(form, curve, p, at.amplitudes)
-        if at.rss <= tiny or not np.isfinite(J).all():
-            break
-        J = (J - at.basis @ (at.basis.T @ J)) * scale
-        A, g = J.T @ J, J.T @ at.left
-        better = None
-        for _ in range(8):
-            ridge = damping * np.diag(np.diag(A) + 1e-12 * A.trace() + 1e-300)
-            step = np.linalg.lstsq(A + ridge, g, rcond=None)[0] * scale
-            q = np.clip(p + step, limits[:, 0], limits[:, 1])
-            there = _linear(form, curve, q)
-            if there is not None and there.rss < at.rss:
-                better = there
-                break
-            damping *= 8.0
-        if better is None:
-            break
-        gain = 1.0 - better.rss / at.rss
-        p, at = q, better
-        damping = max(damping / 8.0, 1e-12)
-        if gain < GAIN:
-            break
-    return p
+    lower, upper = np.array([k.limits(curve.low, curve.high, len(curve.x)) for k in form.knobs]).T
+    found = descend(lambda p: _linear(form, curve, p), start, lower, upper, ITERATIONS,
+                    lambda at: max(GAIN * at.cost, 1e-26 * curve.total))
+    return start if found is None else found.theta
 
 
 def _inside_jacobian(form: Form, curve: Curve, p: Array, amplitudes: Array) -> Array:
@@ -223,7 +207,7 @@ def _finish(form: Form, curve: Curve, p: Array) -> FormFit | None:
     found = _linear(form, curve, p)
     if found is None:
         return None
-    a, rss, shape = found.amplitudes, found.rss, found.phi @ found.amplitudes
+    a, rss, shape = found.amplitudes, found.cost, found.phi @ found.amplitudes
     values = found.raw @ a
     offset, base = _offset(curve, values)
     covariance = _covariance(form, curve, p, found.raw, a, base)

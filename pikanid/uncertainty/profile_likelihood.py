@@ -14,7 +14,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.model import Model
 from pikanid.objective.shooting import Shooting
-from pikanid.optimise.levenberg_marquardt import minimise
+from pikanid.optimise.minpack import minimise
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.uncertainty.information import covariance

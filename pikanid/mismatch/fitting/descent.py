@@ -13,7 +13,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.data.whitened import GROSS, Whitened, allowance
 from pikanid.mismatch.fitting.closest import Closest
-from pikanid.mismatch.fitting.least_squares import Minimum, minimise
+from pikanid.optimise.levenberg_marquardt import Minimum, minimise
 
 WILD = 1000.0  # times the closest χ², and that of the noise: starts above both are given up
 GLANCE = 1e4  # χ² per row that is good enough to see that

@@ -19,9 +19,9 @@ from pikanid.mismatch.fitting.descent import (
     place,
     renewed,
 )
-from pikanid.mismatch.fitting.least_squares import Minimum
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
 from pikanid.model import Model
+from pikanid.optimise.levenberg_marquardt import Minimum
 
 LIMIT = 30  # iterations of a fit
 HURRIED = 12  # and of one among gross misfits

@@ -14,7 +14,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.descent import GLANCE
-from pikanid.mismatch.fitting.least_squares import Evaluate, Minimum, minimise
+from pikanid.optimise.levenberg_marquardt import Evaluate, Minimum, minimise
 
 SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of all motion, that beginnings hold
 FEWEST = 10  # rows a parameter that are worth a fit

@@ -14,11 +14,11 @@ from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, extended
-from pikanid.mismatch.fitting.least_squares import Minimum, held, minimise
 from pikanid.mismatch.fitting.progressive_horizon import besides, progressive_horizon, rough
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit, room
 from pikanid.model import Model
+from pikanid.optimise.levenberg_marquardt import Minimum, held, minimise
 
 NEAR, AGAIN = 3.0, 4  # standard deviations that a linearisation holds for; how often it is renewed
 Residual = tuple[int, str, np.ndarray, np.ndarray]  # recording, output, times, values

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from pikanid.mismatch.fitting.decisions import in_order
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.fitting.least_squares import repeated
 
 
 def overdispersion(fits: Iterable[Hypothesis]) -> float:
@@ -21,3 +22,12 @@ def overdispersion(fits: Iterable[Hypothesis]) -> float:
     freedom = max(closest.whitened.rows - len(closest.minimum.theta), 1)
     level = max(1.0, closest.minimum.chi2 / freedom)
     return level * repeated(closest.minimum.r) ** (1 - 1 / level)
+
+
+def repeated(r: np.ndarray) -> float:
+    """How many neighbouring rows of a residual (N,) say the same: Σ ρ_k², at least one."""
+    n = len(r)
+    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
+    rho = np.fft.irfft(spectrum)[1:max(n // 4, 2)] / max(float(r @ r), 1e-300)
+    # noise alone has ρ² = 1/N
+    return max(1.0, 1 + 2 * float(np.sum(rho**2 - 1 / n)))

@@ -1,0 +1,85 @@
+"""Least squares within bounds: against SciPy, at walls, and where nothing is determined."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from pikanid.optimise.levenberg_marquardt import Rows, descend, minimise
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_linear_problems_in_a_box_are_solved_as_by_scipy(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    A, b = rng.normal(size=(20, 4)), 3 * rng.normal(size=20)
+    lower, upper = -rng.uniform(0, 0.5, 4), rng.uniform(0, 0.5, 4)
+    found = descend(lambda q: Rows(A @ q - b, A), np.zeros(4), lower, upper, 30,
+                    lambda at: 1e-12 * at.cost)
+    assert found is not None and found.converged
+    np.testing.assert_allclose(found.theta, lsq_linear(A, b, (lower, upper)).x, atol=1e-6)
+    at_wall = (found.theta == lower) | (found.theta == upper)
+    assert at_wall.any()  # exactly, not up to rounding
+
+
+def valley(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rosenbrock's, a bent one."""
+    return (np.array([10 * (q[1] - q[0] ** 2), 1 - q[0]]),
+            np.array([[-20 * q[0], 10.0], [-1.0, 0.0]]))
+
+
+def test_a_bent_valley_is_followed_to_its_end() -> None:
+    none = np.full(2, np.inf)
+    found = descend(lambda q: Rows(*valley(q)), np.array([-1.2, 1.0]), -none, none, 100,
+                    lambda at: 1e-20)
+    assert found is not None and found.converged
+    np.testing.assert_allclose(found.theta, 1.0, atol=1e-8)
+
+
+def test_a_parameter_with_equal_bounds_stays() -> None:
+    found = minimise(valley, np.array([-1.0, 0.25]), np.array([-2.0, 0.25]), np.array([2.0, 0.25]),
+                     100, tolerance=1e-12)
+    assert found is not None and found.theta[1] == 0.25
+    grid = np.linspace(-2, 2, 4001)
+    least = grid[np.argmin([float(np.sum(valley(np.array([x, 0.25]))[0] ** 2)) for x in grid])]
+    # two rows: a tenth of what they leave is not worth a step
+    assert abs(found.theta[0]) == pytest.approx(abs(least), abs=0.1)
+
+
+def test_what_the_data_do_not_tell_does_not_move_the_rest() -> None:
+    """Two alike columns and an empty one: the fit is found, the undetermined stays finite."""
+    A = np.column_stack([np.ones(5), np.ones(5), np.zeros(5), np.arange(5.0)])
+    b = 2.0 + 3.0 * np.arange(5.0)
+    wide = np.full(4, 1e6)
+    found = descend(lambda q: Rows(A @ q - b, A), np.zeros(4), -wide, wide, 50, lambda at: 1e-15)
+    assert found is not None
+    assert found.at.cost < 1e-10 and found.theta[3] == pytest.approx(3.0)
+    assert found.theta[2] == 0.0 and found.theta[0] + found.theta[1] == pytest.approx(2.0)
+
+
+def test_no_start_and_no_step() -> None:
+    box = np.zeros(1), np.ones(1)
+    assert minimise(lambda q: None, np.zeros(1), *box) is None
+
+    def only_here(q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        return (np.full(2000, 9.0), np.full((2000, 1), -1.0)) if q[0] == 0 else None
+
+    lost = minimise(only_here, np.zeros(1), *box)
+    assert lost is not None and not lost.converged and lost.theta[0] == 0.0
+
+
+@pytest.mark.parametrize(("reach", "most"), [(np.inf, 200), (1.0, 8)])
+def test_what_is_beyond_reach_is_given_up(reach: float, most: int) -> None:
+    """Steps of a twentieth of the way leave nine tenths of the cost each."""
+    calls = 0
+
+    def slow(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        nonlocal calls
+        calls += 1
+        return np.full(50, 10.0 - q[0]), np.full((50, 1), -20.0)
+
+    found = minimise(slow, np.zeros(1), np.full(1, -99.0), np.full(1, 99.0), 150,
+                     beyond=lambda chi2: chi2 > reach)
+    assert found is not None
+    assert (found.chi2 < 1.0) == (reach == np.inf)
+    assert 7 <= calls <= most
