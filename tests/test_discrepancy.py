@@ -3,35 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
+from scipy.linalg import block_diag
+from tanks import coarse, recording, tank
 
 import pikanid as pk
 from pikanid import errors
-from pikanid.discrepancy import Discrepancy, Edge
+from pikanid.discrepancy import Discrepancy, Edge, api
+from pikanid.discrepancy.edges import EdgePlan
+from pikanid.discrepancy.level import Level
+from pikanid.problem.problem import Problem
 from pikanid.uncertainty import cramer_rao
-
-SIGMA = 0.01
-
-
-def tank(name: str = "tank") -> pk.Model:
-    """x' = -a x + u, measured: no second argument can take the place of x."""
-    return pk.Model.from_dict({
-        "name": name, "states": {"x": {"unit": "m"}}, "inputs": {"u": {"unit": "m/s"}},
-        "parameters": {"a": {"guess": 1.0, "unit": "1/s", "bounds": [0.0, 10.0]}},
-        "equations": {"x": "-a*x + u"}, "outputs": {"x": {"unit": "m", "expression": "x"}}})
-
-
-def recording(cube: float, seed: int) -> pk.Recording:
-    """20 s of a multisine; a missing law -cube·x³."""
-    model = tank().with_term("x", "-c*x**3", [pk.Parameter("c", cube)])
-    drive = pk.excitation.multisine(np.arange(0.05, 0.5, 0.05), 20.0, 0.05, 3.0, seed=1,
-                                    channel="u", unit="m/s")
-    return pk.simulate(model, drive, sigma=SIGMA, seed=seed)
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +89,44 @@ def test_what_is_shown(found: Discrepancy) -> None:
     assert "x: up to" in str(found)
     assert "<table>" in found._repr_html_()
     assert len(found.plot().axes) == 1
+
+
+def test_plain_numbers_are_the_attributes(found: Discrepancy) -> None:
+    edge = found.edge("x")
+    jumping = replace(
+        edge, jump_probability=0.9, coefficients=np.append(edge.coefficients, 0.7),
+        covariance=block_diag(edge.covariance, 0.04),
+        gauge=replace(edge.gauge, plan=replace(edge.gauge.plan, step=True)))
+    for one, step in ((edge, None), (jumping, {"value": 0.7, "std": 0.2, "probability": 0.9})):
+        told = one.to_dict()
+        for name in ("argument", "argument_unit", "unit", "range", "p_value", "freedom",
+                     "significant", "values", "std"):
+            np.testing.assert_array_equal(told.pop(name), getattr(one, name))
+        np.testing.assert_array_equal(told.pop("argument_values"), one.grid)
+        np.testing.assert_array_equal([told.pop("lower"), told.pop("upper")], one.band)
+        assert told == {"step": step}
+    told = found.to_dict()
+    for name in ("equation", "unit", "adequate", "p_value", "alpha", "evidence"):
+        assert told.pop(name) == getattr(found, name)
+    assert told == {"offset": {"value": found.offset[0], "std": found.offset[1]},
+                    "edges": [edge.to_dict()], "estimate": found.estimate.to_dict(),
+                    "nominal": found.nominal.to_dict()}
+
+
+def test_the_functional_is_asked_for_the_coarsest_grid(found: Discrepancy,
+                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the relaxation itself says of the edge is asked below, at length."""
+    def relaxed(nominal: pk.Estimate, problem: Problem, equation: str, plans: Sequence[EdgePlan],
+                intervals: int) -> Level:
+        assert nominal is found.nominal and problem.model.name == "tank"
+        assert (equation, [p.argument for p in plans], intervals) == ("x", ["x"], 8)
+        return coarse()
+
+    monkeypatch.setattr(api, "relaxed_level", relaxed)
+    other = pk.kan_discrepancy(tank(), recording(0.3, 0), "x", ["x"], grid=[8, 16],
+                               nominal=found.nominal, method="functional")
+    assert other.estimate.settings["method"] == "functional"
+    np.testing.assert_allclose(other.edge("x").values, found.edge("x").values, atol=1e-6)
 
 
 def test_the_estimate_is_kept_on_disk(found: Discrepancy, tmp_path: Any) -> None:
@@ -190,7 +217,10 @@ def test_bad_input_is_one_sentence(options: dict[str, Any], kind: type[Exception
                              "nominal": found.nominal} | options
     with pytest.raises(kind) as raised:
         pk.kan_discrepancy(tank(), recording(0.3, 0), **given)
-    assert "\n" not in str(raised.value)
+    said = str(raised.value)
+    assert "\n" not in said
+    if {"grid", "alpha", "method"} & set(options):
+        assert re.search(rf"\b{next(iter(options))}\b", said)
 
 
 def test_an_edge_that_is_not_there(found: Discrepancy) -> None:

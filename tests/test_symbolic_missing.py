@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from tanks import recording, searching, tank
 
 import pikanid as pk
+from pikanid import errors
 from pikanid.approximators.bspline import BSpline
 from pikanid.approximators.kan.plan import uniform_extended_knots
+from pikanid.discrepancy import Discrepancy
 from pikanid.symbolic import extract
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import fit_form
 from pikanid.symbolic.library import LIBRARY
-from pikanid.symbolic.missing import _simpler, sticks
+from pikanid.symbolic.missing import _at_limit, _score, _simpler, _tried, edge_curve, sticks
 from pikanid.symbolic.naming import name_curve
 
 FORMS = {form.name: form for form in LIBRARY}
+FEW = [FORMS[n] for n in ("linear", "quadratic", "cubic", "signed square")]
 X = np.linspace(-2.0, 2.0, 400)
 SIGMA = 0.1 * np.pi / 180
 
@@ -77,6 +83,80 @@ def test_edge_of_a_model_that_comes_to_rest_is_not_trusted(jump: float, resting:
     gauge = SimpleNamespace(a=a, weights=np.full(a.size, 1.0 / a.size))
     assert sticks(SimpleNamespace(  # type: ignore[arg-type]
         range=(-1.0, 1.0), gauge=gauge, jump_probability=jump)) == stuck
+
+
+@pytest.fixture(scope="module")
+def found() -> Discrepancy:
+    """A cubic law that a tank lacks."""
+    return pk.kan_discrepancy(tank(), recording(0.3, 0), "x", ["x"], grid=[8], steps=False,
+                              nominal=searching().nominal)
+
+
+def test_an_edge_alone_says_its_law(found: Discrepancy) -> None:
+    reading = extract(found, library=FEW)
+    assert dict(reading.forms) == {(0, 0, 0): "cubic"} and reading.ok
+    assert reading.values[0] == pytest.approx(-0.3, abs=4 * reading.std[0])
+    edge, (weight,) = found.edge("x"), reading.contributions
+    assert (weight.size, weight.std, weight.p_value) == pytest.approx(
+        (np.sqrt(np.mean(edge.values**2)), np.sqrt(np.mean(edge.std**2)), edge.p_value))
+
+
+def test_what_is_named_is_the_edge_at_visited_arguments(found: Discrepancy) -> None:
+    edge = found.edge("x")
+    curve = edge_curve(edge, 123)
+    assert set(curve.x) <= set(edge.gauge.a) and len(curve.x) > 100
+    assert (curve.x[0], curve.x[-1]) == (edge.gauge.a.min(), edge.gauge.a.max())
+    np.testing.assert_allclose(curve.y, edge(curve.x), atol=1e-12)
+    assert curve.std is not None
+    np.testing.assert_allclose(
+        curve.std**2, np.diag(edge.covariance_of_values(curve.x)), rtol=1e-9)
+    assert (curve.samples, curve.argument, curve.unit, curve.x_unit) == (123, "x", "(m)/s", "m")
+
+
+def test_a_law_at_the_end_of_what_it_may_be_is_another_one() -> None:
+    edge = name_curve(Curve.of_points(X, np.sign(X)), [FORMS["sign"]])
+
+    def at(name: str, value: float) -> bool:
+        fit = SimpleNamespace(form=FORMS[name], inside=np.array([value]))
+        return _at_limit(cast(Any, fit), edge)
+
+    assert at("signed power", 0.3) and not at("signed power", 1.5) and at("signed power", 6.5)
+    low, high = FORMS["shifted sign"].knobs[0].limits(-2.0, 2.0, X.size)
+    assert at("shifted sign", low) and at("shifted sign", high) and not at("shifted sign", 0.1)
+
+
+@pytest.mark.parametrize("source", ["given", "estimated"])
+def test_laws_compete_by_bic_of_the_recordings(source: str, found: Discrepancy,
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    """χ² where the noise is stated, n log(χ²/n) where it is not; what cannot run is left out."""
+    left = {"cubic": 400.0, "quadratic": 500.0}
+
+    class Fit:
+        def __init__(self, starts: int):
+            assert starts == 1
+
+        def fit(self, model: pk.Model, recordings: object) -> object:
+            own = {p.name for p in model.parameters}
+            assert "a" in own and recordings is data
+            name = next((n for n, text in (("cubic", "x**3"), ("quadratic", "x**2"))
+                         if text in str(model.equations["x"])), "")
+            if not name:
+                raise errors.SimulationFailed("it runs away")
+            return SimpleNamespace(
+                n=401, theta=np.zeros(2), cost=0.5 * left[name],
+                adequacy=SimpleNamespace(source=source, value=left[name]))
+
+    data = recording(0.3, 0)
+    monkeypatch.setattr("pikanid.strategies.nls.NLS", Fit)
+    named = {(0, 0, 0): name_curve(edge_curve(found.edge("x"), 401), FEW)}
+    weights: Mapping[str, float] = {f.name: 0.25 if f.name == "cubic" else 0.125 for f in FEW}
+    tried: Sequence[Any] = _tried(found, named, data, weights)
+    assert tried[0][1].label == "cubic"
+    for score, law, estimate in tried:
+        chi2 = left[law.label]
+        bic = 2 * np.log(401) + (chi2 if source == "given" else 401 * np.log(chi2 / 401))
+        assert _score(estimate) == pytest.approx(bic)
+        assert score == pytest.approx(bic - 2 * np.log(weights[law.label]))
 
 
 @pytest.mark.slow
