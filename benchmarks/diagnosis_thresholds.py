@@ -1,25 +1,21 @@
-"""Do verdicts survive when an internal threshold is a quarter smaller or larger?
+"""Do verdicts survive when a setting is a quarter smaller or larger?
 
     python benchmarks/diagnosis_thresholds.py [--work build/diagnosis] [--cases 8] [--workers 2]
 
-Every number that a module of the diagnosis names counts as a threshold unless `LEFT_OUT` says why
-it is none.  One at a time is scaled, and recordings of the open sets are diagnosed again.
+Every field of `pikanid.Settings` is varied unless `LEFT_OUT` says why not.  One at a time is
+scaled, and recordings of the open sets are diagnosed again.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import contextlib
-import functools
 import itertools
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
@@ -30,78 +26,72 @@ from pikanid.errors import PikanidError
 from pikanid.mismatch import case
 from pikanid.mismatch import diagnose as api
 from pikanid.mismatch.beyond import formulas as symbols
+from pikanid.mismatch.data import noise_level
 from pikanid.mismatch.search import search
+from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.mismatch.steps import reporting
-from pikanid.noise import level as noise
 from pikanid.storage.outputs import atomically
 from pikanid.strategies.nls import NLS
 from pikanid.validation.concealed.score import judge
 
 FACTORS = (0.75, 1.25)
-FEW = 3  # cases of each set that thresholds inside fits are tried on: nothing can be remembered
-FOLDER = Path(api.__file__).parent
-PACKAGE = api.__package__
-MODULES = {path.stem: path for path in sorted(FOLDER.rglob("*.py")) if path.stem != "__init__"}
-# a threshold that is looked up nowhere else changes no result of what is remembered
-OUTSIDE = {"case", "confirming", "doubt", "noise_level", "outliers", "preparation", "screen",
-           "search", "searching", "formulas", "verdict"}
-REMEMBERED = ((noise, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
+FEW = 3  # cases of each set that settings inside fits are tried on: nothing can be remembered
+REMEMBERED = ((noise_level, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
               (symbols, "name_curve"), (case, "residual_tests"), (case, "held_out"),
               (api, "force_shape"))
+# settings that no function of these looks up, nor what it returned: a change of one of them
+# changes no result of what is remembered
+UNREAD = frozenset({
+    "alpha", "power", "refusal", "refusal_together", "needless", "noise_excess", "noise_conflict",
+    "search.promising", "search.kept", "search.much", "search.equal",
+    *(name for name, _ in DEFAULTS.items() if name.startswith(("noise.", "verdict."))
+      and name not in ("verdict.linear", "verdict.missed")),
+    *(f"budget.{name}" for name in (
+        "singles", "pairs", "beside_one", "beside_more", "leading", "effects", "carried",
+        "carried_far", "effort", "setup", "rivals", "asked_again", "tested", "predicted"))})
 # takes time and says nothing about the verdict
-SKIPPED: Mapping[Any, Mapping[str, Any]] = {
-    api: {"patch": None}, reporting: {"advice": "", "force_over_time": None, "smallest": {}}}
-AFTERWARDS = "says where, how large or what next once the verdict stands"
-BEFOREHAND = "plans experiments, diagnoses none"
-LONGER = "acts on longer recordings only"
-REPEATED = "acts on repeated experiments only"
-STEPS = "iterations or steps of a numerical method"
-LEFT_OUT: Mapping[str, Mapping[str, str]] = {
-    AFTERWARDS: {"advice": "*", "force_shape": "ADEQUATE OWN", "latent_force": "*", "locate": "*",
-                 "patch": "*", "penalised": "*"},
-    BEFOREHAND: {"confusable": "*", "next_experiment": "*", "profiles": "*",
-                 "response": "*", "sizing": "*"},
-    LONGER: {"case": "SEARCHED", "preparation": "LONG FINE MOST", "remainder": "MOST_ROWS"},
-    REPEATED: {"repeats": "*"},
-    STEPS: {"searching": "RELEVELLED", "confirming": "ASKED", "case": "AGAIN",
-            "descent": "HOPS COARSE RENEWED",
-            "progressive_horizon": "SHARES LIMIT HURRIED", "hypothesis": "LIMIT HURRIED",
-            "prediction": "AGAIN", "least_squares": "PATIENCE", "tangent": "*",
-            "whitened": "FINEST"},
-    "number of threads": {"parallel": "*"},
-    "far above rounding and far below what decides anything": {"decisions": "*"},
-    "number of draws, points or knots": {
-        "residual_tests": "DRAWS BATCH", "force_shape": "INTERVALS DEGREE GRID TYPICAL"},
-    "where fits begin": {"beginning": "SHARE", "channels": "LAGS", "late_inputs": "SHIFTS"},
-    "acts without a held-out recording only": {"preparation": "ASIDE LEAST"}}
+SKIPPED: tuple[tuple[Any, str, Any], ...] = (
+    (reporting, "advice", ""), (reporting, "force_over_time", None), (api, "patch", None),
+    (reporting, "smallest", {}))
+LEFT_OUT: Mapping[str, tuple[str, ...]] = {
+    "says where, how large or what next once the verdict stands": (
+        "band", "beyond.own", "beyond.line", "beyond.inside", "beyond.knots_a_period",
+        "beyond.resolved", "beyond.rows_a_knot", "beyond.louder", "beyond.unexplained",
+        "verdict.sensitive", "budget.force_passes", "budget.force_knots", "budget.slow_knots",
+        "budget.windows"),
+    "plans experiments, diagnoses none": (
+        "confusion", "signs", "budget.planned_refits", "budget.planned_sizes", "budget.finalists",
+        "budget.compared", "budget.profile"),
+    "acts on longer recordings only": (
+        "budget.samples", "budget.put_together", "budget.samples_a_period",
+        "budget.rows_searched", "budget.rows_tested", "budget.carried_far"),
+    "acts on repeated experiments only": (
+        "noise_refusal", "noise.driven_alike", "noise.moved_alike", "noise.covered", "noise.flat",
+        "noise.caution", "budget.modes"),
+    "acts without a held-out recording only": ("noise.aside", "noise.least_aside"),
+    "iterations or steps of a numerical method": (
+        "budget.relevelled", "budget.rechecked", "budget.iterations", "budget.hurried",
+        "budget.over_hills", "budget.several_starts", "budget.patience", "budget.noise_refit",
+        "budget.hops", "budget.finer", "budget.relinearised", "budget.levels"),
+    "number of threads": ("budget.threads",),
+    "number of draws": ("budget.draws",),
+}
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """A named number (or several) of one module, and the modules that look it up."""
+    """A setting, by its name in `Settings.items`."""
 
-    module: str
     name: str
-    users: frozenset[str]
+    value: Any
 
     @property
     def inside_fits(self) -> bool:
         """Whether it may change a fit or a test."""
-        return not self.users <= OUTSIDE
-
-    @property
-    def value(self) -> Any:
-        """As it stands."""
-        return getattr(imported(self.module), self.name)
+        return self.name not in UNREAD
 
     def __str__(self) -> str:
-        return f"{self.module}.{self.name}"
-
-
-def imported(module: str) -> ModuleType:
-    """The module of the diagnosis that has this name, whichever room it stands in."""
-    return import_module(
-        ".".join([PACKAGE, *MODULES[module].relative_to(FOLDER).with_suffix("").parts]))
+        return self.name
 
 
 def scaled(value: Any, factor: float) -> Any:
@@ -118,70 +108,43 @@ def scaled(value: Any, factor: float) -> Any:
     return value * factor
 
 
-@functools.cache
-def named_numbers() -> tuple[Threshold, ...]:
-    """All that the modules of the diagnosis name, whether thresholds or not."""
-    trees = {module: ast.parse(path.read_text()) for module, path in MODULES.items()}
-    users: dict[tuple[str, str], set[str]] = {}
-    for module, tree in trees.items():
-        for node in ast.walk(tree):
-            dotted = node.module or "" if isinstance(node, ast.ImportFrom) else ""
-            if isinstance(node, ast.ImportFrom) and dotted.startswith(PACKAGE):
-                for alias in node.names:
-                    users.setdefault((dotted.split(".")[-1], alias.name), set()).add(module)
-    found = []
-    for module, tree in trees.items():
-        names = [n.id for node in tree.body if isinstance(node, ast.Assign)
-                 for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)]
-        for name in names:
-            own = Threshold(module, name, frozenset(
-                {module} | users.get((module, name), set())))
-            if name.isupper() and name != "INF" and _numeric(own.value):
-                found.append(own)
-    return tuple(found)
-
-
-def _numeric(value: Any) -> bool:
-    parts = value if isinstance(value, tuple) else (value,)
-    return all(type(v) in (int, float) for v in parts)
-
-
 def reason(threshold: Threshold) -> str:
-    """Why a named number is not varied; empty for a threshold."""
-    return next((why for why, modules in LEFT_OUT.items()
-                 if {"*", threshold.name} & set(modules.get(threshold.module, "").split())), "")
+    """Why a setting is not varied; empty where it is."""
+    return next((why for why, names in LEFT_OUT.items() if threshold.name in names), "")
+
+
+def all_settings() -> list[Threshold]:
+    """Every field, whether it is varied or not."""
+    return [Threshold(name, value) for name, value in DEFAULTS.items()]
 
 
 def thresholds() -> list[Threshold]:
-    """The named numbers that are varied."""
-    return [t for t in named_numbers() if not reason(t)]
+    """The settings that are varied."""
+    return [t for t in all_settings() if not reason(t)]
 
 
-@contextlib.contextmanager
-def changed(threshold: Threshold, factor: float) -> Iterator[None]:
-    """The package with one threshold scaled, wherever it is looked up."""
-    value = scaled(threshold.value, factor)
-    with contextlib.ExitStack() as stack:
-        for user in threshold.users:
-            stack.enter_context(patch.object(
-                imported(user), threshold.name, value))
-        yield
+def changed(threshold: Threshold, factor: float) -> Settings | None:
+    """The defaults with one setting scaled; None where it can have no such value."""
+    try:
+        return DEFAULTS.with_values({threshold.name: scaled(threshold.value, factor)})
+    except PikanidError:  # shares of 1, and probabilities, cannot all be larger
+        return None
 
 
-def diagnosed(train: pk.Recording, other: pk.Recording, memory: Memory) -> dict[str, Any]:
+def diagnosed(train: pk.Recording, other: pk.Recording, settings: Settings, memory: Memory
+              ) -> dict[str, Any]:
     """What a diagnosis answers, as far as it is judged."""
     with contextlib.ExitStack() as stack:
         for where, name in REMEMBERED:
             stack.enter_context(patch.object(where, name, memory.of(getattr(where, name))))
-        for where, names in SKIPPED.items():
-            for name, nothing in names.items():
-                stack.enter_context(patch.object(where, name, return_value=nothing))
+        for where, name, nothing in SKIPPED:
+            stack.enter_context(patch.object(where, name, return_value=nothing))
         try:
-            dx = pk.diagnose(pk.systems.sloshing(), train, other, workers=1)
+            dx = pk.diagnose(pk.systems.sloshing(), train, other, settings=settings, workers=1)
         except PikanidError as failure:
             return {"verdict": f"failed: {failure}", "mismatch": False, "hypotheses": []}
     return {"verdict": dx.verdict, "mismatch": dx.mismatch, "hypotheses": [
-        {"effects": [{"ids": list(e.ids)} for e in h.effects], "probability": h.relative_weight}
+        {"effects": [{"ids": list(e.ids)} for e in h.effects], "relative_weight": h.relative_weight}
         for h in dx.hypotheses]}
 
 
@@ -195,21 +158,23 @@ def answers(job: tuple[Path, str, Path, bool]) -> Answers:
     kept.mkdir(parents=True, exist_ok=True)
     train, other = (pk.Recording.read(f"{recordings}/{case}_{part}.csv")
                     for part in ("train", "held_out"))
-    memory = Memory()
+    memory = Memory(UNREAD)
 
-    def answer(key: str, remembered: Memory) -> dict[str, Any]:
+    def answer(key: str, settings: Settings, remembered: Memory) -> dict[str, Any]:
         file = kept / f"{key}.json"
         if not file.exists():
-            atomically(file, json.dumps(diagnosed(train, other, remembered)).encode())
+            atomically(file, json.dumps(diagnosed(train, other, settings, remembered)).encode())
         kept_answer: dict[str, Any] = json.loads(file.read_text())
         return kept_answer
 
-    found = {BASE: answer(BASE, memory)}
+    found = {BASE: answer(BASE, DEFAULTS, memory)}
     for threshold in sorted(thresholds(), key=lambda t: t.inside_fits):
         for factor in FACTORS if thoroughly or not threshold.inside_fits else ():
-            key = f"{threshold} x {factor}"
-            with changed(threshold, factor):
-                found[key] = answer(key, Memory() if threshold.inside_fits else memory.fork())
+            settings = changed(threshold, factor)
+            if settings is not None:
+                key = f"{threshold} x {factor}"
+                found[key] = answer(key, settings,
+                                    Memory() if threshold.inside_fits else memory.fork())
     return found
 
 
@@ -235,7 +200,7 @@ class Tried:
                 else judge(self.truth, answer).outcome)
 
     def survives(self, key: str) -> bool:
-        """Whether verdict and hypotheses are those of the unchanged thresholds."""
+        """Whether verdict and hypotheses are those of the default settings."""
         return explained(self.answers[key]) == explained(self.answers[BASE])
 
 
@@ -271,22 +236,22 @@ def section(cases: int, work: Path, workers: int, sets: Sequence[str] | None = N
     missing = sum(c.answers[BASE]["mismatch"] for c in found)
     few = min(FEW, cases) * len({c.name.split()[0] for c in found})
     parts = [
-        f"\n## Thresholds a quarter smaller and larger, {len(found)} cases\n",
+        f"\n## Settings a quarter smaller and larger, {len(found)} cases\n",
         f"The first cases of each set ({missing} of them with something missing), diagnosed again "
-        "with one threshold changed; whole numbers move by one at least. Thresholds that act "
+        "with one setting changed; whole numbers move by one at least. Settings that act "
         f"inside fits and tests are tried on {few} of them. A verdict survives if it and the ids "
-        "of all its hypotheses stay the same; an outcome is what the score makes of it. Numbers "
-        "that the code gives no name, bounds and starting values among them, are not varied.\n",
+        "of all its hypotheses stay the same; an outcome is what the score makes of it. Numerical "
+        "tolerances, bounds and starting values, which are no settings, are not varied.\n",
         f"Verdicts that survive every change: {len(found) - len(moved)} of {len(found)}. "
         f"Outcomes that do: {sum(_same_outcomes(c) for c in found)} of {len(found)}.\n"]
     if rows:
-        parts += ["| threshold | value | changed verdicts | changed outcomes | became wrong |",
+        parts += ["| setting | value | changed verdicts | changed outcomes | became wrong |",
                   "| --- | --- | --- | --- | --- |", *rows, "", "Verdicts that do not survive: "
                   + "; ".join(f"{c} ({', '.join(by)})" for c, by in moved.items()) + ".\n"]
     parts += [f"No verdict of {own} depends on {', '.join(names)}.\n"
               for own, names in sorted(harmless.items(), reverse=True)]
     parts += ["Not varied:\n", *(f"- {why}: " + ", ".join(
-        f"`{t}`" for t in named_numbers() if reason(t) == why) + "." for why in LEFT_OUT)]
+        f"`{t}`" for t in all_settings() if reason(t) == why) + "." for why in LEFT_OUT)]
     return "\n".join(parts) + "\n"
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.settings.settings import Settings
 
 PLAIN = (str, int, float, bool, type(None), sp.Basic)
 
@@ -27,7 +28,8 @@ class Memory:
     """Remembers what functions returned; arguments are told apart by their content.
 
     Fits and whitened residuals are told apart by identity: whoever remembers the function that
-    made them gets the same ones again.
+    made them gets the same ones again.  `unread` names settings that none of the functions looks
+    up: they tell nothing apart.
 
     >>> calls = []
     >>> double = Memory().of(lambda rows: calls.append(1) or 2 * rows)
@@ -35,13 +37,14 @@ class Memory:
     ([[2.0, 2.0], [2.0, 2.0]], 1)
     """
 
-    def __init__(self) -> None:
+    def __init__(self, unread: Set[str] = frozenset()) -> None:
+        self.unread = unread
         self.results: dict[Hashable, tuple[Any, float | None]] = {}
         self.marks: dict[int, tuple[Any, Hashable]] = {}
 
     def fork(self) -> Memory:
         """Another memory that begins with the same; what it learns this one does not."""
-        other = Memory()
+        other = Memory(self.unread)
         other.results, other.marks = dict(self.results), dict(self.marks)
         return other
 
@@ -93,6 +96,8 @@ class Memory:
         elif isinstance(thing, Candidate):
             # its functions follow from the entry, its formula and the place in the model
             mark = thing.key, thing.expression, self.mark((thing.parameters, thing.site))
+        elif isinstance(thing, Settings):
+            mark = tuple(item for item in thing.items() if item[0] not in self.unread)
         elif is_dataclass(thing) and vars(type(thing))["__dataclass_params__"].frozen:
             mark = (type(thing).__name__, *(self.mark(getattr(thing, f.name))
                                             for f in fields(thing)))

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
     from pikanid.mismatch.diagnose import diagnose
     from pikanid.mismatch.report.diagnosis import Diagnosis
+    from pikanid.mismatch.settings.settings import Settings
     from pikanid.model import Input, Model, Output, Parameter, State, systems
     from pikanid.recording import Channel, Recording, datasets, excitation
     from pikanid.simulation import simulate
@@ -44,6 +45,7 @@ _HOMES = {
     "kan_discrepancy": "pikanid.discrepancy",
     "diagnose": "pikanid.mismatch.diagnose",
     "Diagnosis": "pikanid.mismatch.report.diagnosis",
+    "Settings": "pikanid.mismatch.settings.settings",
     "confusable": "pikanid.mismatch.design.confusable",
     "next_experiment": "pikanid.mismatch.design.next_experiment",
     "d_optimal": "pikanid.mismatch.design.next_experiment",
@@ -71,6 +73,7 @@ __all__ = [
     "kan_discrepancy",
     "diagnose",
     "Diagnosis",
+    "Settings",
     "confusable",
     "next_experiment",
     "d_optimal",

@@ -12,6 +12,7 @@ import pikanid as pk
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.report.advice import EXPLORE, PROVE, STRENGTHEN, advice
 from pikanid.mismatch.report.findings import Explanation
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 
 RATE = float(np.sqrt(9.81 / 0.045))
@@ -27,7 +28,7 @@ def explanation(title: str, term: str, identifier: str = "law") -> Explanation:
 def records() -> Records:
     rec = pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=0.002, seed=0)
     level = cast(NoiseModel, SimpleNamespace(sigma=0.002))
-    return Records((rec,), ({"theta": level},))
+    return Records((rec,), ({"theta": level},), DEFAULTS)
 
 
 FRICTION = explanation("dry friction", "-a*sign(theta_dot)")

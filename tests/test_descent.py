@@ -12,12 +12,13 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.hypothesis import extended, fitted, read_otherwise, turned
 from pikanid.mismatch.search.screen import Screen, law
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 
 
 def opened(truth: pk.Model, train: pk.Recording, sigma: float) -> Case:
     recording = pk.simulate(truth, train, sigma=sigma, seed=3)
-    return open_case(pk.systems.sloshing(), (recording,), None, None, lambda text: None)
+    return open_case(pk.systems.sloshing(), (recording,), None, None, lambda text: None, DEFAULTS)
 
 
 @pytest.mark.parametrize("stiff", [3000.0, 20000.0, 70000.0])

@@ -11,6 +11,7 @@ from pikanid.mismatch.judge.verdict import Verdict
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import _behind
 from pikanid.mismatch.report.findings import Explanation, NamedEffect, Where
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model.systems import sloshing
 
 
@@ -21,8 +22,8 @@ def explanation(name: str, expression: str, relative_weight: float = 0.5) -> Exp
 
 def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:
     nothing = cast(Estimate, None)
-    return Diagnosis(verdict, 1e-9, 0.01, Where("dynamics", "v", (), (), None), given, (), nothing,
-                     nothing, None)
+    return Diagnosis(verdict, 1e-9, DEFAULTS, Where("dynamics", "v", (), (), None), given, (),
+                     nothing, nothing, None)
 
 
 @pytest.mark.parametrize("verdict", ["set", "unconfirmed"])

@@ -1,4 +1,4 @@
-"""Scaled thresholds: every named number is varied or left out; a repeated diagnosis is exact."""
+"""Scaled settings: every field is varied or left out; a repeated diagnosis is exact."""
 
 
 import diagnosis_thresholds as varied
@@ -7,39 +7,44 @@ import pytest
 from remembering import Memory
 
 import pikanid as pk
-from pikanid.mismatch.data import whitened
-from pikanid.mismatch.fitting import hypothesis
-from pikanid.mismatch.judge import verdict
 from pikanid.mismatch.search import search
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.recording import excitation
 
-NUMBERS = {str(t): t for t in varied.named_numbers()}
+SETTINGS = {t.name: t for t in varied.all_settings()}
 
 
-def test_what_is_left_out_exists():
-    for modules in varied.LEFT_OUT.values():
-        for module, names in modules.items():
-            for name in names.split():
-                assert name == "*" or f"{module}.{name}" in NUMBERS
-            assert any(t.module == module for t in NUMBERS.values())
+def test_every_name_is_that_of_a_setting():
+    assert {name for names in varied.LEFT_OUT.values() for name in names} <= set(SETTINGS)
+    assert set(SETTINGS) >= varied.UNREAD
 
 
-def test_the_constants_of_a_verdict_are_thresholds():
-    found = {t.name for t in varied.thresholds() if t.module == "verdict"}
-    assert found >= {"WITHIN", "GUARD", "BEHIND", "PART", "ADEQUATE", "WORTH"}
+def test_what_counts_as_evidence_is_varied():
+    found = {t.name for t in varied.thresholds()}
+    assert found >= {name for name in SETTINGS if name.startswith(("verdict.", "search.", "fits."))
+                     } - {"verdict.sensitive"}
+    assert found >= {"alpha", "power", "refusal", "refusal_together", "choice_weight"}
 
 
-def test_a_change_reaches_every_user_and_ends():
-    before = whitened.GROSS
-    with varied.changed(NUMBERS["whitened.GROSS"], 1.25):
-        assert whitened.GROSS == hypothesis.GROSS == verdict.GROSS == 1.25 * before
-    assert whitened.GROSS == hypothesis.GROSS == verdict.GROSS == before
+def test_a_change_is_of_one_setting():
+    for threshold in varied.thresholds():
+        for factor in varied.FACTORS:
+            found = varied.changed(threshold, factor)
+            assert found is None or list(found.changed()) == [threshold.name]
+    assert varied.changed(SETTINGS["power"], 1.25) is None
+    assert varied.changed(SETTINGS["verdict.worth"], 1.25).verdict.worth == 1.25 * 0.05
+    assert DEFAULTS.verdict.worth == 0.05
 
 
-def test_only_what_acts_outside_fits_keeps_the_memory():
-    assert NUMBERS["hypothesis.FAR"].inside_fits  # in a search too, but in fits as well
-    assert not NUMBERS["verdict.WORTH"].inside_fits
-    assert NUMBERS["verdict.WORTH"].users == {"case", "verdict"}
+def test_what_acts_inside_fits_is_told_apart():
+    memory = Memory(varied.UNREAD)
+    changed = {name: memory.mark(varied.changed(SETTINGS[name], 0.75))
+               for name in ("fits.far", "search.faint", "verdict.worth", "verdict.linear")}
+    usual = memory.mark(DEFAULTS)
+    assert {name for name, mark in changed.items() if mark != usual} == {
+        "fits.far", "search.faint", "verdict.linear"}
+    assert {name for name in changed if SETTINGS[name].inside_fits} == {
+        "fits.far", "search.faint", "verdict.linear"}
 
 
 def test_whole_numbers_move_by_one_at_least():
@@ -79,14 +84,15 @@ def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
             for f in varied.FACTORS}
     case = varied.Tried("rich 001", truth, {
         varied.BASE: answer("input_delay"), **keys,
-        "verdict.GUARD x 0.75": answer("sensor_delay"), "verdict.BEHIND x 1.25": answer("wall")})
+        "verdict.decoy_handicap x 0.75": answer("sensor_delay"),
+        "verdict.behind x 1.25": answer("wall")})
     monkeypatch.setattr(varied, "tried", lambda *given: [case])
     text = varied.section(1, tmp_path, 1)
     assert "Verdicts that survive every change: 0 of 1. Outcomes that do: 0 of 1." in text
-    assert "| `verdict.GUARD` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
-    assert "| `verdict.BEHIND` | 3 → 3.75 | 1 of 1 | 1 of 1 | rich 001 |" in text
-    assert "rich 001 (`verdict.BEHIND`, `verdict.GUARD`)" in text
-    assert "No verdict of 1 depends on `" in text and "`case.BETTER`" in text
+    assert "| `verdict.decoy_handicap` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
+    assert "| `verdict.behind` | 3 → 3.75 | 1 of 1 | 1 of 1 | rich 001 |" in text
+    assert "rich 001 (`verdict.behind`, `verdict.decoy_handicap`)" in text
+    assert "No verdict of 1 depends on `" in text and "`verdict.improvement`" in text
 
 
 def test_a_diagnosis_repeated_fits_nothing_anew(monkeypatch):
@@ -95,10 +101,10 @@ def test_a_diagnosis_repeated_fits_nothing_anew(monkeypatch):
     fits = []
     fitted = search.fitted
     monkeypatch.setattr(search, "fitted", lambda *given: fits.append(1) or fitted(*given))
-    memory = Memory()
-    varied.diagnosed(train, other, memory)
+    memory = Memory(varied.UNREAD)
+    varied.diagnosed(train, other, DEFAULTS, memory)
     count = len(fits)
-    varied.diagnosed(train, other, memory.fork())
+    varied.diagnosed(train, other, DEFAULTS.with_values({"verdict.worth": 0.06}), memory.fork())
     assert len(fits) == count > 0
 
 
@@ -108,10 +114,11 @@ def test_a_remembered_diagnosis_is_the_same():
         "theta_dot", "-k3*theta**3", [pk.Parameter("k3", 60.0)])
     train, other = (pk.simulate(truth, excitation.planar_moves(6, 10.0, seed=seed),
                                 sigma=0.002, seed=seed) for seed in (1, 2))
-    memory = Memory()
-    varied.diagnosed(train, other, memory)
-    for name, factor in (("search.SINGLES", 0.75), ("search.CLOSE", 1.25), ("verdict.WITHIN", 1.25),
-                         ("outliers.LONE", 0.75)):
-        with varied.changed(NUMBERS[name], factor):
-            assert varied.diagnosed(train, other, memory.fork()) == varied.diagnosed(
-                train, other, Memory())
+    memory = Memory(varied.UNREAD)
+    varied.diagnosed(train, other, DEFAULTS, memory)
+    for name, factor in (("budget.singles", 0.75), ("verdict.indistinct", 1.25),
+                         ("verdict.decoy_handicap", 0.75), ("noise.lone", 0.75),
+                         ("refusal", 1.25)):
+        settings = varied.changed(SETTINGS[name], factor)
+        assert varied.diagnosed(train, other, settings, memory.fork()) == varied.diagnosed(
+            train, other, settings, Memory())

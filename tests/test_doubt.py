@@ -10,7 +10,8 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
-from pikanid.mismatch.judge.doubt import least_proof, why_not
+from pikanid.mismatch.judge.doubt import why_not
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
@@ -21,7 +22,8 @@ SIGMA = 0.002
 @pytest.fixture(scope="module")
 def hypotheses() -> tuple[Case, list[Hypothesis]]:
     """A cubic spring, found in a recording; held out, the same system in another motion."""
-    case = open_case(pk.systems.sloshing(), (moved(1),), (moved(2),), None, lambda text: None)
+    case = open_case(pk.systems.sloshing(), (moved(1),), (moved(2),), None,
+                     lambda text: None, DEFAULTS)
     effect = next(c for c in case.candidates if c.key == "cubic_stiffness")
     found = fitted(case.model, [effect], case.records, [{"k3": 200.0}], 30)
     assert found is not None
@@ -42,7 +44,7 @@ def doubt(case: Case, ranked: list[Hypothesis], later: Recording) -> tuple[str, 
     other = replace(case, later=held, predictions={})
     predicted = other.predicted(case.base)
     assert predicted is not None
-    return why_not(ranked[0], ranked, other.predicted, 1.0, 0.01), predicted.motion
+    return why_not(ranked[0], ranked, other.predicted, 1.0, DEFAULTS), predicted.motion
 
 
 def test_another_motion_proves_a_spring(hypotheses: tuple[Case, list[Hypothesis]]) -> None:
@@ -56,7 +58,7 @@ def test_what_is_at_rest_or_short_proves_nothing(
         said, motion = doubt(*hypotheses, later)
         assert "could not have refuted cubic stiffness" in said
         assert motion < 100
-    assert doubt(*hypotheses, moved(2, 0.0))[1] < least_proof(0.01)
+    assert doubt(*hypotheses, moved(2, 0.0))[1] < DEFAULTS.least_proof
 
 
 def test_a_small_motion_bends_no_spring(hypotheses: tuple[Case, list[Hypothesis]]) -> None:

@@ -11,6 +11,7 @@ from pikanid.mismatch.beyond.formulas import symbolic_candidates
 from pikanid.mismatch.beyond.patch import patch
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import systems
 from pikanid.recording import excitation
@@ -28,13 +29,13 @@ def recorded(truth: pk.Model, seed: int, duration: float = 8.0) -> pk.Recording:
 @pytest.fixture(scope="module")
 def case() -> Case:
     return open_case(systems.sloshing(), (recorded(EVEN, 1),), (recorded(EVEN, 2),), None,
-                   lambda text: None)
+                   lambda text: None, DEFAULTS)
 
 
 def test_the_missing_law_is_among_the_formulas(case: Case) -> None:
     shape = force_shape(case.base, case.sites[0], case.candidates)
     formulas = [c.ids[0] for c in symbolic_candidates(
-        shape, case.sites[0], case.candidates)]
+        shape, case.sites[0], case.candidates, DEFAULTS)]
     assert f"{SYMBOLIC}a_theta*theta**2" in formulas
     assert f"{SYMBOLIC}a_theta*theta**3" not in formulas  # the catalogue's own
 
@@ -60,7 +61,7 @@ def bent(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def test_a_clean_recording_offers_no_patch() -> None:
     opened = open_case(systems.sloshing(), (recorded(systems.sloshing(), 1),),
-                     (recorded(systems.sloshing(), 2),), None, lambda text: None)
+                     (recorded(systems.sloshing(), 2),), None, lambda text: None, DEFAULTS)
     shape = force_shape(opened.base, opened.sites[0], opened.candidates)
     assert patch(opened.base, opened.model, shape, opened.sites[0], opened.records, opened.later,
                  opened.predicted) is None

@@ -17,6 +17,7 @@ from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.tangent import directions
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model.parts import Hold, Parameter
 from pikanid.noise.level import NoiseModel
 from pikanid.problem.held import HeldInput, acting
@@ -159,7 +160,7 @@ def test_recorded_rates_below_the_limit_change_nothing() -> None:
 def test_a_play_wider_than_the_input_leaves_nothing_to_look_for_in_it() -> None:
     level = cast(NoiseModel, SimpleNamespace(sigma=0.002, whiten=lambda r, t: r))
     records = Records((pk.simulate(loose(), wandering(), sigma=0.002, seed=1),),
-                      ({"theta": level},))
+                      ({"theta": level},), DEFAULTS)
     model = loose().with_values(b=9.0)
     whitened = Whitened(model, records)
     theta = whitened.problem.guess

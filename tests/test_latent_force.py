@@ -16,6 +16,7 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.locate import locate
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import systems
 from pikanid.recording import Recording, excitation
@@ -40,7 +41,7 @@ def recorded(law: str, seed: int, sigma: float = SIGMA) -> Recording:
 
 @functools.cache
 def opened(law: str, seed: int) -> Case:
-    return open_case(NOMINAL, (recorded(law, seed),), None, None, lambda text: None)
+    return open_case(NOMINAL, (recorded(law, seed),), None, None, lambda text: None, DEFAULTS)
 
 
 @functools.cache
@@ -125,8 +126,8 @@ def test_a_force_that_acts_once_is_found_when_it_acts() -> None:
     assert force.resolved and force.unit == "rad/s^2" and 0.9 < force.left < 1.1
     assert np.max(force.values) == pytest.approx(2.0, abs=0.5)
     answer = Answer("unnamed", (), ())
-    assert locate(case.base, case.base, answer, case.sites[0], None, force, 0.01).time == (window,)
-    coarse = locate(case.base, case.base, answer, case.sites[0], None, None, 0.01).time
+    assert locate(case.base, case.base, answer, case.sites[0], None, force).time == (window,)
+    coarse = locate(case.base, case.base, answer, case.sites[0], None, None).time
     assert sum(b - a for a, b in coarse) > 2 * (window[1] - window[0])
 
 

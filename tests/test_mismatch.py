@@ -26,6 +26,7 @@ from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.fitting.hypothesis import extended
 from pikanid.mismatch.judge.beginning import own_beginning
+from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Model, systems
 from pikanid.noise.level import NoiseModel
 from pikanid.optimise.levenberg_marquardt import minimise
@@ -37,7 +38,7 @@ SIGMA = 0.002
 
 
 def records_of(recording: Recording) -> Records:
-    return Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "given")},))
+    return Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "given")},), DEFAULTS)
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +120,7 @@ def gaussian_case(seed: int, lift: float = 0.0, spread: float = 0.0) -> float:
     r -= J @ np.linalg.lstsq(J, r, rcond=None)[0]
     u = np.where((t > 1) & (t < 2), 1.0, 0.0)
     return detect(r, J, units, np.zeros(30, bool), frequency_bands(t, 15.0),
-                  past_inputs(t, [(t, u)], 15.0), spread).p_value
+                  past_inputs(t, [(t, u)], 15.0), spread, DEFAULTS).p_value
 
 
 @pytest.mark.slow
@@ -140,7 +141,7 @@ def test_outliers_go_and_a_fast_signal_stays() -> None:
     t = np.arange(1000) * 0.01
     y = 0.2 * np.sin(15 * t) + 0.002 * rng.standard_normal(1000)
     y[[100, 400, 700]] += 0.05
-    clean, count = without_outliers(Recording.from_arrays(t, {"y": y}), "y")
+    clean, count = without_outliers(Recording.from_arrays(t, {"y": y}), "y", DEFAULTS.noise)
     assert count == 3
     assert np.flatnonzero(np.isnan(clean["y"].values)).tolist() == [100, 400, 700]
 
@@ -153,7 +154,7 @@ def test_coloured_noise_is_recognised_without_a_quiet_stretch() -> None:
         e[k] = 0.5 * e[k - 1] + np.sqrt(0.75) * rng.standard_normal()
     e *= SIGMA
     channel = Recording.from_arrays(t, {"y": np.sin(15 * t) + e})["y"]
-    level = refined(NoiseModel(SIGMA, 0.0, 0.1, 0.01, "test"), channel, t, e, 15.0, None)
+    level = refined(NoiseModel(SIGMA, 0.0, 0.1, 0.01, "test"), channel, t, e, 15.0, None, DEFAULTS)
     # from the upper part of the band alone ρ is known to about 0.04 here
     assert level.rho == pytest.approx(0.5, abs=0.12)
     assert level.sigma == pytest.approx(SIGMA, rel=0.1)
@@ -167,7 +168,7 @@ def test_bad_pairs_are_refused(recording: Recording) -> None:
     with pytest.raises(errors.BadRecording, match="lacks"):
         diagnose(systems.sloshing(), recording, recording.without("u_y"))
     with pytest.raises(errors.BadSetting, match="alpha"):
-        diagnose(systems.sloshing(), recording, alpha=0.0)
+        diagnose(systems.sloshing(), recording, settings=Settings(alpha=0.0))
 
 
 def test_a_clean_recording_gets_no_diagnosis(recording: Recording) -> None:
@@ -212,7 +213,7 @@ def test_neighbouring_samples_become_one_without_bias() -> None:
     model = systems.pendulum()
     y = np.sin(8 * t) + 0.01 * rng.standard_normal(13000)
     recording = Recording.from_arrays(t, {"theta": y}, {"theta": "rad"}, sigma={"theta": 0.01})
-    assert oversampling(model, (recording,)) == 3
+    assert oversampling(model, (recording,), DEFAULTS.budget) == 3
     one = averaged(recording["theta"], 5)
     gap = one.values - np.sin(8 * one.time)
     assert one.sigma is not None

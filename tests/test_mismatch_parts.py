@@ -21,6 +21,7 @@ from pikanid.mismatch.detect.residual_tests import frequency_bands
 from pikanid.mismatch.detect.tangent import _middle
 from pikanid.mismatch.fitting.progressive_horizon import lost
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import systems
 from pikanid.noise.level import NoiseModel
 from pikanid.recording.channel import Channel
@@ -39,8 +40,8 @@ def test_bands_share_out_the_lines_of_a_record() -> None:
 
 
 def test_a_fit_is_lost_by_its_chi2_per_row() -> None:
-    assert lost(301.0, 100) and not lost(299.0, 100)
-    assert not lost(301.0, 1000)
+    assert lost(301.0, 100, DEFAULTS) and not lost(299.0, 100, DEFAULTS)
+    assert not lost(301.0, 1000, DEFAULTS)
 
 
 def test_middles_of_cubics_are_exact() -> None:
@@ -74,10 +75,10 @@ def quick(t: np.ndarray, rate: float) -> Recording:
 
 def test_samples_are_put_together_only_where_nothing_moves_between() -> None:
     model, t = systems.sloshing(), np.linspace(0.0, 20.0, 40_001)
-    count = oversampling(model, (quick(t, 0.5),))
+    count = oversampling(model, (quick(t, 0.5),), DEFAULTS.budget)
     assert isinstance(count, int) and count % 2 == 1 and count > 1
-    assert oversampling(model, (quick(t, 30.0),)) == 1
-    assert oversampling(model, (quick(t[::100], 0.5),)) == 1
+    assert oversampling(model, (quick(t, 30.0),), DEFAULTS.budget) == 1
+    assert oversampling(model, (quick(t[::100], 0.5),), DEFAULTS.budget) == 1
     # never so many that a period keeps fewer than thirty
     slow = averaged(quick(t, 0.5)["theta"], count)
     assert np.diff(slow.time).max() < 2.0 / 25
@@ -153,7 +154,7 @@ def test_noise_of_repeats_has_the_level_that_it_was_drawn_with(rho: float) -> No
     white = rng.normal(size=(3, 1200)) * np.sqrt(1 - rho**2)
     residuals = list(lfilter([1.0], [1.0, -rho], white, axis=1)[:, 200:])
     t = np.linspace(0.0, 9.99, 1000)
-    spectra = Spectra.of([t] * 3, residuals, [np.ones((1000, 1))] * 3, 0.01)
+    spectra = Spectra.of([t] * 3, residuals, [np.ones((1000, 1))] * 3, 0.01, DEFAULTS)
     old = NoiseModel(1.0, rho, 0.05, 0.01, "stated")
     found = spectra.level(old)
     assert found.sigma == pytest.approx(1.0, abs=0.12) and found.rho == pytest.approx(rho, abs=0.1)

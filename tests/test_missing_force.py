@@ -7,6 +7,7 @@ import pytest
 
 import pikanid as pk
 from pikanid.mismatch.beyond.force_shape import ForceShape, force_shape
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import Model, Parameter, systems
 from pikanid.recording import excitation
@@ -21,7 +22,8 @@ def recording(truth: Model, seed: int = 3) -> pk.Recording:
 
 
 def shape(truth: Model) -> ForceShape:
-    opened = open_case(systems.sloshing(), (recording(truth),), None, None, lambda text: None)
+    opened = open_case(systems.sloshing(), (recording(truth),), None, None,
+                       lambda text: None, DEFAULTS)
     return force_shape(opened.base, opened.sites[0], opened.candidates)
 
 
@@ -30,7 +32,7 @@ def shape(truth: Model) -> ForceShape:
     pytest.param("-abs(theta_dot)*theta_dot", "theta_dot", marks=pytest.mark.slow)])
 def test_a_static_law_is_found_over_its_own_state(term: str, argument: str) -> None:
     found = shape(systems.sloshing().with_term("theta_dot", term))
-    assert found.depends_on(0.01) == (argument,)
+    assert found.depends_on(DEFAULTS) == (argument,)
     assert [e.argument for e in found.edges] == ["theta", "theta_dot", "u_x"]
 
 
@@ -42,7 +44,7 @@ def test_a_lag_is_not_taken_for_a_static_law() -> None:
 
 def test_nothing_missing_has_no_shape() -> None:
     found = shape(systems.sloshing())
-    assert found.depends_on(0.01) == () and found.static_law
+    assert found.depends_on(DEFAULTS) == () and found.static_law
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.search.neighbours import with_simpler, with_twins, with_wider, without_one
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 
 
@@ -24,7 +25,7 @@ def case() -> Case:
         "theta", function="theta + 0.001")
     train, later = (pk.simulate(truth, pk.excitation.planar_moves(6, 10.0, seed=seed),
                                 sigma=0.002, seed=seed) for seed in (1, 2))
-    return open_case(model, (train,), (later,), None, lambda text: None)
+    return open_case(model, (train,), (later,), None, lambda text: None, DEFAULTS)
 
 
 def hypothesis(case: Case, *keys: str, **start: float) -> Hypothesis:

@@ -12,6 +12,7 @@ import pikanid as pk
 from pikanid.mismatch.data.noise_level import first_level, refined
 from pikanid.mismatch.data.preparation import prepared, set_aside
 from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise import level as noise
 from pikanid.noise.floor import repeated, rounding_noise, rounding_step
 from pikanid.noise.level import NoiseModel
@@ -84,7 +85,7 @@ def test_no_estimate_of_noise_is_below_that_of_rounding() -> None:
     assert first_level(recording, "motor", (0.0, 3.5)).sigma == pytest.approx(floor)
     left = np.where(TIMES < 4, 0.0, floor * np.random.default_rng(0).standard_normal(600))
     level = NoiseModel(floor, 0.0, 0.1, 0.01, "")
-    assert refined(level, channel, TIMES, left, 3.0, None).sigma >= 0.999 * floor
+    assert refined(level, channel, TIMES, left, 3.0, None, DEFAULTS).sigma >= 0.999 * floor
 
 
 def test_a_right_model_of_a_rig_at_rest_explains_it() -> None:
@@ -100,7 +101,7 @@ def test_beginnings_hold_motion_and_so_many_rows() -> None:
 
     def beginning(values: np.ndarray, rows: int) -> Channel:
         recording = pk.Recording.from_arrays(TIMES, {"motor": values})
-        return Records((recording,), (level,)).beginning(rows).recordings[0]["motor"]
+        return Records((recording,), (level,), DEFAULTS).beginning(rows).recordings[0]["motor"]
 
     assert np.ptp(beginning(y, 60).values) > 0
     assert len(beginning(y, 500)) == 500
@@ -111,15 +112,15 @@ def test_beginnings_hold_motion_and_so_many_rows() -> None:
 def test_an_end_at_rest_is_not_set_aside_as_proof() -> None:
     model, notes = motor(), list[str]()
     at_rest, moving = run(0, 0.5, 1.0, 6.0, 0.05), run(0, 1.0, 5.0, 6.0, 0.05)
-    assert set_aside((at_rest,), model, notes) == ((at_rest,), None)
-    kept, end = set_aside((moving,), model, notes)
+    assert set_aside((at_rest,), model, notes, DEFAULTS.noise) == ((at_rest,), None)
+    kept, end = set_aside((moving,), model, notes, DEFAULTS.noise)
     assert end is not None and kept[0].stop < moving.stop
 
 
 def test_equal_samples_in_a_row_are_one_observation() -> None:
     notes: list[str] = []
     recording = run(0, 2.0, 1.0, 6.0)
-    records = prepared(motor(), (recording,), None, notes)
+    records = prepared(motor(), (recording,), None, notes, DEFAULTS)
     kept = np.isfinite(records.recordings[0]["motor"].values)
     assert kept[200:300].sum() > 70 and kept[:195].sum() == 2 and kept[500:].sum() <= 2
     assert any("repeat their neighbours" in note for note in notes)

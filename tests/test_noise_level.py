@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pikanid.mismatch.data.noise_level import _whittle, first_level, refined
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 from pikanid.noise.quiet import without_moves
 from pikanid.recording import Recording
@@ -67,7 +68,7 @@ def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None
     for seed in range(120):
         y = coloured(rho, seed)
         level = refined(replace(WHITE, stretch=(0.0, 2.16)), Channel("y", t, y), t, y, 8.0,
-                        None)
+                        None, DEFAULTS)
         gain = 1 - 2 * level.rho * np.cos(low) + level.rho**2
         powers.append(np.mean(np.log(level.sigma**2 * (1 - level.rho**2) / gain)))
         stated.append(level.spread)
@@ -94,11 +95,11 @@ def test_a_stretch_in_which_a_motion_dies_out_is_no_quiet_one() -> None:
     t, motion = rung(300.0)
     noise = coloured(0.0, 5)
     before = replace(WHITE, stretch=(3.0, 6.0))
-    level = refined(before, Channel("y", t, motion + noise), t, noise, 8.0, None)
+    level = refined(before, Channel("y", t, motion + noise), t, noise, 8.0, None, DEFAULTS)
     assert (level.sigma, level.rho) == (pytest.approx(1.0, abs=0.06), 0.0)
     assert level.source == "the residual at all frequencies"
     # not even before the motion is explained: it is a line among the frequencies
-    left = refined(before, Channel("y", t, motion + noise), t, motion + noise, 8.0, None)
+    left = refined(before, Channel("y", t, motion + noise), t, motion + noise, 8.0, None, DEFAULTS)
     assert (left.sigma, left.rho) == (pytest.approx(1.0, abs=0.15), 0.0)
 
 
@@ -108,7 +109,7 @@ def test_the_shape_of_high_frequencies_does_not_mislead() -> None:
     noise = coloured(0.6, 7)[:501]
     steep = np.fft.irfft(np.fft.rfft(noise) * np.interp(
         np.linspace(0, 1, 251), [0, 0.2, 1], [1.0, 1.0, 0.25]), 501)
-    level = refined(WHITE, Channel("y", t, steep), t, steep, 20.0, None)
+    level = refined(WHITE, Channel("y", t, steep), t, steep, 20.0, None, DEFAULTS)
     power = level.sigma**2 * (1 + level.rho) / (1 - level.rho)
     assert power < 2 * 1.6 / 0.4
 
@@ -120,7 +121,7 @@ def test_an_explanation_tells_the_noise_better_than_high_frequencies_alone(rho: 
     for seed in range(60):
         y = coloured(rho, 1000 + seed)
         levels = [refined(replace(WHITE, stretch=(0.0, 2.16)), Channel("y", t, y), t, y,
-                          8.0, None, explained) for explained in (False, True)]
+                          8.0, None, DEFAULTS, explained) for explained in (False, True)]
         errors.append([np.mean(np.log(level.sigma**2 * (1 - level.rho**2) / (
             1 - 2 * level.rho * np.cos(low) + level.rho**2))) - true for level in levels])
     before, after = np.std(errors, axis=0)  # of 60 they are known to 9 %
@@ -135,7 +136,7 @@ def test_a_short_recording_without_a_quiet_stretch_states_its_doubt(rho: float) 
     true = (1 - rho**2) * np.mean(1 / (1 - 2 * rho * np.cos(low) + rho**2))
     for seed in range(150):
         y = coloured(rho, 3000 + seed)[:501]
-        level = refined(WHITE, Channel("y", t, y), t, y, 14.4, None)
+        level = refined(WHITE, Channel("y", t, y), t, y, 14.4, None, DEFAULTS)
         power = level.sigma**2 * (1 - level.rho**2) * np.mean(
             1 / (1 - 2 * level.rho * np.cos(low) + level.rho**2))
         scores.append(np.log(power / true) / level.spread)
@@ -151,7 +152,7 @@ def test_what_explains_all_tells_a_colour_that_high_frequencies_hide() -> None:
     for seed in range(60):
         y = coloured(0.65, 5000 + seed)[:501]
         before, after = (refined(WHITE, Channel("y", t, y), t, y, 14.4,
-                                 None, explained) for explained in (False, True))
+                                 None, DEFAULTS, explained) for explained in (False, True))
         found.append((before.rho, after.rho))
     rho = np.array(found)
     assert np.min(rho[:, 0]) < 0.35  # it does mislead
@@ -162,7 +163,7 @@ def test_no_explanation_makes_sure_noise_louder() -> None:
     """White noise, and a slow misfit of the same power that is said to be none."""
     t = np.arange(2001) * 0.01
     y = coloured(0.0, 11) + np.sin(2 * t) + np.sin(3.1 * t) + np.sin(4.3 * t)
-    level = refined(WHITE, Channel("y", t, y), t, y, 8.0, None, True)
+    level = refined(WHITE, Channel("y", t, y), t, y, 8.0, None, DEFAULTS, True)
     assert (level.sigma, level.rho) == (pytest.approx(1.0, abs=0.05), 0.0)
 
 
@@ -183,12 +184,12 @@ def test_whitening_is_the_inverse_covariance_over_gaps_too(rho: float) -> None:
 def test_a_sigma_that_is_given_stays_and_its_colour_is_read(rho: float) -> None:
     t = np.arange(2001) * 0.01
     level = NoiseModel(1.0, 0.0, 0.0, 0.01, "given")
-    found = refined(level, Channel("y", t, t), t, coloured(rho, 1), 5.0, None)
+    found = refined(level, Channel("y", t, t), t, coloured(rho, 1), 5.0, None, DEFAULTS)
     assert (found.sigma, found.source) == (1.0, "given")
     assert found.rho == pytest.approx(rho, abs=0.15)
     for given in (0.9, 1.0, 1.1):
-        assert _whittle(spectra_of(rho), given)[0] == pytest.approx(given)
-    free, alone, _ = _whittle(spectra_of(rho), None)
+        assert _whittle(spectra_of(rho), given, DEFAULTS.noise)[0] == pytest.approx(given)
+    free, alone, _ = _whittle(spectra_of(rho), None, DEFAULTS.noise)
     assert free == pytest.approx(1.0, rel=0.1) and alone == pytest.approx(rho, abs=0.1)
 
 
@@ -201,7 +202,7 @@ def spectra_of(rho: float) -> list[tuple[np.ndarray, np.ndarray, float]]:
 def test_the_standard_error_of_a_power_is_one_over_the_root_of_its_ordinates() -> None:
     """And σ² of white noise is the mean of the ordinates, up to those that are no noise."""
     spectra = spectra_of(0.0)
-    sigma, rho, spread = _whittle(spectra, None)
+    sigma, rho, spread = _whittle(spectra, None, DEFAULTS.noise)
     assert rho == 0.0 and sigma == pytest.approx(np.sqrt(np.mean(spectra[0][1])), rel=0.01)
     assert 1 / np.sqrt(999) <= spread < 4 / np.sqrt(999)
 

@@ -11,7 +11,7 @@ from odd_recordings import odd
 import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.data.preparation import EXACT, FREEDOM, MOST, beginnings, loud_enough
+from pikanid.mismatch.data.preparation import EXACT, beginnings, loud_enough
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import condensed, lines, residual_tests
 from pikanid.mismatch.detect.residual_tests import project
@@ -19,6 +19,7 @@ from pikanid.mismatch.detect.tangent import CELLS, Tangent, directions
 from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.search.screen import best_level
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.recording import Recording
 from pikanid.reporting import strict_json
@@ -38,7 +39,7 @@ def swing(seed: int = 1, seconds: float = 4.0, sigma: float = 0.002, k3: float =
 
 def opened(train: Recording, later: Recording | None = None) -> Case:
     return open_case(pk.systems.sloshing(), (train,), None if later is None else (later,), None,
-                   lambda text: None)
+                   lambda text: None, DEFAULTS)
 
 
 def told(train: Recording, later: Recording | None) -> Diagnosis | None:
@@ -65,7 +66,8 @@ def test_an_odd_recording_is_diagnosed_or_refused(seed: int) -> None:
 def test_a_diagnosis_says_how_many_samples_it_needs() -> None:
     whole = swing()
     for count in (2, 8, 21):
-        with pytest.raises(errors.BadRecording, match=f"{count} usable.*at least {2 + FREEDOM}"):
+        needed = 2 + DEFAULTS.noise.freedom
+        with pytest.raises(errors.BadRecording, match=f"{count} usable.*at least {needed}"):
             diagnose(pk.systems.sloshing(), whole.window(1.0, 1.0 + 0.01 * count - 0.005))
 
 
@@ -105,24 +107,25 @@ def test_levels_that_cannot_be_simulated_are_no_start() -> None:
 
 def test_a_page_without_edges_is_drawn() -> None:
     """As that of the shortest recording there may be."""
-    dx = told(swing().window(1.0, 1.0 + 0.01 * (2 + FREEDOM) - 0.005), None)
+    dx = told(swing().window(1.0, 1.0 + 0.01 * (2 + DEFAULTS.noise.freedom) - 0.005), None)
     assert dx is not None and dx.shape is not None
     bare = replace(dx, shape=replace(dx.shape, edges=()), patch=None)
     assert len(bare.plot().axes) == len(replace(dx, shape=None, patch=None).plot().axes)
 
 
 def test_long_recordings_are_cut_and_that_is_said() -> None:
-    t = np.arange(8 * MOST) * 0.01
+    t = np.arange(8 * DEFAULTS.budget.samples) * 0.01
     y = np.random.default_rng(0).standard_normal(len(t))
     long = Recording.from_arrays(t, {"theta": y, "u_x": y}, units={"theta": "rad", "u_x": "m/s^2"})
     notes: list[str] = []
-    (cut,) = beginnings(pk.systems.sloshing(), (long,), "the recording", notes)
-    assert len(cut["theta"].time) == pytest.approx(MOST, abs=2) and cut.start == long.start
+    (cut,) = beginnings(pk.systems.sloshing(), (long,), "the recording", notes, DEFAULTS.budget)
+    assert len(cut["theta"].time) == pytest.approx(DEFAULTS.budget.samples, abs=2)
+    assert cut.start == long.start
     assert "12 %" in notes[0] and str(len(t)) in notes[0]
     # two of them share what can be diagnosed; what is short stays as it is
-    both = beginnings(pk.systems.sloshing(), (long, long), "the recording", [])
-    assert sum(len(r["theta"].time) for r in both) == pytest.approx(MOST, abs=4)
-    assert beginnings(pk.systems.sloshing(), (cut,), "the recording", []) == (cut,)
+    both = beginnings(pk.systems.sloshing(), (long, long), "the recording", [], DEFAULTS.budget)
+    assert sum(len(r["theta"].time) for r in both) == pytest.approx(DEFAULTS.budget.samples, abs=4)
+    assert beginnings(pk.systems.sloshing(), (cut,), "the recording", [], DEFAULTS.budget) == (cut,)
 
 
 def test_few_signs_are_followed_at_once_along_a_long_recording(

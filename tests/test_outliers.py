@@ -13,6 +13,7 @@ from pikanid.mismatch.data.noise_level import bridged, refined
 from pikanid.mismatch.data.outliers import lone, without_lone, without_outliers
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 
 SIGMA = 0.002
@@ -25,17 +26,17 @@ def noise(n: int, rho: float = 0.0, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
 def test_hardly_any_noise_is_alone(rho: float) -> None:
-    assert lone(noise(100_000, rho)).mean() < 1e-3
+    assert lone(noise(100_000, rho), DEFAULTS.noise).mean() < 1e-3
 
 
 def test_gross_errors_are_found_where_the_residual_bends() -> None:
     """Misfits bend where an input switches or a sensor clips; errors of 6 σ are no such thing."""
     n = np.arange(2000)
     bent = 40 * np.abs((n % 100) / 50 - 1) + noise(2000)
-    assert lone(bent).mean() < 2e-3
+    assert lone(bent, DEFAULTS.noise).mean() < 2e-3
     hit = np.arange(37, 2000, 111)
     bent[hit] += 8.0 * np.where(hit % 2, 1, -1)
-    found = lone(bent)
+    found = lone(bent, DEFAULTS.noise)
     assert found[hit].mean() > 0.9
     assert found.sum() <= len(hit) + 2
 
@@ -43,8 +44,8 @@ def test_gross_errors_are_found_where_the_residual_bends() -> None:
 def test_what_is_everywhere_is_no_outlier() -> None:
     r = noise(500)
     r[::5] += 30.0
-    assert not lone(r).any()
-    assert not lone(np.zeros(10)).any()
+    assert not lone(r, DEFAULTS.noise).any()
+    assert not lone(np.zeros(10), DEFAULTS.noise).any()
 
 
 def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
@@ -54,10 +55,10 @@ def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
     hit = np.arange(20, 1000, 50)
     y[hit] += 6 * SIGMA
     whole = Recording.from_arrays(t, {"y": y}, {"y": "rad"})
-    before, _ = without_outliers(whole, "y")
+    before, _ = without_outliers(whole, "y", DEFAULTS.noise)
     seen = np.isfinite(before["y"].values)
     residual = (0, "y", t[seen], (y - motion)[seen])
-    records, count = without_lone(Records((before,), ({},)), [residual])
+    records, count = without_lone(Records((before,), ({},), DEFAULTS), [residual])
     left = np.flatnonzero(~np.isfinite(records.recordings[0]["y"].values))
     assert count == (~np.isin(hit, np.flatnonzero(~seen))).sum() - np.isfinite(
         records.recordings[0]["y"].values[hit]).sum()
@@ -91,7 +92,7 @@ def test_dropouts_do_not_lower_the_noise() -> None:
         channel = Recording.from_arrays(t, {"y": np.where(kept, 0.2 * np.sin(14 * t) + e, np.nan)},
                                         {"y": "rad"})["y"]
         level = refined(NoiseModel(SIGMA, 0.0, 0.1, 0.01, "the start"), channel, t[kept],
-                        e[kept], 14.0, None)
+                        e[kept], 14.0, None, DEFAULTS)
         found.append(level.sigma)
     assert np.mean(found) == pytest.approx(SIGMA, rel=0.02)
 
@@ -112,7 +113,7 @@ def test_friction_is_found_beyond_the_hills_between() -> None:
         sign = 1 if half % 2 == 0 else -1
         y[k] = sign * rest + a * np.cos(w * time) if a > 0 else y[k - 1]
     records = Records((Recording.from_arrays(t, {"q": y + SIGMA * noise(300)}),),
-                      ({"q": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "given")},))
+                      ({"q": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "given")},), DEFAULTS)
     entry = coulomb_friction(sites(model, records.recordings)[0])[0]
     size = entry.parameters[0].name
     for start in (2.0, 4.5, 14.0):
@@ -127,7 +128,7 @@ def test_two_neighbours_do_not_hide_each_other() -> None:
     residual = SIGMA * noise(500, seed=2)
     residual[[219, 220]] += np.array([12.0, 15.0]) * SIGMA
     whole = Recording.from_arrays(t, {"y": residual})
-    records, count = without_lone(Records((whole,), ({},)), [(0, "y", t, residual)])
+    records, count = without_lone(Records((whole,), ({},), DEFAULTS), [(0, "y", t, residual)])
     gone = np.flatnonzero(np.isnan(records.recordings[0]["y"].values))
     assert {219, 220} <= set(gone.tolist()) and count == len(gone) <= 3
 
@@ -141,7 +142,7 @@ def test_a_clipped_peak_is_no_run_of_outliers() -> None:
     alone = np.array([200, 700, 701, 1500])
     r[alone] += SIGMA * np.array([30.0, 30.0, -40.0, 25.0])
     recording = Recording.from_arrays(t, {"y": r}, {"y": "rad"})
-    records = Records((recording,), ({"y": NoiseModel(SIGMA, 0.4, 0.0, 0.01, "")},))
+    records = Records((recording,), ({"y": NoiseModel(SIGMA, 0.4, 0.0, 0.01, "")},), DEFAULTS)
     kept, count = without_lone(records, [(0, "y", t, r)])
     gone = np.flatnonzero(np.isnan(kept.recordings[0]["y"].values))
     assert set(alone) <= set(gone) and not set(hump) & set(gone)

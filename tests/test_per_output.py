@@ -16,6 +16,7 @@ from pikanid.mismatch.fitting.hypothesis import fitted
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.report.findings import OutputError, Proof
 from pikanid.mismatch.report.locate import affected, loud_windows
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model.parts import Output
 from pikanid.noise.level import NoiseModel
 from pikanid.reporting import strict_json
@@ -60,7 +61,7 @@ def predicted(unit: str) -> HeldOut:
         seen = moved(seed)
         swing = replace(seen["swing"], values=times * factor * seen["swing"].values, unit=unit,
                         sigma=factor * SIGMA["swing"])
-        return Records((seen.with_channels(swing),), (levels,))
+        return Records((seen.with_channels(swing),), (levels,), DEFAULTS)
 
     base = fitted(swinging(unit), (), records(0), [{}], 1)
     assert base is not None
@@ -86,9 +87,9 @@ def test_a_proof_is_told_output_by_output() -> None:
     proof = Proof({"theta": OutputError(0.01, 0.002, 0.002, 0.002, "rad"),
                    "swing": OutputError(4.0, 0.31, 0.3, 0.3, "mm")}, 0.4,
                   *(np.zeros(3),) * 5)
-    assert not proof.sensitive
+    assert not proof.sensitive(DEFAULTS)
     assert Proof({**proof.outputs, "swing": OutputError(4.0, 1.0, 0.3, 0.3, "mm")}, 0.4,
-                 *(np.zeros(3),) * 5).sensitive
+                 *(np.zeros(3),) * 5).sensitive(DEFAULTS)
     content = proof.to_dict()
     assert content["rmse_after"] == 0.002 and content["unit"] == "rad"
     assert content["outputs"]["swing"] == {
@@ -104,7 +105,7 @@ def test_what_is_missing_in_the_second_coordinate_is_found_there() -> None:
     levels = {o: NoiseModel(s, 0.0, 0.0, 0.01, "given") for o, s in SIGMA.items()}
     # one parameter for each, so that the first coordinate keeps what it needs
     base = fitted(swinging().fix("l_theta", "d_theta").free("m"), (),
-                  Records((recording,), (levels,)), [{}], 1)
+                  Records((recording,), (levels,), DEFAULTS), [{}], 1)
     assert base is not None
     found = sites(base.model, (recording,))
     assert [s.q for s in found] == ["theta", "phi"]

@@ -13,6 +13,7 @@ from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.hypothesis import extended, fitted
 from pikanid.mismatch.judge.prediction import _from_levels, held_out
 from pikanid.mismatch.judge.prior import Prior, room
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.optimise.levenberg_marquardt import minimise
 
@@ -52,7 +53,7 @@ def opened(size: float) -> Case:
     truth = model.with_term("theta_dot", "-k3*theta**3", [pk.Parameter("k3", size)])
     train, later = (pk.simulate(truth, pk.excitation.planar_moves(6, 10.0, seed=seed),
                                 sigma=0.002, seed=seed) for seed in (1, 2))
-    return open_case(model, (train,), (later,), None, lambda text: None)
+    return open_case(model, (train,), (later,), None, lambda text: None, DEFAULTS)
 
 
 def test_what_is_weak_in_each_recording_adds_up() -> None:
@@ -73,7 +74,7 @@ def test_a_wall_that_a_fit_to_all_recordings_has_lost_is_found_again() -> None:
         driven = pk.Recording.from_arrays(t, {"u_x": u}, {"u_x": "m/s^2"})
         return pk.simulate(truth, driven, sigma=0.0005, seed=int(100 * size))
 
-    case = open_case(model, (pushed(2.0), pushed(1.9)), None, None, lambda text: None)
+    case = open_case(model, (pushed(2.0), pushed(1.9)), None, None, lambda text: None, DEFAULTS)
     wall = next(c for c in case.candidates if c.key == "wall_impact")
     whitened = Whitened(extended(case.model, [wall]), case.records)
     far = np.array([{"wall": 0.4, "k_wall": 30.0}.get(f.name, f.guess)
@@ -123,7 +124,8 @@ def test_a_wall_that_was_hardly_touched_predicts_a_hard_hit(depth: float, seed: 
     truth = pk.systems.sloshing().with_term("theta_dot", f"-6000*max(theta - {depth * top}, 0)")
     seen = [pk.simulate(truth, r, sigma=0.0017, seed=seed + k)
             for k, r in enumerate((train, later))]
-    case = open_case(pk.systems.sloshing(), (seen[0],), (seen[1],), None, lambda text: None)
+    case = open_case(pk.systems.sloshing(), (seen[0],), (seen[1],), None,
+                     lambda text: None, DEFAULTS)
     wall = next(c for c in case.candidates if c.key == "wall_impact")
     begin = {"wall": 0.95 * depth * top, "k_wall": 60.0, "l_theta": 0.045, "d_theta": 0.15}
     found = fitted(case.model, [wall], case.records, [begin], 30)

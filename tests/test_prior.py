@@ -8,6 +8,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.prior import elsewhere, of_fit
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 
 
@@ -17,7 +18,7 @@ def fit() -> Hypothesis:
     model = pk.systems.sloshing().with_initial(theta="free", theta_dot="free")
     recs = [pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=0.002, seed=seed)
             for seed in (0, 1)]
-    return open_case(model, (recs[0],), (recs[1],), None, lambda text: None).base
+    return open_case(model, (recs[0],), (recs[1],), None, lambda text: None, DEFAULTS).base
 
 
 def test_the_others_follow_so_that_chi_squared_stays_least(fit: Hypothesis) -> None:

@@ -11,6 +11,7 @@ from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.hypothesis import extended
 from pikanid.mismatch.fitting.progressive_horizon import progressive_horizon, rough
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 from pikanid.optimise.levenberg_marquardt import minimise
 
@@ -24,7 +25,7 @@ def opened(seed: int, wall: float) -> tuple[Whitened, np.ndarray]:
     truth = model.with_term("theta_dot", "-20000*max(theta - 0.1, 0)")
     driven = pk.excitation.multisine(np.arange(1.0, 4.0, 0.17), 20.0, seed=seed)
     recording = pk.simulate(truth, driven, sigma=SIGMA, seed=seed)
-    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},))
+    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},), DEFAULTS)
     effect = wall_impact(sites(model, records.recordings)[0])[0]
     whitened = Whitened(extended(model, [effect]), records)
     problem = whitened.problem
@@ -58,7 +59,7 @@ def test_a_wall_is_found_where_the_motion_begins_late_and_gently() -> None:
     u = np.interp(t, driven["u_x"].time, driven["u_x"].values) * np.clip((t - 2) / 6, 0, 1)
     recording = pk.simulate(truth, pk.Recording.from_arrays(t, {"u_x": u}, {"u_x": "m/s^2"}),
                             sigma=SIGMA, seed=4)
-    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},))
+    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},), DEFAULTS)
     effect = wall_impact(sites(model, records.recordings)[0])[0]
     whitened = Whitened(extended(model, [effect]), records)
     # as the nominal model's fit, misled by the impacts, may have left it
@@ -89,5 +90,5 @@ def test_only_laws_with_hills_are_rough() -> None:
     model = pk.systems.sloshing()
     recording = pk.simulate(model, pk.excitation.two_pulse(), sigma=SIGMA, seed=0)
     wall = wall_impact(sites(model, (recording,))[0])
-    assert rough(1300.0, 1000, wall) and not rough(1100.0, 1000, wall)
-    assert not rough(1e9, 1000, [])
+    assert rough(1300.0, 1000, wall, DEFAULTS) and not rough(1100.0, 1000, wall, DEFAULTS)
+    assert not rough(1e9, 1000, [], DEFAULTS)

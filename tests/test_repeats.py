@@ -9,6 +9,7 @@ from scipy.stats import binom
 
 import pikanid as pk
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside, same_experiment
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 
 T = np.arange(60) / 15
@@ -35,7 +36,7 @@ def slow(seed: int, count: int, kind: str, n: int = len(T)) -> np.ndarray:
 
 def spectra(residuals: np.ndarray) -> Spectra:
     rest = residuals - (START @ np.linalg.lstsq(START, residuals.T)[0]).T
-    return Spectra.of([T] * len(rest), list(rest), [START] * len(rest), float(T[1]))
+    return Spectra.of([T] * len(rest), list(rest), [START] * len(rest), float(T[1]), DEFAULTS)
 
 
 @pytest.mark.parametrize("repeated", [2, 3])
@@ -84,9 +85,9 @@ def test_another_motion_is_no_repeat() -> None:
         return pk.Recording.from_arrays(t, {"theta": start * np.exp(-0.05 * t) * np.cos(6 * t)
                                             + noise}, {"theta": "rad"})
 
-    assert same_experiment(model, [swing(0.5, 0), swing(0.52, 1)])
-    assert not same_experiment(model, [swing(0.5, 0), swing(0.2, 1)])
-    assert not same_experiment(model, [swing(0.5, 0), swing(0.5, 1, 5.0)])
+    assert same_experiment(model, [swing(0.5, 0), swing(0.52, 1)], DEFAULTS.noise)
+    assert not same_experiment(model, [swing(0.5, 0), swing(0.2, 1)], DEFAULTS.noise)
+    assert not same_experiment(model, [swing(0.5, 0), swing(0.5, 1, 5.0)], DEFAULTS.noise)
 
 
 def drop(drag: float, seed: int, level: float = 0.03) -> pk.Recording:

@@ -9,8 +9,6 @@ from scipy.stats import binom, chi2, norm
 from pikanid.mismatch.detect.residual_tests import (
     BATCH,
     CLEAR,
-    DRAWS,
-    SHARES,
     Detection,
     detect,
     frequency_bands,
@@ -18,6 +16,7 @@ from pikanid.mismatch.detect.residual_tests import (
     project,
     unit_columns,
 )
+from pikanid.mismatch.settings.settings import DEFAULTS
 
 N = 200
 # orthonormal: a Jacobian, two signs, a narrow and a wide band, inputs
@@ -29,14 +28,14 @@ NOTHING = np.empty((N, 0))
 def judged(r: np.ndarray, one_sided: tuple[bool, ...] = (True, True), signs: np.ndarray = SIGNS,
            bands: list[np.ndarray] | None = None, spread: float = 0.0) -> Detection:
     lines = [NARROW, WIDE] if bands is None else bands
-    return detect(r, J, signs, np.array(one_sided, bool), lines, INPUTS, spread)
+    return detect(r, J, signs, np.array(one_sided, bool), lines, INPUTS, spread, DEFAULTS)
 
 
 def near(p: float, share: float) -> object:
     """A p-value within four standard errors; where it is clearly no alarm one batch of draws is
     enough.
     """
-    draws = DRAWS if p / share < 0.8 * CLEAR[1] else BATCH
+    draws = DEFAULTS.budget.draws if p / share < 0.8 * CLEAR[1] else BATCH
     return pytest.approx(p, abs=4 * np.sqrt(p * (1 - p) / draws) + 1 / draws)
 
 
@@ -90,8 +89,8 @@ def test_what_the_parameters_take_up_tells_nothing() -> None:
 
 def test_each_kind_of_test_has_its_share() -> None:
     found = judged(np.sqrt(18.0) * INPUTS[:, 0])
-    each = zip((found.catalogue, found.bands, found.inputs), SHARES, strict=True)
-    assert sum(SHARES) == pytest.approx(1.0)
+    each = zip((found.catalogue, found.bands, found.inputs), DEFAULTS.kinds, strict=True)
+    assert sum(DEFAULTS.kinds) == pytest.approx(1.0)
     assert found.p_value == min(1.0, *(p / share for p, share in each)) == found.inputs / 0.2
 
 

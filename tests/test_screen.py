@@ -12,11 +12,12 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.hypothesis import extended
 from pikanid.mismatch.search.screen import Screen, best_level, entry, law
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 
 
 def opened(train: pk.Recording, later: pk.Recording) -> Case:
-    return open_case(pk.systems.sloshing(), (train,), (later,), None, lambda text: None)
+    return open_case(pk.systems.sloshing(), (train,), (later,), None, lambda text: None, DEFAULTS)
 
 
 @pytest.fixture(scope="module")

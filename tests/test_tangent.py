@@ -9,6 +9,7 @@ from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.tangent import Directions, directions
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 
 MODEL = pk.systems.sloshing()
@@ -19,7 +20,7 @@ LEVEL = {"theta": NoiseModel(0.002, 0.0, 0.0, 0.01, "")}
 
 
 def found(*recordings: pk.Recording) -> Directions:
-    whitened = Whitened(MODEL, Records(recordings, tuple(LEVEL for _ in recordings)))
+    whitened = Whitened(MODEL, Records(recordings, tuple(LEVEL for _ in recordings), DEFAULTS))
     assert whitened.choose_steps(THETA)
     return directions(whitened, THETA, LISTED)
 

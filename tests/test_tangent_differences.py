@@ -17,6 +17,7 @@ from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.design.response import Watched
 from pikanid.mismatch.detect.tangent import directions
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model.parts import Output
 from pikanid.noise.level import NoiseModel
 from pikanid.objective.shooting import Shooting
@@ -89,7 +90,7 @@ class Rig:
         self.records = Records((self.recording,), ({
             o.name: NoiseModel(
                 1e-3 * float(np.ptp(self.recording[o.name].values)), 0.0, 0.0, STEP, "")
-            for o in model.outputs},))
+            for o in model.outputs},), DEFAULTS)
         self.sites = sites(model, (self.recording,))
         self.at = Whitened(model, self.records)
         assert self.at.choose_steps(self.at.problem.guess)

@@ -13,9 +13,10 @@ from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import POWER, least_proof
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.verdict import Answer, criterion, settle, with_formulas
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.settings.thresholds import least_proof
 from pikanid.model.parts import Parameter
 from pikanid.model.systems import sloshing
 from pikanid.optimise.levenberg_marquardt import Minimum
@@ -61,7 +62,8 @@ def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothe
     count = 2 + len(effects)
     r = np.full(ROWS, np.sqrt(chi2 / ROWS))
     whitened = cast(Whitened, SimpleNamespace(rows=ROWS, problem=SimpleNamespace(free=()),
-                                              records=SimpleNamespace(spread=spread)))
+                                              records=SimpleNamespace(spread=spread),
+                                              settings=DEFAULTS))
     return Hypothesis(tuple(effects), sloshing(), whitened,
                       Minimum(np.zeros(count), r, np.zeros((ROWS, count)), True),
                       14.0 * len(effects))
@@ -96,8 +98,9 @@ def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
 
     ranked = sorted(fits, key=lambda h: h.score())
-    answer = settle([h for h in ranked if not h.symbolic], 1.0, adequate, predicted, True, True)
-    return with_formulas(answer, ranked, 1.0, adequate, predicted, True, True) if (
+    answer = settle([h for h in ranked if not h.symbolic], 1.0, adequate, predicted, True, True,
+                    DEFAULTS)
+    return with_formulas(answer, ranked, 1.0, adequate, predicted, True, True, DEFAULTS) if (
         answer.verdict == "unnamed") else answer
 
 
@@ -210,14 +213,15 @@ def test_what_happened_once_is_proved_by_a_motion_without_it() -> None:
 
 
 def test_what_proves_an_effect_grows_with_the_certainty_that_is_asked() -> None:
-    assert least_proof(0.01) == pytest.approx(13.02, abs=0.01)
-    asked = [least_proof(alpha) for alpha in (0.999, 0.5, 0.05, 0.01, 1e-9, 1e-300)]
+    assert least_proof(0.01, DEFAULTS.power) == pytest.approx(13.02, abs=0.01)
+    asked = [least_proof(alpha, DEFAULTS.power)
+             for alpha in (0.999, 0.5, 0.05, 0.01, 1e-9, 1e-300)]
     assert asked == sorted(asked) and asked[0] == 0.0 and np.isfinite(asked[-1])
     # two predictions that far apart: right at the level α, and wrong in one case of ten
     rng = np.random.default_rng(8)
-    apart = np.sqrt(least_proof(0.01))
+    apart = np.sqrt(least_proof(0.01, DEFAULTS.power))
     refused = rng.standard_normal(100_000) + apart > 2.3263
-    assert np.mean(refused) == pytest.approx(POWER, abs=0.005)
+    assert np.mean(refused) == pytest.approx(DEFAULTS.power, abs=0.005)
 
 
 @pytest.mark.parametrize("rounding", [e for e in ERRORS if "above" not in e], indirect=True)
@@ -239,7 +243,8 @@ def test_exact_ties_fall_the_same_way_whatever_the_rounding() -> None:
 def test_the_most_probable_explanation_comes_first() -> None:
     """Also where it is a law outside the catalogue, or a part of what is missing."""
     given = answered([BASE, hypothesis(1000.0, A), hypothesis(985.0, GUARD)], {"a": -12.0})
-    found = [criterion(h, None, 1.0) + {"a": -12.0}.get("+".join(h.key), 0.0) for h in given.given]
+    found = [criterion(h, None, 1.0, DEFAULTS.verdict)
+             + {"a": -12.0}.get("+".join(h.key), 0.0) for h in given.given]
     assert len(found) == 2 and found == sorted(found)
     part = answered([BASE, hypothesis(1000.0, A), hypothesis(1001.0, B)], refused=("a", "b"),
                     misfit={"a": 0.22, "b": 0.21})

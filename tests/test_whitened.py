@@ -15,6 +15,7 @@ from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.search.screen import Screen
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model
 from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
@@ -43,7 +44,7 @@ def recorded(seed: int, start: float = 0.0, length: float = 0.045, drag: float =
 
 
 def records(*recordings: Recording) -> Records:
-    return Records(recordings, tuple({"theta": LEVEL} for _ in recordings))
+    return Records(recordings, tuple({"theta": LEVEL} for _ in recordings), DEFAULTS)
 
 
 def white(r: np.ndarray) -> np.ndarray:

@@ -51,7 +51,11 @@ def diagnose(
     sigma: Sigma = [],  # noqa: B006
     quiet_until: Annotated[str | None, typer.Option(
         metavar="TIME", help="nothing moves before, as 2s")] = None,
-    alpha: Annotated[float, typer.Option(help="rate of false alarms")] = 0.01,
+    settings: Annotated[str | None, typer.Option(
+        metavar="FILE.toml", show_default=False,
+        help="error rates, thresholds, budgets: fields of pikanid.Settings")] = None,
+    alpha: Annotated[float | None, typer.Option(
+        help="rate of false alarms, 0.01 by default", show_default=False)] = None,
     set_: Values = [],  # noqa: B006
     column: Columns = [],  # noqa: B006
     unit: Units = [],  # noqa: B006
@@ -63,11 +67,15 @@ def diagnose(
 ) -> int:
     """Find out which physics a model leaves out, and prove it on another recording."""
     check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),
-                   "--report": (report, [".html"])}, [*train, *held_out, model])
+                   "--report": (report, [".html"])}, 
+                  [*train, *held_out, model, *([settings] if settings else [])])
     from pikanid.mismatch.diagnose import diagnose as run
+    from pikanid.mismatch.settings.settings import Settings
     from pikanid.model import systems
     from pikanid.reporting.console import working
 
+    taken = Settings() if settings is None else Settings.read(settings)
+    taken = taken if alpha is None else taken.with_values({"alpha": alpha})
     chosen = adjusted(systems.find(model), set_)
     columns, units = assignments("--column", column, "theta=angle"), assignments(
         "--unit", unit, "theta=deg")
@@ -83,7 +91,7 @@ def diagnose(
         stretch = (start, start + quantity(quiet_until, "s", "--quiet-until"))
     with working("diagnosing", 8, quiet) as step:
         dx = run(chosen, records, others or None,
-                 alpha=alpha, quiet=stretch, tell=step, workers=workers)
+                 settings=taken, quiet=stretch, tell=step, workers=workers)
     _write(dx, train[0], json_, report)
     if not quiet and json_ != "-":
         print(dx)

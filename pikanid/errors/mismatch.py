@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pikanid.errors.wording import listed, short
+from pikanid.errors.wording import did_you_mean, listed, short
 
 
 def rounded_repeats(where: str, name: str, count: int) -> str:
@@ -93,3 +93,14 @@ def held_out_same(train: str, name: str) -> str:
         f"'{short(name)}' holds the same data as '{short(train)}': nothing can be proved on what "
         "was fitted; give another recording."
     )
+
+
+def unknown_setting(name: str, close: Sequence[str]) -> str:
+    return (
+        f"There is no setting '{name}'.{did_you_mean(close)} pikanid.Settings describes all of "
+        "them."
+    )
+
+
+def settings_unreadable(path: str, detail: str) -> str:
+    return f"The settings '{path}' cannot be read: {detail}."

@@ -21,16 +21,10 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.parallel import side_by_side
 from pikanid.mismatch.fitting.repeats import Repeats
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
-from pikanid.mismatch.judge.verdict import ADEQUATE, WORTH
 from pikanid.mismatch.search.search import Search
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.optimise.levenberg_marquardt import minimise
-
-SEARCHED = 6000  # rows that a search is made on before its best hypotheses get all
-EXPLAINED = 0.05  # p-value above which a search need not go on
-AGAIN = 5  # iterations of a fit where nothing but the noise is another
-SAME, SAME_RHO = 0.05, 0.06  # changes of a noise level, and its correlation, that make none
-BETTER = 0.9  # ratio of held-out misfits that makes one more effect worth while
 
 
 @dataclass
@@ -53,13 +47,18 @@ class Case:
     excuse: str = ""  # why held-out recordings that were given prove nothing
 
     @property
+    def settings(self) -> Settings:
+        """By which it is diagnosed."""
+        return self.records.settings
+
+    @property
     def rate(self) -> float:
         """Natural frequency of the first coordinate [rad/s]."""
         return self.sites[0].rate
 
     def begin_search(self) -> Search:
         """A search on as much of the recordings as can be searched in a minute."""
-        short = self.records.beginning(SEARCHED)
+        short = self.records.beginning(self.settings.budget.rows_searched)
         return self.search if short is self.records else self.resumed(self.search, short)
 
     def resumed(self, search: Search, records: Records | None = None) -> Search:
@@ -87,9 +86,9 @@ class Case:
         if not explained:
             # high frequencies tell little of the colour of noise: it may be all that is left
             other, _ = with_refined_noise(self.records, fit, rate, quiet, True)
-            if not _same(other, new) and self._clears(best, other):
+            if not self._same(other, new) and self._clears(best, other):
                 new = other
-        if _same(self.records, new) and not count:
+        if self._same(self.records, new) and not count:
             return False
         self.records = new
         self.resumed(self.search)
@@ -103,10 +102,11 @@ class Case:
         problem = whitened.problem
         if not whitened.choose_steps(h.minimum.theta):
             return False
-        found = minimise(whitened.residual, h.minimum.theta, problem.lower, problem.upper, AGAIN)
+        found = minimise(whitened.residual, h.minimum.theta, problem.lower, problem.upper,
+                         self.settings.budget.noise_refit)
         return found is not None and residual_tests(
             whitened, found.theta, found.r, found.J, self.candidates, self.rate
-        ).p_value > ADEQUATE
+        ).p_value > self.settings.adequate
 
     def clear_later(self, best: Hypothesis) -> None:
         """Leave the outliers of the held-out recordings out that the best prediction shows."""
@@ -120,7 +120,7 @@ class Case:
 
     def adequate(self, h: Hypothesis) -> bool:
         """Whether nothing is left in the train recordings."""
-        return not h.far and self.test(h).p_value > EXPLAINED
+        return not h.far and self.test(h).p_value > self.settings.needless
 
     def detected(self) -> Detection:
         """Whether the nominal model leaves anything; between repeats, what they differ by tells."""
@@ -155,15 +155,18 @@ class Case:
         """
         if self.later is None or not more.far:
             return True
+        asks = self.settings.verdict
         old, new, nominal = (self.predicted(h) for h in (fewer, more, self.base))
         return old is None or nominal is None or (
             new is not None and smaller(
-                new.misfit, min(BETTER * old.misfit, old.misfit - WORTH * nominal.misfit)))
+                new.misfit, min(asks.improvement * old.misfit,
+                                old.misfit - asks.worth * nominal.misfit)))
 
-
-def _same(one: Records, other: Records) -> bool:
-    return all(abs(np.log(a[o].sigma / b[o].sigma)) < SAME and abs(a[o].rho - b[o].rho) < SAME_RHO
-               for a, b in zip(one.levels, other.levels, strict=True) for o in a)
+    def _same(self, one: Records, other: Records) -> bool:
+        noise = self.settings.noise
+        return all(abs(np.log(a[o].sigma / b[o].sigma)) < noise.same
+                   and abs(a[o].rho - b[o].rho) < noise.same_correlation
+                   for a, b in zip(one.levels, other.levels, strict=True) for o in a)
 
 
 def note_outliers(count: int, where: str, notes: list[str]) -> None:

@@ -14,6 +14,7 @@ from pikanid.mismatch.fitting.parallel import blas_on_one_thread, threads
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.locate import affected
+from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.mismatch.steps.confirming import confirmed, with_laws_outside
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.mismatch.steps.reporting import reported
@@ -26,7 +27,7 @@ Recordings = Recording | Sequence[Recording]
 
 
 def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
-             alpha: float = 0.01, quiet: tuple[float, float] | None = None,
+             settings: Settings = DEFAULTS, quiet: tuple[float, float] | None = None,
              tell: Callable[[str], None] = lambda text: None,
              workers: int | None = None) -> Diagnosis:
     """What is missing in a model, according to recordings?
@@ -42,7 +43,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         train: Recording, or several, to explain.
         held_out: Recording, or several, with another excitation, to prove it on.  Without one the
             end of the recording is set aside, and the verdict is at most "unconfirmed".
-        alpha: Rate of false alarms.
+        settings: Error rates, thresholds, budgets.
         quiet: Start and stop [s] of a stretch known to show noise only.
         tell: Called with what is being done.
         workers: Threads that fit side by side; by default two where there are as many cores.  The
@@ -55,7 +56,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         BadModel: No coordinate is found, or nothing is free.
         BadRecording: A channel is missing or unusable; there are too few samples; train and
             held-out are the same.
-        BadSetting: alpha is no probability, or workers is not positive.
+        BadSetting: settings are none, or workers is not positive.
         SimulationFailed: The model cannot be simulated, or not as exactly as the noise asks.
 
     >>> import pikanid as pk
@@ -68,36 +69,38 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     ('named', ('cubic_stiffness',))
     """
     begun = time.perf_counter()
-    if not 0 < alpha < 1:
-        raise errors.BadSetting(errors.bad_value("alpha", alpha, "between 0 and 1"))
+    if not isinstance(settings, Settings):
+        raise errors.BadSetting(errors.not_of_kind(
+            "'settings'", type(settings).__name__, "pikanid.Settings"))
     if workers is not None and workers < 1:
         raise errors.BadSetting(errors.bad_value("workers", workers, "at least 1"))
     if not a_model(model).free_names:
         raise errors.BadModel(errors.nothing_free(model.name))
     later = None if held_out is None else several(held_out)
     with blas_on_one_thread():
-        found = _diagnosed(model, several(train), later, alpha, quiet, tell, threads(workers))
+        found = _diagnosed(model, several(train), later, settings, quiet, tell,
+                           threads(workers, settings.budget.threads))
     return replace(found, seconds=time.perf_counter() - begun)
 
 
 def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
-               alpha: float, quiet: tuple[float, float] | None, tell: Callable[[str], None],
+               settings: Settings, quiet: tuple[float, float] | None, tell: Callable[[str], None],
                workers: int) -> Diagnosis:
-    case = open_case(model, train, later, quiet, tell, workers)
+    case = open_case(model, train, later, quiet, tell, settings, workers)
     tell("detection")
     detection = case.detected()
-    if not smaller(detection.p_value, alpha):
-        return reported(case, detection, Answer("none", (), ()), case.sites[0], None, alpha)
+    if not smaller(detection.p_value, settings.alpha):
+        return reported(case, detection, Answer("none", (), ()), case.sites[0], None)
     ranked = with_noise_of_the_rest(case, searched(case, tell), quiet, tell)
     tell("confirmation")
-    answer = confirmed(case, ranked, alpha)
+    answer = confirmed(case, ranked)
     site = affected(case.base, answer.given, case.sites, case.candidates)
     shape = force_shape(case.base, site, case.candidates)
     mend = None
     if shape is not None and answer.verdict == "unnamed":
         tell("laws outside the catalogue")
-        answer = with_laws_outside(case, answer, shape, site, alpha)
+        answer = with_laws_outside(case, answer, shape, site)
         if answer.verdict == "unnamed" and case.later is not None:
             mend = patch(case.base, case.model, shape, site, case.records, case.later,
                          case.predicted)
-    return replace(reported(case, detection, answer, site, shape, alpha), patch=mend)
+    return replace(reported(case, detection, answer, site, shape), patch=mend)

@@ -17,9 +17,8 @@ from pikanid.approximators import Array
 from pikanid.optimise.box import box_minimum
 
 TRIES = 8  # dampings of one step
-PATIENCE = 6  # iterations that a fit gets to come near the best one
-SLOW = 0.7  # share of the cost left by one iteration from which on a fit far away is given up
 Evaluate = Callable[[Array], tuple[Array, Array] | None]
+GiveUp = Callable[[int, float, float], bool]  # number of an iteration, |r|² before and after it
 
 
 class Linearised(Protocol):
@@ -78,11 +77,11 @@ class Rows:
 
 
 def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit: int = 30,
-             tolerance: float = 0.02, beyond: Callable[[float], bool] = lambda chi2: False
+             tolerance: float = 0.02, give_up: GiveUp = lambda count, last, cost: False
              ) -> Minimum | None:
     """Minimise |r(θ)|² within bounds; None where the start cannot be evaluated.
 
-    What is still `beyond` reach after `PATIENCE` iterations and falls slowly is given up.
+    After each iteration it is asked whether to `give_up`.
 
     >>> line = lambda q: (np.array([q[0] - 3.0]), np.ones((1, 1)))
     >>> found = minimise(line, np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -94,7 +93,7 @@ def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit
         return None if at is None else Rows(*at)
 
     found = descend(
-        rows, start, lower, upper, limit, beyond=beyond,
+        rows, start, lower, upper, limit, give_up=give_up,
         # far from an explanation nobody needs the last digits
         enough=lambda at: max(tolerance, 2e-5 * at.cost, 0.1 * at.cost / len(at.r)))
     return None if found is None else Minimum(found.theta, found.at.r, found.at.J, found.converged)
@@ -102,7 +101,7 @@ def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit
 
 def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, upper: Array,
             limit: int, enough: Callable[[At], float],
-            beyond: Callable[[float], bool] = lambda cost: False) -> Descent[At] | None:
+            give_up: GiveUp = lambda count, last, cost: False) -> Descent[At] | None:
     """Minimise a sum of squares within bounds; None where the start cannot be evaluated.
 
     Args:
@@ -112,7 +111,7 @@ def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, 
         upper: (n,).
         limit: Iterations.
         enough: A decrease that is not worth another step.
-        beyond: Costs that are out of reach after `PATIENCE` iterations that end slowly.
+        give_up: Asked after each iteration.
     """
     theta = np.clip(start, lower, upper)
     at, damping = evaluate(theta), 1e-3
@@ -144,7 +143,7 @@ def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, 
         before, gain = at.cost, at.cost - there.cost
         damping = max(damping * (0.1 if gain > 0.5 * expected else 1.0), 1e-9)
         theta, at = new, there
-        if count + 1 >= PATIENCE and at.cost > SLOW * before and beyond(at.cost):
+        if give_up(count + 1, before, at.cost):
             return Descent(theta, at, False)
     return Descent(theta, at, False)
 

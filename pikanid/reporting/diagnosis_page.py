@@ -30,9 +30,6 @@ code { background: #f3f4f6; padding: .1rem .3rem; } img { max-width: 100%; }
 """
 
 
-UNEXPLAINED = 1.5  # χ² per degree of freedom from which on no force explains a recording
-
-
 def page(dx: Diagnosis, title: str) -> str:
     """The page: verdict, where, what, proof, what next; figures inside.
 
@@ -48,7 +45,7 @@ def page(dx: Diagnosis, title: str) -> str:
         "<h2>Noise and notes</h2><ul>" + "".join(
             f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes)) + "</ul>",
         f'<p class="small">p = {dx.p_value:.2g} at a false-alarm rate of {dx.alpha:g}; '
-        f"{dx.seconds:.1f} s.</p>"]
+        f"{dx.seconds:.1f} s. {escape(str(dx.settings))}</p>"]
     return ('<!doctype html><html lang="en"><head><meta charset="utf-8">'
             f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>"
             + "".join(parts) + "</body></html>\n")
@@ -68,10 +65,11 @@ def _force(dx: Diagnosis) -> str:
     if force is None or not force.resolved:
         return " There the residual is louder than noise."
     worth = (f" It leaves {force.left:.2g} of χ² per degree of freedom: no force explains "
-             "everything." if force.left > UNEXPLAINED else "")
-    return (" There the simultaneous 95 % band of the force that would explain it excludes zero "
-            f"(means over {force.resolution:.2g} s). What a sensor or an input gets wrong can look "
-            f"like a force too.{worth}")
+             "everything." if force.left > dx.settings.beyond.unexplained else "")
+    band = 100 * (1 - dx.settings.band)
+    return (f" There the simultaneous {band:g} % band of the force that would explain it excludes "
+            f"zero (means over {force.resolution:.2g} s). What a sensor or an input gets wrong can "
+            f"look like a force too.{worth}")
 
 
 def _what(dx: Diagnosis) -> str:
@@ -127,7 +125,7 @@ def _proof(dx: Diagnosis) -> str:
     told = []
     for name, e in proof.outputs.items():
         moved = (f"{e.moved:.3g} with the parameters moved within their errors, "
-                 if proof.sensitive and dx.hypotheses else "")
+                 if proof.sensitive(dx.settings) and dx.hypotheses else "")
         whose = f" of {escape(name)}" if len(proof.outputs) > 1 else ""
         told.append(f"Held-out RMSE{whose}: {e.before:.3g} before, {e.after:.3g} after, "
                     f"{moved}noise {e.noise:.3g} {escape(e.unit)}".rstrip())

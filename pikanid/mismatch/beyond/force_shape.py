@@ -26,15 +26,13 @@ from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.symbolic.curve import Curve
 
-INTERVALS, DEGREE = 8, 3
-GRID = 101  # points at which an edge is drawn
-TYPICAL = 120  # and visited ones at which laws are compared with it
-GAUGE = 1e-3  # of a coefficient's sign: less is left when the free parameters can do the same
-LINEAR = 0.05  # of a straight line's sign: with less left the line is the free parameters' own
-ADEQUATE = 0.01
-OWN = 0.1  # of what all edges explain: so much must be an edge's alone to count
+INTERVALS, DEGREE = 8, 3  # numerical: knots to spare, which the penalty holds down; cubic
+GRID = 101  # numerical: points at which an edge is drawn
+TYPICAL = 120  # numerical: and visited ones at which laws are compared with it
+GAUGE = 1e-3  # numerical: of a sign: less is left when the free parameters can do the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +62,10 @@ class ForceShape:
     unit: str
     static_law: Literal[True] | None
 
-    def depends_on(self, alpha: float) -> tuple[str, ...]:
+    def depends_on(self, settings: Settings) -> tuple[str, ...]:
         """Arguments whose edge the others cannot replace."""
-        return tuple(e.argument for e in self.edges
-                     if e.own > OWN and e.p_value < alpha / len(self.edges))
+        return tuple(e.argument for e in self.edges if e.own > settings.beyond.own
+                     and e.p_value < settings.alpha / len(self.edges))
 
 
 def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...]) -> ForceShape:
@@ -98,7 +96,8 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
         alone, rank = _explained((rest / size)[:, ~own], target)
         gain, freedom = everything[0] - alone, everything[1] - rank
         line = spline.sites()
-        removed = np.linalg.norm(rest[:, own] @ line) < LINEAR * np.linalg.norm(D[:, own] @ line)
+        removed = np.linalg.norm(rest[:, own] @ line) < (
+            whitened.settings.beyond.line * np.linalg.norm(D[:, own] @ line))
         values, std = spline.drawn(coefficients[own], covariance[np.ix_(own, own)], bool(removed))
         seen = _without_constant(rest[:, own])
         at = spline.typical()
@@ -113,7 +112,7 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
                           float(chi2.sf(gain, freedom)) if freedom > 0 else 1.0,
                           float(lone / max(everything[0], 1e-300)), curve))
     left = residual_tests(whitened, fit.theta, fit.r, np.hstack([fit.J, D]), candidates, site.rate)
-    static: Literal[True] | None = True if left.p_value >= ADEQUATE else None
+    static: Literal[True] | None = True if left.p_value >= whitened.settings.refusal else None
     return ForceShape(tuple(edges), f"{site.unit}/s^2", static)
 
 

@@ -15,6 +15,7 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Input, Parameter, State
 from pikanid.symbolic.fitting import FormFit
 from pikanid.symbolic.laws import Laws, sum_of_laws
@@ -22,33 +23,33 @@ from pikanid.symbolic.library import NOTHING
 from pikanid.symbolic.naming import name_curve
 from pikanid.symbolic.search import shortlist
 
-FORMS = 3  # of an edge
-MOST, ALMOST = 0.6, 0.9  # of what all edges explain, or the best one alone: less is not read
 LINEAR = "linear"  # what free parameters do already, as a rule
 CONSTANT = ("constant", "")
 Entries = Mapping[tuple[str, str], str]  # form and argument -> key in the catalogue
 
 
-def symbolic_candidates(shape: ForceShape, site: Site, entries: Sequence[Candidate]
-                        ) -> list[Candidate]:
+def symbolic_candidates(shape: ForceShape, site: Site, entries: Sequence[Candidate],
+                        settings: Settings) -> list[Candidate]:
     """Formulas for what an edge shows, as effects, of the edges that explain most alone.
 
     Args:
         shape: The missing force.
         site: Where it acts.
         entries: The catalogue: a form that is an entry of it is no formula of its own.
+        settings: How much an edge must explain, and how many formulas are read of it.
     """
     named = {(e.form, e.argument): e.key for e in entries if e.form and e.site.q == site.q}
-    best = max((e.alone for e in shape.edges), default=0.0)
-    edges = [e for e in shape.edges if e.alone > max(MOST, ALMOST * best)]
+    best, asks = max((e.alone for e in shape.edges), default=0.0), settings.beyond
+    edges = [e for e in shape.edges if e.alone > max(asks.read, asks.read_beside * best)]
     return [_candidate(site, edge, fit, constant, named)
-            for edge in edges for fit in _forms(edge) for constant in (False, True)
+            for edge in edges for fit in _forms(edge, settings.budget.forms)
+            for constant in (False, True)
             if constant or (fit.form.name, edge.argument) not in named]
 
 
-def _forms(edge: Edge) -> list[FormFit]:
+def _forms(edge: Edge, count: int) -> list[FormFit]:
     fits = shortlist(name_curve(edge.curve))
-    return [f for f in fits if f.form is not NOTHING and f.form.family != LINEAR][:FORMS]
+    return [f for f in fits if f.form is not NOTHING and f.form.family != LINEAR][:count]
 
 
 def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entries) -> Candidate:

@@ -31,21 +31,15 @@ from pikanid.mismatch.beyond.penalised import Penalised, critical_value
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.data.whitened import Records, Whitened
-from pikanid.mismatch.detect.remainder import MOST_ROWS, condensed
+from pikanid.mismatch.detect.remainder import condensed
 from pikanid.mismatch.detect.tangent import TOGETHER, Tangent
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Input
 from pikanid.recording.channel import Channel
 
-DEGREE = 3
-A_PERIOD = 6  # knots in a natural period: friction's third harmonic still fits between them
-LEAST, MOST = 8, 800  # knot intervals
-SLOW = 200  # of them where even the most follow no oscillation, but only what changes slowly
-ROWS_EACH = 5  # samples to a knot interval, at least
-RESOLVED = 4  # knots in a natural period from which on a force that follows the motion shows
-POINTS = 4  # of the drawn grid to a knot interval
-LEVEL = 0.95  # of the simultaneous band
-PASSES = 2  # the second along the motion that the force of the first one makes
+DEGREE = 3  # numerical: cubic
+POINTS = 4  # numerical: of the drawn grid to a knot interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +51,7 @@ class ForceOverTime:
         values: (G,) δ, in `unit`: means over `resolution`, without what the free parameters can do.
         std: (G,) standard errors, pointwise.
         critical: Half the width, in standard errors, of the simultaneous band: it holds all of δ
-            at once with probability `LEVEL`.
+            at once with the probability that the settings ask for.
         resolution: Seconds that a value is the mean of: the recording's length over `freedom`.
         freedom: Effective degrees of freedom of the force.
         left: χ² per degree of freedom that it leaves: far above 1 where no force explains the
@@ -65,6 +59,7 @@ class ForceOverTime:
         unit: Of q''.
         spacing: Of the knots [s].
         period: Natural period [s]; 0 without a restoring force.
+        resolved: Whether the knots are fine enough for a force that follows the motion.
     """
 
     t: np.ndarray
@@ -77,11 +72,7 @@ class ForceOverTime:
     unit: str
     spacing: float
     period: float
-
-    @property
-    def resolved(self) -> bool:
-        """Whether the knots are fine enough for a force that follows the motion."""
-        return RESOLVED * self.spacing <= self.period or not self.period
+    resolved: bool
 
     @property
     def windows(self) -> tuple[tuple[float, float], ...]:
@@ -116,16 +107,16 @@ def force_over_time(base: Hypothesis, site: Site) -> ForceOverTime | None:
     nominal = motion = _Motion.of(base, site, np.array(site.span), np.zeros(2))
     if nominal is None or motion is None:
         return None
-    rows = len(nominal.r)
-    intervals = _intervals(stop - start, period, rows)
-    if intervals < LEAST:
+    rows, settings = len(nominal.r), base.whitened.settings
+    intervals = _intervals(stop - start, period, rows, settings)
+    if intervals < settings.budget.force_knots[0]:
         return None
     edges = np.linspace(start, stop, intervals + 1)
     knots = np.concatenate([[start] * DEGREE, edges, [stop] * DEGREE])
-    together = -(-rows // MOST_ROWS)
+    together = -(-rows // settings.budget.rows_tested)
     fitted: Penalised | None = None
     force = np.zeros(len(knots) - DEGREE - 1)
-    for _ in range(PASSES):
+    for _ in range(settings.budget.force_passes):
         D = motion.columns(knots, together)
         if not np.isfinite(D).all():
             return None
@@ -142,22 +133,27 @@ def force_over_time(base: Hypothesis, site: Site) -> ForceOverTime | None:
         motion = pushed
     assert fitted is not None
     t = np.linspace(start, stop, POINTS * intervals + 1)
+    spacing = (stop - start) / intervals
     resolution = (stop - start) / max(fitted.freedom, 1.0)
     means = _means(t, knots, resolution)
     spread = solve_triangular(fitted.root, (means @ fitted.gauge).T, lower=True)
     spread *= max(fitted.left, 1.0) ** 0.5
     return ForceOverTime(t, means @ force, np.linalg.norm(spread, axis=0),
-                         critical_value(spread, LEVEL), resolution, fitted.freedom, fitted.left,
-                         f"{site.unit}/s^2", (stop - start) / intervals, period)
+                         critical_value(spread, 1 - settings.band), resolution, fitted.freedom,
+                         fitted.left, f"{site.unit}/s^2", spacing, period,
+                         not period or settings.beyond.resolved * spacing <= period)
 
 
-def _intervals(span: float, period: float, rows: int) -> int:
+def _intervals(span: float, period: float, rows: int, settings: Settings) -> int:
     """Number of knot intervals, as fine as the motion asks for and the recording can pay."""
-    most = min(MOST, rows // ROWS_EACH)
+    (least, limit), asks = settings.budget.force_knots, settings.beyond
+    most = min(limit, rows // asks.rows_a_knot)
     if not period:
         return most
     periods = span / period
-    return min(SLOW if RESOLVED * periods > MOST else max(int(A_PERIOD * periods), LEAST), most)
+    if asks.resolved * periods > limit:
+        return min(settings.budget.slow_knots, most)
+    return min(max(int(asks.knots_a_period * periods), least), most)
 
 
 def _means(t: np.ndarray, knots: np.ndarray, width: float) -> np.ndarray:
@@ -183,7 +179,8 @@ class _Motion:
         name, records = site.name("delta"), base.whitened.records
         model = base.model.replace(inputs=(*base.model.inputs, Input(name, hold="first")))
         pushed = records.recordings[0].with_channels(Channel(name, t, force))
-        whitened = Whitened(model.with_term(site.v, name), Records((pushed,), records.levels[:1]))
+        whitened = Whitened(model.with_term(site.v, name), Records(
+            (pushed,), records.levels[:1], records.settings))
         theta = np.array([base.values[f.name] for f in whitened.problem.free])
         whitened.steps = base.whitened.steps[:1]
         found = whitened.residual(theta)

@@ -22,10 +22,8 @@ from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, Spline
 
-INTERVALS, DEGREE = 5, 3
-INSIDE = 0.95  # of the held-out motion that must lie in the range
-BETTER = 0.9  # of the nominal held-out misfit that must not be exceeded
-GRID = 201
+INTERVALS, DEGREE = 5, 3  # numerical: of a law that nobody knows: a few pieces, cubic
+GRID = 201  # numerical: points at which an edge is drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,10 +78,11 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
     if found is None or before is None or found.minimum.chi2 >= base.minimum.chi2:
         return None
     after = predict(found)
-    if after is None or after.misfit > BETTER * before.misfit:
+    settings = records.settings
+    if after is None or after.misfit > settings.verdict.improvement * before.misfit:
         return None
     inside = _inside(found, later, edge)
-    if inside < INSIDE:
+    if inside < settings.beyond.inside:
         return None
     grid = np.linspace(basis.low, basis.high, GRID)
     free = [f.name for f in found.whitened.problem.free]

@@ -7,10 +7,11 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-MEMORIES = (2.0, 50.0)  # of the force, in knot intervals: it follows an oscillation, or does not
-DECADES = 10  # of the penalty's weight, from almost no force downwards
-HOPELESS = 60.0  # of -2 ln likelihood above the best: lighter weights only get worse
-GAUGE = 1e-6  # of the prior: tells apart forces that do the same as a parameter
+# of the force, in knot intervals: it follows an oscillation, or does not
+MEMORIES = (2.0, 50.0)  # numerical: the likelihood takes one of two, and is flat between them
+DECADES = 10  # numerical: of the penalty's weight, from almost no force downwards
+HOPELESS = 60.0  # numerical: -2 ln likelihood above the best: e^-30, lighter weights are worse
+GAUGE = 1e-6  # numerical: of the prior: tells apart forces that do the same as a parameter
 
 
 class Penalised:

@@ -93,7 +93,7 @@ def delay(site: Site) -> list[Candidate]:
                       lambda m: m.map_output(o, delay=tau.name), directions, twin="delay")]
 
 
-LAGS = (0.0015, 0.005, 0.015, 0.05)
+LAGS = (0.0015, 0.005, 0.015, 0.05)  # numerical: [s], from where fits begin
 
 
 def lags(site: Site) -> list[Candidate]:

@@ -19,7 +19,7 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.problem.held import HeldInput, acting
 
-PARTS = 8  # of a step, at which a ramp within it is looked at
+PARTS = 8  # numerical: of a step, at which a ramp within it is looked at
 Shape = Callable[[View], np.ndarray]
 
 

@@ -13,7 +13,8 @@ from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, State
 
-STICKING = (0.6, 0.8, 1.25, 1.6)  # of the size of dry friction: a motion comes to rest elsewhere
+# of the size of dry friction, about which a motion comes to rest elsewhere
+STICKING = (0.6, 0.8, 1.25, 1.6)  # numerical: where fits begin
 
 
 def sense(view: View, v: str) -> np.ndarray:

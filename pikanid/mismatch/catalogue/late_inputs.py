@@ -14,7 +14,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, Vi
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model.parts import Parameter
 
-SHIFTS = (0.3, 3.0, 8.0)  # samples, from where fits begin
+SHIFTS = (0.3, 3.0, 8.0)  # numerical: samples, from where fits begin
 
 
 def input_delay(site: Site) -> list[Candidate]:

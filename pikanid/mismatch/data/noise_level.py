@@ -12,21 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from pikanid.mismatch.settings.noise import NoiseSettings
+from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.settings.thresholds import bic
 from pikanid.noise.floor import rounding_noise
 from pikanid.noise.level import QUIET, NoiseModel, estimate
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
-LONGEST = 50  # samples of a gap that a line across it is followed over
-ABOVE = 6.0  # natural frequencies from which on a residual is noise
-BEGINS = (0.25, 0.6)  # of the highest frequency, between which that lies in any case
-BELIEVED = 0.5  # of ln N that a correlation must gain in log-likelihood
+LONGEST = 50  # numerical: samples of a gap beyond which a line across it leaves nothing that counts
 GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
-UNKNOWN = 0.6  # relative standard error of a power, at most: then it is known by its order only
-REFUTED = 2.0  # standard errors of a power by which less than that is left by a fit
-UNLIKELY = 4.6  # of log-likelihood that what all frequencies say may cost: one time in a hundred
 Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
-CALM = 7.0  # means of the noise from which on an ordinate of its spectrum counts as a line
 
 
 def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None,
@@ -43,15 +39,17 @@ def first_level(recording: Recording, output: str, quiet: tuple[float, float] | 
 
 
 def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
-            quiet: tuple[float, float] | None, explained: bool = False) -> NoiseModel:
+            quiet: tuple[float, float] | None, settings: Settings, explained: bool = False
+            ) -> NoiseModel:
     """The level again, now that a fit has taken the motion away.
 
     Args:
         level: So far.
         channel: Of the output.
         t, residual: (N,) of the fit at the samples that are there.
-        rate: Natural frequency [rad/s]: the residual counts from `ABOVE` times that on.
+        rate: Natural frequency [rad/s]: the residual counts from some times that on.
         quiet: Stretch in which nothing moves, if one is known.
+        settings: What counts as noise.
         explained: Whether the fit leaves nothing that a test sees.
     """
     from scipy.signal.windows import tukey
@@ -67,8 +65,8 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
     omega = np.linspace(0, np.pi, len(power))
     power /= np.maximum(bridged(grid), 0.1)
     # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
-    low, top = (share * np.pi for share in BEGINS)
-    high = (omega > np.clip(ABOVE * rate * h, low, top)) & (omega < 0.97 * np.pi)
+    low, top = (share * np.pi for share in settings.noise.begins)
+    high = (omega > np.clip(settings.noise.above * rate * h, low, top)) & (omega < 0.97 * np.pi)
     spectra = [(omega[high], power[high], 0.9 * share)]
     source = "the residual's highest frequencies"
     found = quiet or level.stretch
@@ -81,16 +79,18 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
             spectra.append((np.linspace(0, np.pi, len(p))[1:], p[1:], 1.0))
             source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
     given = level.sigma if level.source == "given" else None
-    sigma, rho, spread = _whittle(spectra, given)
+    sigma, rho, spread = _whittle(spectra, given, settings.noise)
     # What a fit leaves at all frequencies is noise and misfit: it may be more than noise, not less.
     # A stretch in which a motion dies out is no quiet one, and the shape of high frequencies can
     # mislead.  What explains all that a test sees leaves noise alone: it is read at all
     # frequencies, unless where noise was sure that makes it unlikely.
     every = (omega > 0) & (omega < 0.97 * np.pi)
-    whole = _whittle([(omega[every], power[every], 0.9 * share)], given)
+    whole = _whittle([(omega[every], power[every], 0.9 * share)], given, settings.noise)
     louder = np.log(_power(*whole[:2], low) / _power(sigma, rho, low))
-    dearer = _against(spectra, *whole[:2]) - _against(spectra, sigma, rho)
-    if louder < -REFUTED * spread or (explained and (louder < 0 or dearer < UNLIKELY)):
+    dearer = (_against(spectra, *whole[:2], settings.noise)
+              - _against(spectra, sigma, rho, settings.noise))
+    if louder < -settings.noise.less * spread or (
+            explained and (louder < 0 or dearer < settings.contradiction)):
         sigma, rho, spread = whole
         source = "the residual at all frequencies"
     if given is not None:
@@ -126,15 +126,17 @@ def bridged(grid: np.ndarray) -> np.ndarray:
     return np.asarray(np.fft.rfft(lags).real / n)
 
 
-def _whittle(spectra: list[Spectrum], given: float | None) -> tuple[float, float, float]:
+def _whittle(spectra: list[Spectrum], given: float | None, settings: NoiseSettings
+             ) -> tuple[float, float, float]:
     """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`."""
     total = sum(w * len(o) for o, _, w in spectra)
     scales = []
     for rho in GRID:
-        power = sum(w * np.sum(_calm(p / _shape(rho, o))) for o, p, w in spectra)
+        power = sum(w * np.sum(_calm(p / _shape(rho, o), settings.line)) for o, p, w in spectra)
         scales.append(power / total if given is None else given**2 * (1 - rho**2))
     sigmas = np.sqrt(np.array(scales) / (1 - GRID**2))
-    costs = np.array([_against(spectra, *level) for level in zip(sigmas, GRID, strict=True)])
+    costs = np.array([_against(spectra, *level, settings)
+                      for level in zip(sigmas, GRID, strict=True)])
     best = likeliest(costs, total)
     spread = 1.0 / np.sqrt(total)
     if best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
@@ -144,7 +146,7 @@ def _whittle(spectra: list[Spectrum], given: float | None) -> tuple[float, float
         likely = np.exp(costs.min() - costs) / len(GRID)
         likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
         spread = float(np.hypot(spread, _two_thirds(np.abs(powers - powers[best]), likely)))
-    return float(sigmas[best]), float(GRID[best]), min(spread, UNKNOWN)
+    return float(sigmas[best]), float(GRID[best]), min(spread, settings.order_only)
 
 
 def _two_thirds(distances: np.ndarray, weights: np.ndarray) -> float:
@@ -154,12 +156,12 @@ def _two_thirds(distances: np.ndarray, weights: np.ndarray) -> float:
     return float(np.interp(0.683, share, distances[order]))
 
 
-def _against(spectra: list[Spectrum], sigma: float, rho: float) -> float:
+def _against(spectra: list[Spectrum], sigma: float, rho: float, settings: NoiseSettings) -> float:
     """-ln of the likelihood of AR(1) noise."""
     cost, scale = 0.0, sigma**2 * (1 - rho**2)
     for omega, power, weight in spectra:
         expected = scale * _shape(rho, omega)
-        cost += weight * float(np.sum(_calm(power / expected) + np.log(expected)))
+        cost += weight * float(np.sum(_calm(power / expected, settings.line) + np.log(expected)))
     return cost
 
 
@@ -175,13 +177,13 @@ def _shape(rho: float, omega: np.ndarray) -> np.ndarray:
 
 def likeliest(costs: np.ndarray, total: float) -> int:
     """Which ρ of `GRID` has the least cost, -ln of the likelihood of `total` ordinates; zero unless
-    another one is clearly better.
+    another one is better by more than the price of a parameter.
     """
     best = int(np.argmin(costs))
-    return 0 if costs[0] - costs[best] < BELIEVED * np.log(total) else best
+    return 0 if costs[0] - costs[best] < bic(total) else best
 
 
-def _calm(ratio: np.ndarray) -> np.ndarray:
-    """Ordinates limited to `CALM` times their median's mean: a line in the band is no noise."""
-    return np.minimum(ratio, CALM * float(np.median(ratio)) / np.log(2))
+def _calm(ratio: np.ndarray, line: float) -> np.ndarray:
+    """Ordinates limited to some times their median's mean: a `line` in the band is no noise."""
+    return np.minimum(ratio, line * float(np.median(ratio)) / np.log(2))
 

@@ -9,19 +9,18 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.data.whitened import Records
-from pikanid.noise import level as noise
+from pikanid.mismatch.settings.noise import NoiseSettings
+from pikanid.noise.level import high_band_sigma
 from pikanid.recording import Recording
 
-SPIKE = 5.0  # σ by which a sample must leave its neighbours before there is a fit
-LONE = 9.0  # median gaps by which it must once a fit is taken away: of white noise 1 in 4000 does
-HUMP = 3  # neighbours that are alone together
-MOST = 0.1  # of the samples: where more are alone, nothing is
+# the cubic through two neighbours on either side
 CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
 # straight on from three neighbours on the left
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0
 
 
-def without_outliers(recording: Recording, output: str) -> tuple[Recording, int]:
+def without_outliers(recording: Recording, output: str, noise: NoiseSettings
+                     ) -> tuple[Recording, int]:
     """The recording without samples that leave the cubic through their neighbours, and how many.
 
     The worst goes first: beside a spike its neighbours look bad as well.
@@ -32,28 +31,28 @@ def without_outliers(recording: Recording, output: str) -> tuple[Recording, int]
     if len(y) < 20:
         return recording, 0
     try:
-        sigma, _ = noise.high_band_sigma(channel)
+        sigma, _ = high_band_sigma(channel)
     except errors.BadRecording:
         return recording, 0
     gap = np.zeros(len(y))
     gap[2:-2] = y[2:-2] - np.convolve(y, CUBIC, "valid")
     bad: list[int] = []
-    while len(bad) <= MOST * len(y):
+    while len(bad) <= noise.most_outliers * len(y):
         k = int(np.argmax(np.abs(gap)))
-        if abs(gap[k]) < SPIKE * sigma * np.sqrt(1 + np.sum(CUBIC**2)):
+        if abs(gap[k]) < noise.spike * sigma * np.sqrt(1 + np.sum(CUBIC**2)):
             break
         bad.append(k)
         y[k] -= gap[k]
         for near in range(max(k - 2, 2), min(k + 3, len(y) - 2)):
             gap[near] = y[near] - CUBIC @ y[near - 2:near + 3]
-    if not bad or len(bad) > MOST * len(y):
+    if not bad or len(bad) > noise.most_outliers * len(y):
         return recording, 0
     values = channel.values.copy()
     values[seen[bad]] = np.nan
     return recording.with_channels(replace(channel, values=values)), len(bad)
 
 
-def lone(residual: np.ndarray) -> np.ndarray:
+def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
     """Which samples (N,) of a residual are far from what its neighbours say, whichever one asks:
     those around it, or those on one side only, beyond which a misfit may bend.
     """
@@ -64,22 +63,24 @@ def lone(residual: np.ndarray) -> np.ndarray:
     said = np.stack([np.median(np.delete(near, 3, axis=1), axis=1), near[:, :3] @ LINE,
                      near[:, :3:-1] @ LINE])
     gap = np.min(np.abs(residual - said), axis=0)
-    found = gap > LONE * np.median(gap)
-    return np.asarray(found if 0 < found.sum() <= MOST * len(found) else np.zeros_like(found))
+    found = gap > noise.lone * np.median(gap)
+    few = 0 < found.sum() <= noise.most_outliers * len(found)
+    return np.asarray(found if few else np.zeros_like(found))
 
 
-def with_humps(residual: np.ndarray, kept: np.ndarray) -> np.ndarray:
+def with_humps(residual: np.ndarray, kept: np.ndarray, together: int) -> np.ndarray:
     """Which samples are kept (increasing), with those put back that leave the others together.
 
-    `HUMP` neighbours on one side are no errors one by one: a sensor may have been at its end.
+    So many neighbours on one side, `together`, are no errors one by one: a sensor may have been at
+    its end.
 
-    >>> with_humps(np.array([0.0, 9, 8, 9, 0, 9, 8, 0]), np.array([0, 4, 7]))
+    >>> with_humps(np.array([0.0, 9, 8, 9, 0, 9, 8, 0]), np.array([0, 4, 7]), 3)
     array([0, 1, 2, 3, 4, 7])
     """
     gone = np.setdiff1d(np.arange(len(residual)), kept)
     side = np.sign(residual[gone] - np.interp(gone, kept, residual[kept]))
     runs = np.split(gone, np.flatnonzero((np.diff(gone) > 1) | (np.diff(side) != 0)) + 1)
-    return np.union1d(kept, np.concatenate([run for run in runs if len(run) >= HUMP] or [kept]))
+    return np.union1d(kept, np.concatenate([run for run in runs if len(run) >= together] or [kept]))
 
 
 def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np.ndarray]]
@@ -90,17 +91,18 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
         records: Any.
         seen: Number of the recording, output, times (N,) and residual (N,) there.
     """
-    recordings, count = list(records.recordings), 0
+    recordings, count, noise = list(records.recordings), 0, records.settings.noise
     for r, name, t, residual in seen:
         kept = np.arange(len(t))
         # two that are neighbours hide each other: the second shows when the first has gone
-        while (bad := lone(residual[kept])).any() and len(kept) > (1 - MOST) * len(t):
+        while (bad := lone(residual[kept], noise)).any() and (
+                len(kept) > (1 - noise.most_outliers) * len(t)):
             kept = kept[~bad]
-        kept = with_humps(residual, kept)
+        kept = with_humps(residual, kept, noise.together)
         if len(kept) < len(t):
             channel = recordings[r][name]
             gone = np.isin(channel.time, np.delete(t, kept))
             recordings[r] = recordings[r].with_channels(replace(
                 channel, values=np.where(gone, np.nan, channel.values)))
             count += len(t) - len(kept)
-    return Records(tuple(recordings), records.levels), count
+    return replace(records, recordings=tuple(recordings)), count

@@ -12,24 +12,21 @@ from pikanid.estimate import Estimate
 from pikanid.mismatch.data.noise_level import first_level, refined
 from pikanid.mismatch.data.outliers import without_lone, without_outliers
 from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.settings.budget import Budget
+from pikanid.mismatch.settings.noise import NoiseSettings
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.noise.floor import repeated
 from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
-LONG = 4000  # samples below which none are put together
-FINE = 30  # samples a period that are kept
-ASIDE = 0.3  # of a recording that is set aside where there is no held-out one
-MOST = 25_000  # samples, put together where they may be, that a minute's diagnosis has time for
-EXACT = 1e-6  # of an output's half range: no simulation is compared with less noise
-FREEDOM = 20  # samples beyond the free parameters: a noise level read off them is 16 % uncertain
-LEAST = 300  # samples of an output that must be there for that
+EXACT = 1e-6  # numerical: of an output's half range: no simulation is compared with less noise
 
 
 def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float, float] | None,
-             notes: list[str], together: int = 1, levels: Mapping[str, NoiseModel] | None = None
-             ) -> Records:
+             notes: list[str], settings: Settings, together: int = 1,
+             levels: Mapping[str, NoiseModel] | None = None) -> Records:
     """Recordings in the model's units without outliers, each output with a first noise level, or
     with the one that is known.
 
@@ -40,7 +37,8 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
         found: dict[str, NoiseModel] = {}
         for output in model.outputs:
             channel = recording.as_output(output.name, output.unit or None)
-            recording, count = without_outliers(recording.with_channels(channel), output.name)
+            recording, count = without_outliers(
+                recording.with_channels(channel), output.name, settings.noise)
             if count:
                 notes.append(f"Recording '{recording.name}': {count} outliers of "
                              f"'{output.name}' are left out.")
@@ -66,11 +64,11 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
                              f"{EXACT:.0e} of its half range counts as that.")
         done.append(recording)
         every.append(found)
-    return Records(tuple(done), tuple(every))
+    return Records(tuple(done), tuple(every), settings)
 
 
-def beginnings(model: Model, recordings: tuple[Recording, ...], what: str, notes: list[str]
-               ) -> tuple[Recording, ...]:
+def beginnings(model: Model, recordings: tuple[Recording, ...], what: str, notes: list[str],
+               budget: Budget) -> tuple[Recording, ...]:
     """The recordings, or as much of them from their start on as can be diagnosed in a minute.
 
     Args:
@@ -78,11 +76,12 @@ def beginnings(model: Model, recordings: tuple[Recording, ...], what: str, notes
         recordings: Each is cut alike.
         what: They are, for a note.
         notes: Get a sentence where something is cut.
+        budget: How much can be diagnosed.
     """
     total = sum(len(r[o].time) for r in recordings for o in model.output_names)
-    if total <= MOST:
+    if total <= budget.samples:
         return recordings
-    share = MOST * oversampling(model, recordings) / total
+    share = budget.samples * oversampling(model, recordings, budget) / total
     if share >= 1:
         return recordings
     notes.append(f"{what[0].upper()}{what[1:]} is long: its first {100 * share:.2g} % are "
@@ -118,29 +117,29 @@ def freedom(model: Model, records: Records) -> tuple[int, int, int]:
                 for o in model.output_names)
     free = sum(1 if p.scope == "shared" else len(records.recordings)
                for p in model.parameters if p.free)
-    return count, free, free + FREEDOM
+    return count, free, free + records.settings.noise.freedom
 
 
-def oversampling(model: Model, recordings: tuple[Recording, ...]) -> int:
+def oversampling(model: Model, recordings: tuple[Recording, ...], budget: Budget) -> int:
     """How many samples of the outputs may become one: of records that are long, and recorded far
     faster than anything in them moves.
 
-    Above the frequency that 99.9 % of an output's changes stay below, `FINE` samples a period are
-    kept.
+    Above the frequency that 99.9 % of an output's changes stay below, the budget's samples a period
+    are kept.
     """
     total = sum(len(r[o].time) for r in recordings for o in model.output_names)
-    counts = [total // LONG]
+    counts = [total // budget.put_together]
     for recording in recordings:
         for name in model.output_names:
             c = recording[name]
             y = c.values[np.isfinite(c.values)]
             steps = np.diff(c.time)
-            if len(y) < LONG // 4 or np.ptp(steps) > 0.01 * np.median(steps):
+            if len(y) < budget.put_together // 4 or np.ptp(steps) > 0.01 * np.median(steps):
                 return 1
             y = (y - np.linspace(y[0], y[-1], len(y))) * np.hanning(len(y))
             power = np.cumsum(np.abs(np.fft.rfft(y)) ** 2)
             fast = int(np.searchsorted(power, 0.999 * power[-1])) + 1
-            counts.append(int(len(y) / (FINE * fast)))
+            counts.append(int(len(y) / (budget.samples_a_period * fast)))
     odd = max(min(counts), 1)
     return odd - 1 + odd % 2
 
@@ -178,33 +177,34 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
         for name, level in found.items():
             f = fits[r, name]
             kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
-            new[name] = loud_enough(refined(level, recording[name], f.t[kept], f.residual[kept],
-                                            rate, quiet, explained), recording[name])
+            again = refined(level, recording[name], f.t[kept], f.residual[kept], rate, quiet,
+                            records.settings, explained)
+            new[name] = loud_enough(again, recording[name])
         levels.append(new)
-    return Records(records.recordings, tuple(levels)), count
+    return replace(records, levels=tuple(levels)), count
 
 
-def set_aside(train: tuple[Recording, ...], model: Model, notes: list[str]
-               ) -> tuple[tuple[Recording, ...], tuple[Recording, ...] | None]:
+def set_aside(train: tuple[Recording, ...], model: Model, notes: list[str], noise: NoiseSettings
+              ) -> tuple[tuple[Recording, ...], tuple[Recording, ...] | None]:
     """Recordings without their ends, and the same with nothing but their ends to be seen.
 
     Hypotheses that cannot even predict how the same run goes on are refused; a run driven the same
     way proves no more than that.
     """
     notes.append("There is no held-out recording: whatever is found stays unconfirmed.")
-    if min(len(r[o].time) for r in train for o in model.output_names) < LEAST:
+    if min(len(r[o].time) for r in train for o in model.output_names) < noise.least_aside:
         return train, None
     kept, ends = [], []
     for r in train:
-        cut = r.start + (1 - ASIDE) * (r.stop - r.start)
+        cut = r.start + (1 - noise.aside) * (r.stop - r.start)
         kept.append(r.window(r.start, cut))
         unseen = [replace(r[o], values=np.where(r[o].time < cut, np.nan, r[o].values))
                   for o in model.output_names]
         ends.append(r.with_channels(*unseen))
     if any(np.isinf(r[o].changes_at) for r in (*kept, *ends) for o in model.output_names):
         return train, None  # what does not change proves nothing
-    notes.append(f"The last {100 * ASIDE:.0f} % of the recording are set aside: what is found has "
-                 "to predict them.")
+    notes.append(f"The last {100 * noise.aside:.0f} % of the recording are set aside: what "
+                 "is found has to predict them.")
     return tuple(kept), tuple(ends)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.noise.level import NoiseModel
 from pikanid.problem.problem import Problem
@@ -14,19 +15,20 @@ from pikanid.recording import Recording
 from pikanid.simulation.simulator import Response, Steps
 from pikanid.simulation.translated import Translated
 
-CERTAIN = 4.0  # χ² per row that needs no test to be called a misfit
-SHARE = 0.05  # of the noise that a simulation may err by
-FINEST = 16  # steps a sample, at most: more are only for laws that are all but jumps
-SHARP = 8  # steps a sample from which on it is better to stop at corners than to run through them
-GROSS = 25.0  # χ² per row from which on a misfit is gross: nobody needs its last digits
+SHARE = 0.05  # numerical: of the noise that a simulation may err by, 1/400 of its power
+SHARP = 8  # numerical: steps a sample from which on stopping at corners is cheaper than finer steps
+FINEST, COARSEST = 64, 16  # numerical: steps a sample, at most; of a motion that misses grossly
 
 
 @dataclass(frozen=True)
 class Records:
-    """Recordings as they are judged: without outliers, each output with its noise level."""
+    """Recordings as they are judged: without outliers, each output with its noise level, and by
+    which settings.
+    """
 
     recordings: tuple[Recording, ...]
     levels: tuple[dict[str, NoiseModel], ...]
+    settings: Settings
 
     @property
     def spread(self) -> float:
@@ -46,11 +48,11 @@ class Records:
         for r, found, t in zip(self.recordings, self.levels, times, strict=True):
             moved = (min(r[o].changes_at, r.stop) for o in found)
             cut.append(_cut(r, max(float(t[int(share * (len(t) - 1))]), *moved)))
-        return Records(tuple(cut), self.levels)
+        return replace(self, recordings=tuple(cut))
 
     def with_levels(self, levels: dict[str, NoiseModel]) -> Records:
         """The same with one noise level of each output for all recordings."""
-        return Records(self.recordings, tuple(levels for _ in self.recordings))
+        return replace(self, levels=tuple(levels for _ in self.recordings))
 
 
 def _cut(recording: Recording, stop: float) -> Recording:
@@ -81,6 +83,7 @@ class Whitened:
                 for r in records.recordings]
         self.problem = Problem(model, held)
         self.records = records
+        self.settings = records.settings
         self.simulators = [Translated(model, e) for e in self.problem.experiments]
         self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
         self.steps: list[Steps] = []
@@ -98,7 +101,7 @@ class Whitened:
         """
         found = []
         self.weighed = []
-        finest = 64 if misfit < GROSS else 16
+        finest = FINEST if misfit < self.settings.fits.gross else COARSEST
         for r, simulator in enumerate(self.simulators):
             allowed = share * allowance(misfit)
             steps = self._steps(r, theta, allowed, SHARP if simulator.corners else finest)

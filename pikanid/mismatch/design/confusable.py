@@ -22,12 +22,10 @@ from pikanid.mismatch.design.response import Sigma
 from pikanid.mismatch.design.sizing import Sized, recorded, sized
 from pikanid.mismatch.fitting.hypothesis import fitted
 from pikanid.mismatch.search.screen import Screen
+from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Model
 from pikanid.problem.arguments import a_model, one_recording
 from pikanid.recording import Recording
-
-DETECTED, SEPARATED = 5.0, 4.0  # [σ] from the nominal model, from the best rival
-REFITS = 4  # rivals whose simulations are refitted; the others keep the first order
 
 
 @dataclass(frozen=True)
@@ -125,7 +123,8 @@ class Confusable:
 
 def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
                only: Sequence[str] | None = None, strength: float = 30.0, refit: bool = True,
-               tell: Callable[[str], None] = lambda text: None) -> Confusable:
+               settings: Settings = DEFAULTS, tell: Callable[[str], None] = lambda text: None
+               ) -> Confusable:
     """Smallest detectable size of every effect, and the pairs that an experiment cannot separate.
 
     Args:
@@ -136,12 +135,13 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
         strength: How visible each effect is made before its rivals are compared [σ].
         refit: Whether the closest rivals are refitted by simulation; else all distances are those
             of the first order.
+        settings: From which distance on an effect is seen, and two are told apart; budgets.
         tell: Called with the effect that is being looked at.
 
     Raises:
         BadModel: If the model has no second-order coordinate that is seen.
         BadSetting: If σ is unknown for an output, an id in `only` is none of this model's, or
-            `strength` is not above 4 σ.
+            `strength` does not tell effects apart (above 4 σ by default).
         SimulationFailed: If the nominal model cannot be simulated.
 
     >>> from pikanid.recording import excitation
@@ -151,9 +151,10 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
     >>> [(pair[0], pair[1]) for pair in found.pairs]
     [('sensor_offset', 'static_bias')]
     """
-    if not SEPARATED < strength < inf:
-        raise errors.BadSetting(errors.bad_value("strength", strength, f"above {SEPARATED:g}"))
-    nothing = recorded(a_model(model), one_recording(excitation), sigma)
+    separated = settings.separated
+    if not separated < strength < inf:
+        raise errors.BadSetting(errors.bad_value("strength", strength, f"above {separated:g}"))
+    nothing = recorded(a_model(model), one_recording(excitation), sigma, settings)
     catalogue = tuple(c for c in catalogue_of(sites(model, nothing.recordings))
                       if c.known and c.fits and c.suits())
     base = fitted(model, (), nothing, [{}], len(catalogue))
@@ -171,21 +172,22 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
         tell(candidate.key)
         own = np.flatnonzero(screen.found.owner == k)
         if not np.any(screen.lengths[own] > 0):
-            shown.append(_visible(candidate, None, None, ()))
+            shown.append(_visible(candidate, None, None, (), settings))
             continue
-        first = sized(candidate, screen, own, DETECTED, base, excitation, sigma)
+        first = sized(candidate, screen, own, settings.visible, base, excitation, sigma)
         strong = sized(candidate, screen, own, strength, base, excitation, sigma, typical=True)
-        seen = strong is not None and strong.distance >= SEPARATED
+        seen = strong is not None and strong.distance >= separated
         rivals = _rivals(model, strong, candidate, catalogue, refit) if strong and seen else ()
-        shown.append(_visible(candidate, first, strong, rivals))
-    return Confusable(tuple(shown), SEPARATED)
+        shown.append(_visible(candidate, first, strong, rivals, settings))
+    return Confusable(tuple(shown), separated)
 
 
 def _visible(candidate: Candidate, first: Sized | None, strong: Sized | None,
-             rivals: Sequence[Rival]) -> Visible:
+             rivals: Sequence[Rival], settings: Settings) -> Visible:
     name = strong.parameter if strong else ""
     unit = next((p.unit for p in candidate.parameters if p.name == name), "")
-    smallest = first.departure if first and first.distance >= 0.8 * DETECTED else inf
+    found = first is not None and first.distance >= 0.8 * settings.visible
+    smallest = first.departure if first and found else inf
     return Visible(candidate.key, candidate.ids, candidate.name, name, unit, smallest,
                    first.falling if first else False,
                    strong.values.get(name, 0.0) if strong else 0.0,
@@ -204,7 +206,7 @@ def _rivals(model: Model, truth: Sized, candidate: Candidate, catalogue: Sequenc
         gains = screen.gain[screen.found.owner == k]
         distances[other.key] = float(np.sqrt(max(left - gains.max(initial=0.0), 0.0)))
     if refit:
-        for other, starts in screen.singles(REFITS):
+        for other, starts in screen.singles(truth.records.settings.budget.planned_refits):
             found = fitted(model, (other,), truth.records, starts, len(catalogue))
             if found is not None:
                 distances[other.key] = float(np.sqrt(found.minimum.chi2))

@@ -33,6 +33,7 @@ from pikanid.mismatch.design.response import (
     natural_frequency,
 )
 from pikanid.mismatch.design.separation import distance, mean_precision, refitted_within
+from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Model
 from pikanid.problem.arguments import a_model, several
 from pikanid.recording import Recording
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Score = Callable[[Mapping[str, list[WhitenedResponse]], Sequence[Recording]], float]
-FINALISTS = 5  # candidates that are judged again after refitting simulations
-TELLS_APART = 4.0  # [σ] between a hypothesis and its best rival
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +61,7 @@ class NextExperiment:
         ranking: (name, value) of the finalists, the best first.
         responses: Name of a hypothesis -> its outputs under the profile: name -> (times, values).
         std: Foretold standard errors of the parameters, for `parameters`.
+        separated: Distance [σ] that tells two hypotheses apart.
     """
 
     profile: Recording
@@ -72,6 +72,7 @@ class NextExperiment:
     ranking: tuple[tuple[str, float], ...]
     responses: Mapping[str, Mapping[str, tuple[Array, Array]]]
     std: Mapping[str, float]
+    separated: float
 
     @property
     def gain(self) -> float:
@@ -102,8 +103,8 @@ class NextExperiment:
     def __str__(self) -> str:
         name = self.profile.name
         if self.purpose == "separate":
-            verdict = "tells them apart" if self.value >= TELLS_APART else (
-                f"does not tell them apart yet ({TELLS_APART:g} σ are needed)")
+            verdict = "tells them apart" if self.value >= self.separated else (
+                f"does not tell them apart yet ({self.separated:g} σ are needed)")
             return (f"Next experiment: {name}. The closest two hypotheses are {self.value:.3g} σ "
                     f"apart afterwards ({self.before:.3g} σ now): it {verdict}.")
         bounds = ", ".join(f"{key} ± {std:.2g}" for key, std in self.std.items())
@@ -116,6 +117,7 @@ def next_experiment(
     sigma: Sigma = None, candidates: Sequence[Recording] | None = None,
     bounds: Bounds | None = None, duration: float = 20.0, dt: float = 0.01,
     limits: Mapping[str, float] | None = None, seed: int = 0, workers: int = 1,
+    settings: Settings = DEFAULTS,
 ) -> NextExperiment:
     """The feasible profile that best separates hypotheses.
 
@@ -132,6 +134,7 @@ def next_experiment(
             until every hypothesis keeps to it.
         seed: Of the default candidates.
         workers: Threads that simulate hypotheses side by side; the choice does not depend on them.
+        settings: When hypotheses are told apart, and how many profiles are judged by refitting.
 
     Raises:
         BadSetting: With fewer than two hypotheses, no σ, or bounds that leave no room.
@@ -171,14 +174,14 @@ def next_experiment(
 
     offered = (_default_candidates(models, bounds, duration, dt, seed) if candidates is None
                else candidates)
-    return _chosen(watch, "separate", worst, refit, known, past, offered, limits or {})
+    return _chosen(watch, "separate", worst, refit, known, past, offered, limits, settings)
 
 
 def d_optimal(
     model: Model, recorded: Sequence[Recording] | Recording = (), sigma: Sigma = None,
     candidates: Sequence[Recording] | None = None, bounds: Bounds | None = None,
     duration: float = 20.0, dt: float = 0.01, limits: Mapping[str, float] | None = None,
-    seed: int = 0,
+    seed: int = 0, settings: Settings = DEFAULTS,
 ) -> NextExperiment:
     """The feasible profile from which a model's free parameters are learnt best.
 
@@ -194,8 +197,7 @@ def d_optimal(
     if not a_model(model).free_names:
         raise errors.BadSetting(errors.nothing_to_learn(model.name))
     past = [] if isinstance(recorded, Sequence) and not recorded else list(several(recorded))
-    models = {model.name: model}
-    watch = Watch(models, sigma)
+    watch = Watch({model.name: model}, sigma)
     known = watch.responses(past)
 
     def precision(new: Mapping[str, list[WhitenedResponse]], profiles: Sequence[Recording]
@@ -203,21 +205,22 @@ def d_optimal(
         every = [*known[model.name], *new[model.name]]
         return mean_precision(joined(every).jacobian) if every else 0.0
 
-    offered = (_default_candidates(models, bounds, duration, dt, seed) if candidates is None
+    offered = (_default_candidates(watch.models, bounds, duration, dt, seed) if candidates is None
                else candidates)
-    return _chosen(watch, "parameters", precision, precision, known, past, offered, limits or {})
+    return _chosen(watch, "parameters", precision, precision, known, past, offered, limits,
+                   settings)
 
 
 def _chosen(
     watch: Watch, purpose: Literal["separate", "parameters"], quick: Score,
     full: Score, known: Mapping[str, list[WhitenedResponse]], past: Sequence[Recording],
-    candidates: Sequence[Recording], limits: Mapping[str, float],
+    candidates: Sequence[Recording], limits: Mapping[str, float] | None, settings: Settings,
 ) -> NextExperiment:
     """The best candidate, ready to run: all are ranked by `quick`, the first of them by `full`."""
     tried = []
     for candidate in candidates:
         try:
-            profile, responses = _within(watch, candidate, limits)
+            profile, responses = _within(watch, candidate, limits or {})
         except errors.SimulationFailed:
             continue  # a profile too rough for one of the hypotheses is no candidate
         new = {name: [r] for name, r in responses.items()}
@@ -225,23 +228,22 @@ def _chosen(
     if not tried:
         raise errors.SimulationFailed(errors.no_profile_simulated(len(candidates)))
     tried.sort(key=lambda entry: -entry[0])
-    finalists = [(full(new, [profile]), profile, new) for _, profile, new in tried[:FINALISTS]]
+    few = tried[:settings.budget.finalists]
+    finalists = [(full(new, [profile]), profile, new) for _, profile, new in few]
     finalists.sort(key=lambda entry: -entry[0])
     value, profile, new = finalists[0]
     if past:
-        again = {name: responses[-1:] for name, responses in known.items()}
-        repeated = full(again, past[-1:])
+        repeated = full({name: responses[-1:] for name, responses in known.items()}, past[-1:])
     else:
         _, usual, responses_to_it = tried[len(tried) // 2]
         repeated = full(responses_to_it, [usual])
-    nothing: dict[str, list[WhitenedResponse]] = {name: [] for name in watch.models}
-    before = full(nothing, []) if past else 0.0
+    before = full({name: [] for name in watch.models}, []) if past else 0.0
     model = next(iter(watch.models.values()))
     std = _foretold(model, known, new) if purpose == "parameters" else {}
     return NextExperiment(
         profile, purpose, value, before, repeated,
         tuple((entry[1].name, entry[0]) for entry in finalists),
-        {name: responses[0].outputs for name, responses in new.items()}, std)
+        {name: r[0].outputs for name, r in new.items()}, std, settings.separated)
 
 
 def _foretold(model: Model, known: Mapping[str, list[WhitenedResponse]],

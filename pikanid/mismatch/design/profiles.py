@@ -15,7 +15,7 @@ from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 from pikanid.recording.excitation.sampling import grid
 
-DIGITS = 6  # of a profile's values: a file of decimals is run as it was designed
+DIGITS = 6  # numerical: of a profile's values: a file of decimals is run as it was designed
 
 
 @dataclass(frozen=True)

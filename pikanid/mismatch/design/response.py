@@ -20,8 +20,8 @@ from pikanid.simulation.translated import Translated
 
 Sigma = float | Mapping[str, float] | None
 Result = TypeVar("Result")
-SHARE = 0.01  # of σ that an integration error may reach
-COARSE = 16.0  # sub-steps of a sample beyond which a motion is too wild to plan with
+SHARE = 0.01  # numerical: of σ that an integration error may reach
+COARSE = 16.0  # numerical: sub-steps of a sample beyond which a motion is too wild to plan with
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,13 @@ from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.fitting.descent import start_from
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.search.screen import Screen
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.noise.level import NoiseModel
 from pikanid.recording import Channel, Recording
 from pikanid.simulation.synthetic import with_outputs
 
-TRIES = 7  # simulations of one effect on the way to the wanted visibility
-CLOSE = 0.1  # relative error of a distance that is good enough
+CLOSE = 0.1  # numerical: relative error of a distance that is good enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Sized:
     nominal: Hypothesis
 
 
-def recorded(model: Model, excitation: Recording, sigma: Sigma) -> Records:
+def recorded(model: Model, excitation: Recording, sigma: Sigma, settings: Settings) -> Records:
     """What a model would show, without noise but with its level.
 
     Raises:
@@ -65,7 +65,7 @@ def recorded(model: Model, excitation: Recording, sigma: Sigma) -> Records:
             raise errors.BadSetting(errors.sigma_unknown(o.name))
         levels[o.name] = NoiseModel(
             float(np.median(known)), 0.0, 0.0, full[o.name].interval, "given")
-    whitened = Whitened(model, Records((full,), (levels,)))
+    whitened = Whitened(model, Records((full,), (levels,), settings))
     theta = whitened.problem.guess
     if not whitened.choose_steps(theta, 0.01):
         raise errors.SimulationFailed(errors.too_rough_to_plan(model.name, excitation.name))
@@ -76,7 +76,7 @@ def recorded(model: Model, excitation: Recording, sigma: Sigma) -> Records:
     parts = np.split(response.y, np.cumsum([len(s.t) for s in samples])[:-1])
     channels = [Channel(o.name, s.t, y, o.unit, levels[o.name].sigma) for o, s, y in zip(
         (model.outputs[s.output] for s in samples), samples, parts, strict=True)]
-    return Records((full.with_channels(*channels),), (levels,))
+    return Records((full.with_channels(*channels),), (levels,), settings)
 
 
 def sized(candidate: Candidate, screen: Screen, own: np.ndarray, wanted: float, base: Hypothesis,
@@ -116,7 +116,7 @@ def sized(candidate: Candidate, screen: Screen, own: np.ndarray, wanted: float, 
     absorbed = 1.0  # of the first order's distance, what a whole refit leaves
     tried: list[tuple[float, float]] = []
     best: Sized | None = None
-    for _ in range(TRIES):
+    for _ in range(base.whitened.settings.budget.planned_sizes):
         values = dict(start_from(candidate, sign, amplitude, {}).values)
         if not scaling and name:
             values[name] = sign.start[name] * amplitude
@@ -175,7 +175,8 @@ def _shown(candidate: Candidate, values: Mapping[str, float], base: Hypothesis,
     """Values, recording and first-order distance [σ] of an effect; None if it cannot be run."""
     own = {p.name: values.get(p.name, p.value) for p in candidate.parameters}
     try:
-        records = recorded(candidate.applied(base.model).with_values(own), excitation, sigma)
+        records = recorded(candidate.applied(base.model).with_values(own), excitation, sigma,
+                           base.whitened.settings)
     except (errors.SimulationFailed, errors.BadModel):
         return None
     at = Whitened(base.model, records)

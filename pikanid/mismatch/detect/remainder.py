@@ -17,8 +17,6 @@ from pikanid.mismatch.detect.residual_tests import (
 )
 from pikanid.mismatch.detect.tangent import directions
 
-MOST_ROWS = 6000  # of a residual that is tested as it is
-
 
 def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
                    candidates: tuple[Candidate, ...], rate: float, seed: int = 0) -> Detection:
@@ -27,7 +25,7 @@ def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.n
     r and J may have more rows than there are samples: those of a prior.
     """
     more = len(r) - whitened.rows
-    count = -(-whitened.rows // MOST_ROWS)
+    count = -(-whitened.rows // whitened.settings.budget.rows_tested)
 
     def short(rows: np.ndarray) -> np.ndarray:
         return rows if count == 1 else condensed(rows, whitened.rows, count)
@@ -38,7 +36,7 @@ def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.n
     bands, inputs = lines(whitened, rate, more, short)
     units, _ = unit_columns(D, short(J))
     return detect(-short(r), short(J), units, one_sided, bands, inputs, whitened.records.spread,
-                  seed)
+                  whitened.settings, seed)
 
 
 def condensed(rows: np.ndarray, samples: int, count: int) -> np.ndarray:

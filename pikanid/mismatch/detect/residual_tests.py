@@ -14,9 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
-DRAWS, BATCH = 4000, 500
-CLEAR = (1e-6, 0.1)  # p-values beyond which more draws would decide nothing
-SHARES = (0.6, 0.2, 0.2)  # of α for catalogue, bands and inputs
+from pikanid.mismatch.settings.settings import Settings
+
+BATCH = 500  # numerical: draws at once, between which it is asked whether more would matter
+CLEAR = (1e-6, 0.1)  # numerical: p-values beyond which more draws would decide nothing
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,12 @@ def unit_columns(D: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarray,
-           bands: list[np.ndarray], inputs: np.ndarray, spread: float, seed: int = 0) -> Detection:
+           bands: list[np.ndarray], inputs: np.ndarray, spread: float, settings: Settings,
+           seed: int = 0) -> Detection:
     """Test a whitened residual r (N,) of a fit with Jacobian J (N, n).
 
     Draws go on until their number no longer matters (as in J. Besag and P. Clifford, Biometrika 78,
-    1991), or to `DRAWS`.
+    1991), or to the budget's.
 
     Args:
         units: (N, m) signs from `unit_columns`.
@@ -65,6 +67,8 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
         bands: Columns (N, k) of each band of frequency, of about unit length.
         inputs: (N, k) columns of the inputs' past, orthonormal.
         spread: Relative standard error of the noise's power.
+        settings: Shares of α, and the number of draws.
+        seed: Of the draws.
     """
     lines = project(J, np.concatenate([*bands, inputs], axis=1))
     L = np.concatenate([units, lines], axis=1)
@@ -89,13 +93,13 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
     z = L.T @ r
     observed = statistics(z[None])[0]
     drawn: list[np.ndarray] = []
-    for _ in range(DRAWS // BATCH):
+    for _ in range(max(settings.budget.draws // BATCH, 1)):
         noise = rng.standard_normal((BATCH, len(root)), np.float32) @ root
         noise *= np.exp(0.5 * spread * rng.standard_normal((BATCH, 1), np.float32))
         drawn.append(statistics(noise))
         p = [_tail(value, column) for value, column in
              zip(observed, np.concatenate(drawn).T, strict=True)]
-        total = min(1.0, min(q / share for q, share in zip(p, SHARES, strict=True)))
+        total = min(1.0, min(q / share for q, share in zip(p, settings.kinds, strict=True)))
         if not CLEAR[0] < total < CLEAR[1]:
             break
     return Detection(total, p[0], p[1], p[2], z[:m], float(r @ r))

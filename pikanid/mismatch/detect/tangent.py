@@ -22,10 +22,10 @@ from pikanid.recording import Recording
 from pikanid.simulation.input_paths import combined
 from pikanid.simulation.vectorfield import VectorField
 
-TOGETHER = 100  # signs integrated at once
-CELLS = 400_000  # of signs times steps: fewer at once on long recordings, to keep memory small
-STABLE = 1.5  # rate times step that the Runge-Kutta method follows well enough
-MOST_PARTS = 64  # of a step
+TOGETHER = 100  # numerical: signs integrated at once
+CELLS = 400_000  # numerical: signs times steps at once, to keep memory small
+STABLE = 1.5  # numerical: rate times step that the Runge-Kutta method follows well enough
+MOST_PARTS = 64  # numerical: of a step
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pikanid.mismatch.data.whitened import GROSS, Whitened, allowance
+from pikanid.mismatch.data.whitened import Whitened, allowance
 
 Answer = TypeVar("Answer")
 
@@ -51,11 +51,11 @@ class Closest:
         again.
         """
         good = whitened.choose_steps(theta, misfit=misfit(self.chi2))
-        weighed = tuple(whitened.weighed)
+        weighed, gross = tuple(whitened.weighed), whitened.settings.fits.gross
 
         def decided(chi2: float) -> object:
             loose = allowance(misfit(chi2))
-            return misfit(chi2) < GROSS, [
+            return misfit(chi2) < gross, [
                 (error <= share * loose, error > 20 * (share * loose)) for error, share in weighed]
 
         self.ask(decided)

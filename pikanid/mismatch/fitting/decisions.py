@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-RELATIVE = 1e-9  # of the larger of two numbers: rounding of sums and simulations stays below
-BAND = 1e-6  # of χ², and of criteria built from it: no statistic depends on so little
+RELATIVE = 1e-9  # numerical: of the larger number: rounding of sums and simulations stays below
+BAND = 1e-6  # numerical: of χ², and of criteria built from it: no statistic depends on so little
 Item = TypeVar("Item")
 
 

@@ -11,16 +11,12 @@ from operator import lt
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
-from pikanid.mismatch.data.whitened import GROSS, Whitened, allowance
+from pikanid.mismatch.data.whitened import Whitened, allowance
 from pikanid.mismatch.fitting.closest import Closest
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.optimise.levenberg_marquardt import Minimum, minimise
 
-WILD = 1000.0  # times the closest χ², and that of the noise: starts above both are given up
-GLANCE = 1e4  # χ² per row that is good enough to see that
-HOPS = 4  # times that a minimum is left over a hill, if that leads lower
-RENEWED = 3  # times that a fit goes on with finer steps
-TOLERATED = 2.0  # times the error that steps are chosen for, before they are chosen again
-COARSE = 5  # iterations that each of several starts gets before the best one goes on
+TOLERATED = 2.0  # numerical: times the error that steps are chosen for, before they are chosen anew
 
 
 @dataclass(frozen=True)
@@ -56,6 +52,8 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
               closest: Closest, limit: int, beyond: Callable[[float], bool]) -> Minimum | None:
     """The lowest of the minima that the starts lead to."""
     problem, rows = whitened.problem, max(whitened.rows, 1)
+    gross, budget = whitened.settings.fits.gross, whitened.settings.budget
+    give_up = impatient(beyond, whitened.settings)
     misfit = partial(per_row, rows=rows)
     best: Minimum | None = None
     for start in starts:
@@ -63,19 +61,19 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
         if guess is None:
             continue
         found = minimise(whitened.residual, guess, problem.lower, problem.upper,
-                         COARSE if len(starts) > 1 else limit, beyond=beyond)
+                         budget.several_starts if len(starts) > 1 else limit, give_up=give_up)
         if found is not None and (best is None or found.chi2 < best.chi2):
             best = found
     if best is None:
         return None
     coarse = best.chi2
-    finer = closest.ask(lambda chi2: misfit(chi2) > GROSS and coarse < 0.25 * chi2)
+    finer = closest.ask(lambda chi2: misfit(chi2) > gross and coarse < 0.25 * chi2)
     if finer or (not best.converged and not beyond(coarse)):
         if not closest.choose_steps(whitened, best.theta,
                                     lambda chi2: min(coarse / rows, misfit(chi2))):
             return None
         best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        beyond=beyond)
+                        give_up=give_up)
     return renewed(whitened, best, closest, limit, beyond)
 
 
@@ -85,7 +83,7 @@ def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: i
     in one step takes energy out that a real one gives back.
     """
     problem, misfit = whitened.problem, partial(per_row, rows=max(whitened.rows, 1))
-    for _ in range(RENEWED):
+    for _ in range(whitened.settings.budget.finer):
         if best is None or beyond(best.chi2):
             break
         worst, coarse = max(whitened.step_errors(best.theta)), best.chi2 / max(whitened.rows, 1)
@@ -103,8 +101,18 @@ def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: i
                     whitened.steps, before, strict=True)):
             break
         best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        beyond=beyond)
+                        give_up=impatient(beyond, whitened.settings))
     return best
+
+
+def impatient(beyond: Callable[[float], bool], settings: Settings
+              ) -> Callable[[int, float, float], bool]:
+    """When to give a fit up: what is `beyond` reach after some iterations, and falls slowly."""
+    def give_up(count: int, last: float, chi2: float) -> bool:
+        return (count >= settings.budget.patience and chi2 > settings.fits.slow * last
+                and beyond(chi2))
+
+    return give_up
 
 
 def _fine(error: float, misfit: Callable[[float], float], chi2: float) -> bool:
@@ -121,17 +129,19 @@ def basin_hopping(whitened: Whitened, best: Minimum, effect: Candidate, limit: i
     steps = [(share, 0.0) for share in effect.other_minima]
     if effect.absent and effect.site.rate:
         steps += [(-1.0, side * np.pi / effect.site.rate) for side in (-1, 1)]
-    for _ in range(HOPS):
+    settings = whitened.settings
+    for _ in range(settings.budget.hops):
         found = []
         for share, later in steps:
             theta = best.theta.copy()
             theta[first] *= share
             if later:
                 theta[more[0]] += later
-            found.append(minimise(whitened.residual, theta, problem.lower, problem.upper, COARSE,
-                                  beyond=partial(lt, best.chi2)))
+            found.append(minimise(whitened.residual, theta, problem.lower, problem.upper,
+                                  settings.budget.several_starts,
+                                  give_up=impatient(partial(lt, best.chi2), settings)))
         lower = min((m for m in found if m is not None), key=lambda m: m.chi2, default=best)
-        if lower.chi2 > best.chi2 - 1.0:
+        if lower.chi2 > best.chi2 - settings.fits.lower_hill:
             break
         best = lower
         if not best.converged:
@@ -147,14 +157,15 @@ def _begun(whitened: Whitened, start: Start | Mapping[str, float],
     A linear step out of a large misfit goes too far: the phase of an oscillation bends.  A start
     that has no origin and a χ² far beyond the closest, seen at a glance, is not worth finer steps.
     """
-    goal = place(whitened, start)
+    goal, fits = place(whitened, start), whitened.settings.fits
     home = place(whitened, start.origin) if isinstance(start, Start) else goal
     if not np.any(goal != home):
         if isinstance(start, Start):
-            if not closest.choose_steps(whitened, goal, lambda chi2: max(misfit(chi2), GLANCE)):
+            if not closest.choose_steps(
+                    whitened, goal, lambda chi2: max(misfit(chi2), fits.glance)):
                 return None
             seen = whitened.chi2(goal)
-            if not closest.ask(lambda chi2: seen <= WILD * (chi2 + max(whitened.rows, 1))):
+            if not closest.ask(lambda chi2: seen <= fits.wild * (chi2 + max(whitened.rows, 1))):
                 return None
         return goal if closest.choose_steps(whitened, goal, misfit) else None
     best, least = None, np.inf
@@ -163,7 +174,7 @@ def _begun(whitened: Whitened, start: Start | Mapping[str, float],
         if not closest.choose_steps(whitened, theta, misfit):
             continue
         size = whitened.chi2(theta)
-        if closest.ask(lambda chi2: misfit(chi2) < GROSS) or (share < 1 and size > least):
+        if closest.ask(lambda chi2: misfit(chi2) < fits.gross) or (share < 1 and size > least):
             return theta if best is None or size < least else best
         if size < least:
             best, least = theta, size

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
-from pikanid.mismatch.data.whitened import CERTAIN, GROSS, Records, Whitened
+from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.descent import (
     Start,
@@ -20,13 +20,9 @@ from pikanid.mismatch.fitting.descent import (
     renewed,
 )
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
+from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
 from pikanid.optimise.levenberg_marquardt import Minimum
-
-LIMIT = 30  # iterations of a fit
-HURRIED = 12  # and of one among gross misfits
-OTHER = 1.0  # of χ²: what another way to put the same effects together has to matter
-FAR = 2.0  # times the closest χ², and that of the noise: fits above both together are given up
 
 
 @dataclass(frozen=True)
@@ -73,7 +69,8 @@ class Hypothesis:
     @property
     def far(self) -> bool:
         """Whether so much is left that no test is needed to see it."""
-        return self.minimum.chi2 > CERTAIN * max(self.whitened.rows, 1)
+        certain = self.whitened.settings.fits.certain
+        return self.minimum.chi2 > certain * max(self.whitened.rows, 1)
 
     @property
     def pinned(self) -> bool:
@@ -151,15 +148,17 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     whitened = Whitened(model, records)
     rows = max(whitened.rows, 1)
     closest = closest or Closest()
-    limit = closest.ask(lambda chi2: LIMIT if per_row(chi2, rows) < GROSS else HURRIED)
+    fits, budget = records.settings.fits, records.settings.budget
+    limit = closest.ask(
+        lambda chi2: budget.iterations if per_row(chi2, rows) < fits.gross else budget.hurried)
 
     def beyond(size: float) -> bool:
-        return closest.ask(lambda chi2: size > FAR * (chi2 + rows))
+        return closest.ask(lambda chi2: size > fits.far * (chi2 + rows))
 
     best = descended(whitened, starts, closest, limit, beyond)
     hilly = [e for e in effects if (e.other_minima or e.absent) and e.key not in settled]
     failed_search = hits(hilly) and bool(starts) and (
-        best is None or (lost(best.chi2, rows) and (
+        best is None or (lost(best.chi2, rows, records.settings) and (
             len(effects) == 1 or not beyond(best.chi2))))
     whole = progressive_horizon(
         whitened, hilly, place(whitened, starts[0])) if failed_search else None
@@ -172,7 +171,8 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         best = renewed(whitened, best, closest, limit, beyond)
     if best is None:
         return None
-    penalty = _penalty(effects, whitened.rows, choices)
+    free = sum(max(len(e.parameters), 1) for e in effects)
+    penalty = price(free, len(effects), whitened.rows, choices, records.settings.choice_weight)
     found = Hypothesis(tuple(effects), model, whitened, best, penalty)
     for otherwise in (turned, read_otherwise):
         other = otherwise(found.effects)
@@ -186,12 +186,12 @@ def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, 
     """The fit with the same effects put together in another way, where that is closer."""
     model = extended(nominal, effects)
     whitened = Whitened(model, found.whitened.records)
-    theta = place(whitened, found.point)
+    theta, least = place(whitened, found.point), whitened.settings.fits.other_order
     if not closest.choose_steps(whitened, theta, partial(per_row, rows=max(whitened.rows, 1))) or \
-            abs(whitened.chi2(theta) - found.minimum.chi2) < OTHER:
+            abs(whitened.chi2(theta) - found.minimum.chi2) < least:
         return None
     best = descended(whitened, [found.point], closest, limit, beyond)
-    if best is None or best.chi2 > found.minimum.chi2 - OTHER:
+    if best is None or best.chi2 > found.minimum.chi2 - least:
         return None
     return Hypothesis(effects, model, whitened, best, found.penalty)
 
@@ -209,8 +209,3 @@ def turned(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
     last = {channel: [e for e in effects if e.channel == channel]
             for channel in ("input", "sensor")}
     return tuple(last[e.channel].pop() if e.channel in last else e for e in effects)
-
-
-def _penalty(effects: Sequence[Candidate], rows: int, choices: int) -> float:
-    free = sum(max(len(e.parameters), 1) for e in effects)
-    return free * float(np.log(rows)) + 2 * len(effects) * float(np.log(max(choices, 1)))

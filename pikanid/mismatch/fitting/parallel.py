@@ -8,20 +8,20 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
-AHEAD = 4  # jobs a thread that are begun: few wait for one that takes longer
-USEFUL = 2  # threads: beyond them what is begun ahead is too often begun in vain
-
 Job = TypeVar("Job")
 State = TypeVar("State")
 Result = TypeVar("Result")
 
 
-def threads(workers: int | None) -> int:
-    """How many threads to use: as many as there are cores, at most what is useful, by default."""
+AHEAD = 4  # numerical: jobs a thread that are begun; no result depends on it
+
+
+def threads(workers: int | None, useful: int) -> int:
+    """How many threads to use; by default as there are cores, and at most what is useful."""
     if workers is not None:
         return workers
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return min(cores or 1, USEFUL)
+    return min(cores or 1, useful)
 
 
 @contextlib.contextmanager

@@ -13,22 +13,18 @@ import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.fitting.descent import GLANCE
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.optimise.levenberg_marquardt import Evaluate, Minimum, minimise
 
-SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # of all motion, that beginnings hold
-FEWEST = 10  # rows a parameter that are worth a fit
-LOST = 3.0  # χ² per row from which on a beginning counts as unexplained
-LIMIT, HURRIED = 30, 10  # iterations of a fit, and of one over a hill
-HOPELESS = 300.0  # χ² per row above which no hill about a fit leads anywhere
-PLENTY = 3.0  # standard deviations of χ² beyond its mean that make a misfit
+# of all motion, that beginnings hold: each half as much again as the one before
+SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # numerical: where a path of fits leads along
 
 Known = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def rough(chi2: float, rows: int, effects: Sequence[Candidate]) -> bool:
+def rough(chi2: float, rows: int, effects: Sequence[Candidate], settings: Settings) -> bool:
     """Whether a fit that leaves χ² of so many rows may have missed impacts."""
-    return hits(effects) and chi2 > rows + PLENTY * float(np.sqrt(2 * rows))
+    return hits(effects) and chi2 > rows + settings.fits.rough * float(np.sqrt(2 * rows))
 
 
 def hits(effects: Sequence[Candidate]) -> bool:
@@ -36,9 +32,9 @@ def hits(effects: Sequence[Candidate]) -> bool:
     return any(e.levels for e in effects)
 
 
-def lost(chi2: float, rows: int) -> bool:
+def lost(chi2: float, rows: int, settings: Settings) -> bool:
     """Whether a fit that leaves χ² of so many rows explains nothing."""
-    return chi2 > LOST * rows
+    return chi2 > settings.fits.lost * rows
 
 
 def nothing(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,14 +64,14 @@ def progressive_horizon(whitened: Whitened, effects: Sequence[Candidate], theta:
     Returns:
         The fit of the whole; None where a beginning cannot be simulated, or not be explained.
     """
-    problem = whitened.problem
+    problem, settings = whitened.problem, whitened.settings
     found, level = None, 1.0
-    enough = FEWEST * len(theta) / max(whitened.rows, 1)
+    enough = settings.fits.rows_a_parameter * len(theta) / max(whitened.rows, 1)
     for share in (*(share for share in _beginnings(whitened) if share > enough), 1.0):
         part = Whitened(problem.model, whitened.records.beginning(int(share * whitened.rows))
                         ) if share < 1 else whitened
         found = _fitted(part, effects, theta, known, level if share < 1 else 1.0)
-        if found is None or lost(found.chi2, part.rows):
+        if found is None or lost(found.chi2, part.rows, settings):
             return None
         # noise that was taken for too little is no reason to look again
         theta, level = found.theta, max(1.0, found.chi2 / part.rows)
@@ -87,32 +83,34 @@ def _fitted(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray, kno
     """The fit of a beginning: from where the last one ended or, if that leaves more than noise of a
     `level`, from where the effects leave the least, and over the hills about that.
     """
-    problem, found = part.problem, None
+    problem, settings, found = part.problem, part.settings, None
 
-    def explained(start: np.ndarray, limit: int = LIMIT) -> bool:
+    def explained(start: np.ndarray, limit: int = settings.budget.iterations) -> bool:
         nonlocal found
         other = minimise(besides(part, known), start, problem.lower, problem.upper, limit)
         found = min((m for m in (found, other) if m), key=lambda m: m.chi2, default=None)
-        return found is not None and not rough(found.chi2 / level, part.rows, effects)
+        return found is not None and not rough(
+            found.chi2 / level, part.rows, effects, settings)
 
     if _runs(part, theta) and explained(theta):
         return found
     theta = _level(part, effects, theta)
     if not _runs(part, theta) or explained(theta) or (
-            found is not None and found.chi2 > HOPELESS * part.rows):
+            found is not None and found.chi2 > settings.fits.hopeless * part.rows):
         return found
     for effect in effects:
         for factor in effect.other_minima:
             beside = theta.copy()
             beside[_place(part, effect.parameters[0].name)] *= factor
-            if explained(beside, HURRIED):
+            if explained(beside, settings.budget.over_hills):
                 return found
     return found
 
 
 def _runs(part: Whitened, theta: np.ndarray) -> bool:
     # far off, every step of an impact that comes too early would have to be followed
-    return part.choose_steps(theta) or part.choose_steps(theta, misfit=GLANCE)
+    return part.choose_steps(theta) or part.choose_steps(
+        theta, misfit=part.settings.fits.glance)
 
 
 def _beginnings(whitened: Whitened) -> list[float]:
@@ -137,7 +135,7 @@ def _level(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray) -> n
         for values in effect.levels:
             at.append(theta.copy())
             at[-1][[_place(part, name) for name in values]] = list(values.values())
-        if part.choose_steps(at[len(at) // 2], misfit=GLANCE):
+        if part.choose_steps(at[len(at) // 2], misfit=part.settings.fits.glance):
             theta = min(at, key=part.chi2)
     return theta
 

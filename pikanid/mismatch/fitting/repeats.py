@@ -18,19 +18,14 @@ from pikanid.mismatch.data.noise_level import GRID, likeliest
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.detect.remainder import condensed
 from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.settings.noise import NoiseSettings
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 
-DRIVEN_ALIKE = 0.01  # of an input's r.m.s.: larger differences drive another experiment
-MOVED_ALIKE = 0.2  # of an output's half range: beyond it the same missing law leaves something else
-COVERED = 0.8  # of the longest repeat that the shortest has to last
-MODES = 800  # of a residual that are told apart
-WIDER = 1.25  # ratio of the frequencies between which a spectrum counts as flat
-CAUTION = 0.25  # of the number of independent modes that is believed: so much allows for its error
-HOLDS = 0.05  # p-value of the differences from which on the noise that was found is believed
-SHARED = 0.01  # of the largest singular value from which on a direction is one that fits take up
+SHARED = 0.01  # numerical: of the largest singular value: less of a direction no fit takes up
 
 
 @dataclass(frozen=True)
@@ -59,9 +54,10 @@ def repeats(model: Model, records: Records, later: Records | None) -> Repeats | 
     """
     parts = [records] if later is None else [records, later]
     recordings = [r for part in parts for r in part.recordings]
-    if len(recordings) < 2 or not same_experiment(model, recordings):
+    if len(recordings) < 2 or not same_experiment(
+            model, recordings, records.settings.noise):
         return None
-    fits = [_residuals(model, r, records.levels[0]) for r in recordings]
+    fits = [_residuals(model, r, records.levels[0], records.settings) for r in recordings]
     if any(fit is None for fit in fits):
         return None
     found: dict[str, NoiseModel] = {}
@@ -70,8 +66,8 @@ def repeats(model: Model, records: Records, later: Records | None) -> Repeats | 
         own = [fit[k] for fit in fits if fit is not None]
         level = records.levels[0][output.name]
         spectra = Spectra.of([t for t, _, _ in own], [r for _, r, _ in own],
-                             [J for _, _, J in own], level.interval)
-        refused |= spectra.beyond(level) < HOLDS / len(model.outputs)
+                             [J for _, _, J in own], level.interval, records.settings)
+        refused |= spectra.beyond(level) < records.settings.noise_refusal / len(model.outputs)
         found[output.name] = spectra.level(level)
         p_values.append(spectra.p_value)
         notes.append(
@@ -83,7 +79,7 @@ def repeats(model: Model, records: Records, later: Records | None) -> Repeats | 
     return Repeats(min(1.0, len(p_values) * min(p_values)), found, tuple(notes))
 
 
-def same_experiment(model: Model, recordings: Sequence[Recording]) -> bool:
+def same_experiment(model: Model, recordings: Sequence[Recording], alike: NoiseSettings) -> bool:
     """Whether recordings repeat one experiment: equal inputs, and about the same motion.
 
     Each counts from its own start.  Of two free swings from different amplitudes what a missing law
@@ -93,26 +89,26 @@ def same_experiment(model: Model, recordings: Sequence[Recording]) -> bool:
     >>> model = pk.systems.sloshing()
     >>> moved = lambda seed, noise: pk.simulate(
     ...     model, pk.excitation.planar_moves(6, 10.0, seed=seed), sigma=0.002, seed=noise)
-    >>> same_experiment(model, [moved(1, 1), moved(1, 2)])
+    >>> same_experiment(model, [moved(1, 1), moved(1, 2)], NoiseSettings())
     True
-    >>> same_experiment(model, [moved(1, 1), moved(2, 2)])
+    >>> same_experiment(model, [moved(1, 1), moved(2, 2)], NoiseSettings())
     False
     """
     if any(e.has(TIME) for e in model.equations.values()):
         return False
     first, *others = recordings
     spans = [_span(model, r) for r in recordings]
-    if min(spans) < COVERED * max(spans):
+    if min(spans) < alike.covered * max(spans):
         return False
     for other in others:
         for name in model.input_names:
             if (name in first) != (name in other):
                 return False
-            if name in first and _rms(_gap(first, other, name, min(spans))) > DRIVEN_ALIKE * _rms(
-                    _begin(first, name)[1]):
+            if name in first and _rms(_gap(first, other, name, min(spans))) > (
+                    alike.driven_alike * _rms(_begin(first, name)[1])):
                 return False
         # where a motion starts is its own
-        if any(np.std(_gap(first, other, name, min(spans))) > MOVED_ALIKE * np.std(
+        if any(np.std(_gap(first, other, name, min(spans))) > alike.moved_alike * np.std(
                 _begin(first, name)[1]) for name in model.output_names):
             return False
     return True
@@ -141,13 +137,13 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _residuals(model: Model, recording: Recording, levels: dict[str, NoiseModel]
-               ) -> list[tuple[Array, Array, Array]] | None:
+def _residuals(model: Model, recording: Recording, levels: dict[str, NoiseModel],
+               settings: Settings) -> list[tuple[Array, Array, Array]] | None:
     """Of every output, times (N,) from the start, residual (N,) and Jacobian (N, n) of the
     recording's own fit; None where it cannot be fitted.
     """
     white = {o: replace(level, rho=0.0) for o, level in levels.items()}
-    fit = fitted(model, (), Records((recording,), (white,)), [{}], 0)
+    fit = fitted(model, (), Records((recording,), (white,), settings), [{}], 0)
     if fit is None:
         return None
     parts, first = [], 0
@@ -170,6 +166,7 @@ class Spectra:
         power: (K,) of the noise: mean square of the m - 1 differences.
         freedom: m - 1.
         samples: N of each residual that is compared.
+        noise: What counts as flat, and how much of a number of modes is believed.
     """
 
     omega: Array
@@ -177,15 +174,16 @@ class Spectra:
     power: Array
     freedom: int
     samples: int
+    noise: NoiseSettings
 
     @staticmethod
     def of(times: Sequence[Array], residuals: Sequence[Array], jacobians: Sequence[Array],
-           interval: float) -> Spectra:
+           interval: float, settings: Settings) -> Spectra:
         """From residuals (N_i,) at times (N_i,) and their Jacobians (N_i, n)."""
         stop = min(float(t[-1]) for t in times)
         count = int(stop / interval * (1 + 1e-9)) + 1
         grid = interval * np.arange(count)
-        neighbours = -(-count // MODES)
+        neighbours = -(-count // settings.budget.modes)
 
         def even(t: Array, column: Array) -> Array:
             return condensed(np.interp(grid, t, column), count, neighbours)
@@ -199,14 +197,14 @@ class Spectra:
         common = seen.sum(axis=0) / np.sqrt(m)
         # what is not common to all: m - 1 orthonormal differences
         power = (np.sum(seen**2, axis=0) - common**2) / (m - 1)
-        return Spectra(omega / neighbours, common, power, m - 1, count)
+        return Spectra(omega / neighbours, common, power, m - 1, count, settings.noise)
 
     @property
     def blocks(self) -> np.ndarray:
         """First mode of each block in which a spectrum counts as flat."""
         edges = [1]
         while edges[-1] <= len(self.omega):
-            edges.append(max(edges[-1] + 1, round(WIDER * edges[-1])))
+            edges.append(max(edges[-1] + 1, round(self.noise.flat * edges[-1])))
         return np.array(edges[:-1]) - 1
 
     @property
@@ -226,7 +224,7 @@ class Spectra:
 
         The better of two, times two.  All power: F-distributed, with the number of modes that
         equal shares would need, (Σ P)²/Σ P², as that of rows (G. V. Bayley and J. M. Hammersley,
-        J. R. Stat. Soc. Suppl. 8, 1946), of which `CAUTION` is believed.  Block for block: within
+        J. R. Stat. Soc. Suppl. 8, 1946), of which some are believed.  Block for block: within
         one the ratio is F-distributed whatever the spectrum, and the logarithms of the p-values add
         up (R. A. Fisher).
         """
@@ -234,7 +232,7 @@ class Spectra:
 
         # each P is a χ² of m - 1 degrees: its square is too large by 1 + 2/(m - 1) on average
         equal = (1 + 2 / self.freedom) * np.sum(self.power) ** 2 / np.sum(self.power**2)
-        many = CAUTION * float(equal)
+        many = self.noise.caution * float(equal)
         share = float(np.sum(self.common**2) / np.sum(self.power))
         whole = float(f.sf(share, many, self.freedom * many))
         sizes, common, power = self._by_block(np.ones(len(self.omega)))

@@ -8,7 +8,7 @@ from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.problem.problem import Problem
 
-SHARE = 0.4  # of the time in which a phase turns by one radian: a parabola follows that
+SHARE = 0.4  # numerical: of the time in which a phase turns by one radian: a parabola follows that
 
 
 def own_beginning(problem: Problem, theta: np.ndarray, sites: tuple[Site, ...]) -> np.ndarray:

@@ -20,9 +20,7 @@ from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit, room
 from pikanid.model import Model
 from pikanid.optimise.levenberg_marquardt import Minimum, held, minimise
 
-NEAR, AGAIN = 3.0, 4  # standard deviations that a linearisation holds for; how often it is renewed
 Residual = tuple[int, str, np.ndarray, np.ndarray]  # recording, output, times, values
-MISSED = 15.0  # of χ² that a fit to all recordings may exceed fits to each by, where it is best
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
 def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared: list[int],
            prior: Prior) -> tuple[Minimum | None, Prior]:
     """Where parameters suit both a recording and a prior, and that prior, linearised near there."""
-    problem = whitened.problem
+    problem, settings = whitened.problem, whitened.settings
     effects = [e for e in hypothesis.effects if not e.absent]
 
     def known(before: Prior, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -153,18 +151,18 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
                         problem.upper, 25)
 
     found = suited(prior, guess)
-    suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects)
-    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
+    suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects, settings)
+    if suits and found is not None and rough(found.chi2, whitened.rows, effects, settings):
         whole = progressive_horizon(whitened, effects, guess, functools.partial(known, prior))
         found = min(found, whole or found, key=lambda m: m.chi2)
-    for _ in range(AGAIN):
-        if found is None or prior.distance(found.theta[shared]) < NEAR:
+    for _ in range(settings.budget.relinearised):
+        if found is None or prior.distance(found.theta[shared]) < settings.verdict.linear:
             break
         anew = elsewhere(prior, hypothesis, found.theta[shared])
         if anew is None:
             break
         prior, found = anew, suited(anew, found.theta)
-    if suits and found is not None and rough(found.chi2, whitened.rows, effects):
+    if suits and found is not None and rough(found.chi2, whitened.rows, effects, settings):
         # a wall that was hardly touched is stiffer than any line from there leads to
         both = _fitted_together(hypothesis, whitened, found, whitened.rows)
         begin = None if both is None else _part(both, whitened)
@@ -241,7 +239,7 @@ def _fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, le
     count = len(first.records.recordings)
     whitened = Whitened(hypothesis.model, Records(
         first.records.recordings + later.records.recordings,
-        first.records.levels + later.records.levels))
+        first.records.levels + later.records.levels, first.settings))
     whitened.step_as(first, later)
     own = {(f.name, f.recording): v for f, v in zip(
         first.problem.free, hypothesis.minimum.theta, strict=True)}
@@ -252,7 +250,7 @@ def _fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, le
     found = minimise(whitened.residual, start, problem.lower, problem.upper, 25)
     if found is None:
         return None
-    if found.chi2 > hypothesis.minimum.chi2 + left + MISSED:
+    if found.chi2 > hypothesis.minimum.chi2 + left + first.settings.verdict.missed:
         found = _from_levels(whitened, hypothesis, found)
     return whitened, found
 
@@ -281,7 +279,7 @@ def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> 
         # where a law does not act at all, others do as well
         seen = {whitened.chi2(theta): theta
                 for theta in (at(found.theta, level) for level in effect.levels)}
-        for chi2 in sorted(seen)[:AGAIN]:
+        for chi2 in sorted(seen)[:whitened.settings.budget.levels]:
             theta, name = seen[chi2], effect.parameters[0].name
             size = next(v for f, v in zip(problem.free, theta, strict=True) if f.name == name)
             beside = [at(theta, {name: share * size}) for share in (1.0, *effect.other_minima)]

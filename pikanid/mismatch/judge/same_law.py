@@ -6,18 +6,14 @@ from collections.abc import Sequence
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.settings.verdict import VerdictSettings
 from pikanid.model.parts import Parameter
 
-SHARP = 0.12  # standard error below which an exponent can say that it is a whole number
-WHOLE = 1.0  # standard errors from a whole number within which a sharp exponent is that
-OPEN = 3.0  # standard errors from a whole number within which an exponent may be that
-NARROW = 0.03  # of the half range: what is no wider cannot be told from its limit
 
-
-def integer_laws(near: list[Hypothesis]) -> list[Hypothesis]:
+def integer_laws(near: list[Hypothesis], asks: VerdictSettings) -> list[Hypothesis]:
     """A power law whose exponent is sharply a whole number is left to the law of that name."""
     kept = [h for h in near if not any(
-        (gap := _exponent_gap(h, whole)) is not None and gap < WHOLE and _sharp(h)
+        (gap := _exponent_gap(h, whole)) is not None and gap < asks.whole and _sharp(h, asks)
         for whole in (0, 1, 2))]
     return kept or near
 
@@ -37,15 +33,16 @@ def _exponent_gap(h: Hypothesis, whole: float) -> float | None:
     return abs(h.values[n] - whole) / max(h.std[n], 1e-9)
 
 
-def _sharp(h: Hypothesis) -> bool:
+def _sharp(h: Hypothesis, asks: VerdictSettings) -> bool:
     n = _exponent(h)
-    return n is not None and h.std[n] < SHARP
+    return n is not None and h.std[n] < asks.sharp
 
 
-def _open_exponent(h: Hypothesis, whole: float) -> bool:
+def _open_exponent(h: Hypothesis, whole: float, asks: VerdictSettings) -> bool:
     """Whether the exponent of a hypothesis' power law may be `whole`, or something else as well."""
     gap = _exponent_gap(h, whole)
-    return gap is not None and gap < OPEN and not (gap < WHOLE and _sharp(h))
+    return gap is not None and gap < asks.open and not (
+        gap < asks.whole and _sharp(h, asks))
 
 
 def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]
@@ -58,7 +55,7 @@ def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]
                  if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
 
 
-def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
+def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: VerdictSettings
                  ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
@@ -81,10 +78,11 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis]
                     table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.names)))
         for e in h.effects:
             if leader is h and isinstance(e.exponent, int | float) and (
-                    wider := _power_law(h, e, tried)) and _open_exponent(wider[0], e.exponent):
+                    wider := _power_law(h, e, tried)) and _open_exponent(
+                        wider[0], e.exponent, asks):
                 table[e.key] += wider[1].names
                 absorbed.add(wider[0].key)
             if leader is h and e.limit and (
-                    h.values[e.limit.parameter] < NARROW * e.site.half_range):
+                    h.values[e.limit.parameter] < asks.narrow * e.site.half_range):
                 table[e.key] += e.limit.ids
     return [h for h in first.values() if h.key not in absorbed], twins

@@ -9,27 +9,15 @@ from typing import Literal
 
 import numpy as np
 
-from pikanid.mismatch.data.whitened import GROSS
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import below, in_order, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Predict, speaks, why_not
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.same_law import integer_laws, merged_twins
+from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.settings.verdict import VerdictSettings
 
-WITHIN = 6.0  # difference of the criterion below which hypotheses are not told apart
-MANY = 12  # of them that are tested: no reader wants more
-BEHIND = 3.0  # times that, and a hypothesis can still be what predicts best
-GUARD = 4.0  # what a law outside the catalogue is handicapped by: it is the rarer explanation
-PART = 0.5  # of the nominal held-out misfit, a quarter of its square, that a part may leave
-ALIKE = 1.1  # ratio of held-out misfits below which two hypotheses predict alike
-WORTH = 0.05  # of the nominal held-out misfit: what an effect must take away where a part remains
-OPEN = 2.0  # of the criterion: two explanations that differ by less are given side by side
-SAME = 1.0  # of the criterion: what differs by less may be the same law, written in another way
-PREDICTED = 8  # hypotheses of which that is found out
-# p-values below which a hypothesis leaves something unexplained, in the recordings it was fitted to
-# or in held-out ones, and in all together: one right hypothesis in a hundred is refused
-ADEQUATE, TOGETHER = 0.005, 0.001
 Test = Callable[[Hypothesis], Detection]
 
 
@@ -54,8 +42,8 @@ class Answer:
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,
            checked: bool, proves: bool,
-           ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None,
-           alpha: float = 0.01) -> Answer:
+           settings: Settings,
+           ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None) -> Answer:
     """Choose what is given.
 
     Args:
@@ -64,52 +52,55 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         test, predict: Adequacy on the train and on the held-out recordings.
         checked: Whether there is anything held out.
         proves: Whether that is a recording of its own.
+        settings: What counts as evidence.
         ahead: Given work that is all needed, before it is: to do it side by side.
-        alpha: Rate of false alarms: what held-out recordings must be able to refute depends on it.
     """
     reasons: dict[frozenset[str], str] = {}
     spare: dict[frozenset[str], str] = {}
+    asks, budget, adequate = settings.verdict, settings.budget, settings.adequate
+    within = asks.indistinct
     tried = [h for h in ranked if h.effects]
     base = next(h for h in ranked if not h.effects)
     if not tried or not below(tried[0].score(scale), base.score(scale)):
         return Answer("unnamed", (), tuple(tried[:3]))
-    lowest = min(_handicapped(h, scale) for h in tried)
-    close = [h for h in tried if below(h.score(scale), lowest + WITHIN)][:MANY]
-    near = integer_laws(close)
+    lowest = min(_handicapped(h, scale, asks) for h in tried)
+    close = [h for h in tried if below(h.score(scale), lowest + within)][:budget.tested]
+    near = integer_laws(close, asks)
     for h in (h for h in close if h not in near):
         spare[h.key] = "its exponent is a whole number: that law has a name of its own"
     ahead([partial(ask, h) for h in near for ask in (predict, test)])
 
     def total(h: Hypothesis) -> float:
-        return criterion(h, predict(h), scale) if predict(h) or not checked else np.inf
+        return criterion(h, predict(h), scale, asks) if predict(h) or not checked else np.inf
 
     def passes(h: Hypothesis) -> bool:
-        if smaller(test(h).p_value, ADEQUATE):
+        if smaller(test(h).p_value, adequate):
             reasons[h.key] = "leaves something unexplained in the recording"
         elif checked and ((seen := predict(h)) is None
-                          or smaller(seen.detection.p_value, ADEQUATE)):
+                          or smaller(seen.detection.p_value, adequate)):
             reasons[h.key] = "does not predict the held-out recording"
         return h.key not in reasons
 
     def explains_all(h: Hypothesis) -> bool:
         seen = predict(h)
         if checked and seen and (both := seen.together) and smaller(
-                both.p_value, TOGETHER):
+                both.p_value, settings.refusal_together):
             reasons[h.key] = "leaves something unexplained in all recordings together"
         return h.key not in reasons
 
     if checked:
         ahead([partial(getattr, seen, "detection") for h in near
-               if not smaller(test(h).p_value, ADEQUATE) and (seen := predict(h))])
+               if not smaller(test(h).p_value, adequate) and (seen := predict(h))])
     given = [h for h in near if passes(h)]
-    for h in [h for h in given if _needless(h, near, given, scale)]:
+    for h in [h for h in given if _needless(h, near, given, scale, asks)]:
         spare[h.key] = "holds more than is needed"
         given.remove(h)
     if checked:
         # what the recording speaks against a little may predict better
         best = min(map(total, near))
         behind = [h for h in tried if h not in near
-                  and below(_handicapped(h, scale), lowest + BEHIND * WITHIN)][:PREDICTED]
+                  and below(_handicapped(h, scale, asks), lowest + asks.behind * within)
+                  ][:budget.predicted]
         given += [h for h in behind if below(total(h), best) and passes(h)]
         for h in [h for h in given if any(
                 o.key < h.key and below(total(o), total(h)) and speaks(o, h, predict)
@@ -117,7 +108,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             reasons[h.key] = "the held-out recording speaks against one of its effects"
             given.remove(h)
     if checked and len(given) > 1:
-        given = _by_evidence(given, total, reasons)
+        given = _by_evidence(given, total, reasons, asks)
     if checked:
         ahead([partial(getattr, seen, "together") for h in given if (seen := predict(h))])
     given = [h for h in given if explains_all(h)]
@@ -125,82 +116,86 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     known = [h for h in given if h.known]
     if not known:
         rest = tuple(h for h in near if h not in given) + tuple(given)
-        most = _largest_part(base, tried, scale, predict) if not given else ()
+        most = _largest_part(base, tried, scale, predict, settings) if not given else ()
         if most:
-            merged, twins = merged_twins(list(most), tried)
-            return Answer("unconfirmed", _most_probable_first(merged, predict, scale),
+            merged, twins = merged_twins(list(most), tried, asks)
+            return Answer("unconfirmed", _most_probable_first(merged, predict, scale, asks),
                           tuple(h for h in rest if h not in most)[:5], twins, reasons)
         return Answer("unnamed", (), rest[:5], {}, reasons)
-    merged, twins = merged_twins(known, tried)
+    merged, twins = merged_twins(known, tried, asks)
     # laws outside the catalogue that would do as well are for the reader to know
     lowest = min(map(total, known))
     open_to, more = merged_twins(
-        [h for h in outside if below(total(h) - _handicap(h), lowest + WITHIN)], tried)
+        [h for h in outside if below(total(h) - _handicap(h, asks), lowest + within)], tried,
+        asks)
     merged, twins = merged + open_to, {**twins, **more}
-    doubt = why_not(known[0], ranked, predict, scale, alpha) if proves else ""
+    doubt = why_not(known[0], ranked, predict, scale, settings) if proves else ""
     if doubt and not outside:
         # what it holds may be sure by itself, whatever may be there besides
         simplest = min((h for h in known if h.key <= known[0].key), key=lambda h: len(h.effects))
-        doubt = why_not(simplest, ranked, predict, scale, alpha) and doubt
+        doubt = why_not(simplest, ranked, predict, scale, settings) and doubt
     # beside one name, such a law may explain it by a factor e better: that is no evidence
-    margin = OPEN if len(merged) == 2 else 0.0
+    margin = asks.side_by_side if len(merged) == 2 else 0.0
     if proves and not known[0].symbolic and any(
-            below(total(h) - _handicap(h), lowest - margin) for h in outside):
+            below(total(h) - _handicap(h, asks), lowest - margin) for h in outside):
         doubt = "a law outside the catalogue explains it better"
-    if proves and any(below(total(h), lowest - WITHIN) for h in near if h.key in reasons):
+    if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
-    return Answer(verdict, _most_probable_first(merged, predict, scale), tuple(others), twins,
+    return Answer(verdict, _most_probable_first(merged, predict, scale, asks), tuple(others), twins,
                   {**spare, **reasons}, doubt)
 
 
 def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
-                  predict: Predict) -> tuple[Hypothesis, ...]:
+                  predict: Predict, settings: Settings) -> tuple[Hypothesis, ...]:
     """The smallest known hypotheses that predict held-out data as well as any, and far better than
     nothing does, though not down to the noise: part of what is missing, given as unconfirmed.
     """
+    asks = settings.verdict
     # what happens once takes up much of any misfit, and no other recording can confirm it
     lasting = [h for h in tried if h.known and not any(e.absent for e in h.effects)]
-    known = in_order(lasting, lambda h: h.score(scale), Hypothesis.place)[:PREDICTED]
-    closest = in_order(tried, lambda h: _handicapped(h, scale), Hypothesis.place)[0]
+    count = settings.budget.predicted
+    known = in_order(lasting, lambda h: h.score(scale), Hypothesis.place)[:count]
+    closest = in_order(tried, lambda h: _handicapped(h, scale, asks), Hypothesis.place)[0]
     nominal = predict(base)
     if not known or nominal is None or (
-            not closest.known and scale < GROSS
-            and below(_handicapped(closest, scale), known[0].score(scale))):
+            not closest.known and scale < settings.fits.gross
+            and below(_handicapped(closest, scale, asks), known[0].score(scale))):
         return ()
     found = {h.key: p.misfit for h in known if (p := predict(h)) is not None}
     lowest = min(found.values(), default=np.inf)
-    if smaller(PART * nominal.misfit, lowest):
+    if smaller(asks.part * nominal.misfit, lowest):
         return ()
-    enough = max(ALIKE * lowest, lowest + WORTH * nominal.misfit)
+    enough = max(asks.alike * lowest, lowest + asks.worth * nominal.misfit)
     good = [h for h in known if not smaller(enough, found.get(h.key, np.inf))]
     fewest = min(len(h.effects) for h in good)
     return tuple(in_order((h for h in good if len(h.effects) == fewest), lambda h: found[h.key],
                           Hypothesis.place, band=0.0)[:3])
 
 
-def _handicap(h: Hypothesis) -> float:
-    return GUARD * sum(not e.known for e in h.effects)
+def _handicap(h: Hypothesis, asks: VerdictSettings) -> float:
+    return asks.decoy_handicap * sum(not e.known for e in h.effects)
 
 
-def _handicapped(h: Hypothesis, scale: float) -> float:
-    return h.score(scale) + _handicap(h)
+def _handicapped(h: Hypothesis, scale: float, asks: VerdictSettings) -> float:
+    return h.score(scale) + _handicap(h, asks)
 
 
-def criterion(h: Hypothesis, predicted: HeldOut | None, scale: float) -> float:
+def criterion(h: Hypothesis, predicted: HeldOut | None, scale: float, asks: VerdictSettings
+              ) -> float:
     """The criterion over the recording and the held-out one, where there is one."""
-    return _handicapped(h, scale) + (0.0 if predicted is None else predicted.deviance / scale)
+    return _handicapped(h, scale, asks) + (0.0 if predicted is None else predicted.deviance / scale)
 
 
-def _most_probable_first(given: Sequence[Hypothesis], predict: Predict, scale: float
-                         ) -> tuple[Hypothesis, ...]:
-    return tuple(in_order(given, lambda h: criterion(h, predict(h), scale), Hypothesis.place))
+def _most_probable_first(given: Sequence[Hypothesis], predict: Predict, scale: float,
+                         asks: VerdictSettings) -> tuple[Hypothesis, ...]:
+    return tuple(in_order(given, lambda h: criterion(h, predict(h), scale, asks), Hypothesis.place))
 
 
 def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothesis],
-              scale: float) -> bool:
+              scale: float, asks: VerdictSettings) -> bool:
     """Whether a hypothesis adds effects to a far better one, or laws outside the catalogue to a
     better one.
 
@@ -210,12 +205,13 @@ def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothe
     if h.symbolic and any(o.symbolic and len(o.minimum.theta) < len(h.minimum.theta)
                           and not below(h.score(scale), o.score(scale)) for o in given):
         return True  # a longer formula for the same
-    return any(o.key < h.key and not below(_handicapped(h, scale), _handicapped(o, scale) + (
-        0.0 if o in given and not h.known else WITHIN)) for o in near)
+    own = _handicapped(h, scale, asks)
+    return any(o.key < h.key and not below(own, _handicapped(o, scale, asks) + (
+        0.0 if o in given and not h.known else asks.indistinct)) for o in near)
 
 
 def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, test: Test,
-                  predict: Predict, checked: bool, proves: bool, alpha: float = 0.01) -> Answer:
+                  predict: Predict, checked: bool, proves: bool, settings: Settings) -> Answer:
     """The answer where nothing in the catalogue would do, after formulas have been fitted as well.
 
     A formula is given where it explains about as much as the laws outside the catalogue that kept
@@ -223,18 +219,22 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
     """
     if not any(h.symbolic for h in ranked):
         return answer
-    found = settle(ranked, scale, test, predict, checked, proves, alpha=alpha)
-    totals = {h.key: criterion(h, predict(h), scale) - _handicap(h) for h in found.given}
+    asks = settings.verdict
+    found = settle(ranked, scale, test, predict, checked, proves, settings)
+    totals = {h.key: criterion(h, predict(h), scale, asks) - _handicap(h, asks)
+              for h in found.given}
     least = min((totals[h.key] for h in found.given if h.symbolic), default=-np.inf)
     given = tuple(h for h in found.given if h.symbolic
-                  or below(SAME, abs(totals[h.key] - least)))
+                  or below(asks.same_law, abs(totals[h.key] - least)))
     if not given or any(h.known and not h.symbolic for h in given):
         return answer
-    reach = next((h for h in given if h.symbolic), given[0]).score(scale) + BEHIND * WITHIN
+    best = next((h for h in given if h.symbolic), given[0]).score(scale)
+    reach = best + asks.behind * asks.indistinct
     likely = [h for h in ranked if h.effects and not h.known and h not in given
-              and below(h.score(scale), reach)][:PREDICTED]
-    apart = [criterion(h, predict(h), scale) - _handicap(h) - least for h in likely if predict(h)]
-    if any(below(SAME, abs(d)) and below(d, WITHIN) for d in apart):
+              and below(h.score(scale), reach)][:settings.budget.predicted]
+    apart = [criterion(h, predict(h), scale, asks) - _handicap(h, asks) - least
+             for h in likely if predict(h)]
+    if any(below(asks.same_law, abs(d)) and below(d, asks.indistinct) for d in apart):
         doubt = "another law outside the catalogue explains it about as well"
         return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
     return replace(found, given=given, verdict="named" if found.verdict == "set" and len(given) == 1
@@ -242,11 +242,11 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
 
 
 def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
-                 reasons: dict[frozenset[str], str]) -> list[Hypothesis]:
+                 reasons: dict[frozenset[str], str], asks: VerdictSettings) -> list[Hypothesis]:
     """Without those that predict the held-out recording clearly worse than another does."""
     found = {h.key: total(h) for h in given}
     best = min(found.values())
-    kept = [h for h in given if below(found[h.key] - _handicap(h), best + WITHIN)]
+    kept = [h for h in given if below(found[h.key] - _handicap(h, asks), best + asks.indistinct)]
     for h in given:
         if h not in kept:
             reasons[h.key] = "predicts the held-out recording worse"

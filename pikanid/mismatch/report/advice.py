@@ -9,15 +9,13 @@ import numpy as np
 from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.data.whitened import Records
-from pikanid.mismatch.design.next_experiment import TELLS_APART, NextExperiment, next_experiment
+from pikanid.mismatch.design.next_experiment import NextExperiment, next_experiment
 from pikanid.mismatch.design.profiles import profiles
 from pikanid.mismatch.judge.verdict import Verdict
 from pikanid.mismatch.report.findings import Explanation, titles_apart
 from pikanid.model import Model
 from pikanid.model.parts import Input
 
-LONGEST = 20.0  # [s] of a profile that is proposed
-COMPARED = 2  # of the hypotheses in a set, the most probable
 PROVE = ("Record the system once more, driven differently and over another range of amplitudes, "
          "and give that recording as held-out: it decides what is confirmed.")
 EXPLORE = ("No law in the catalogue holds. Record (1) a free decay over a three-fold range of "
@@ -46,7 +44,7 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         return ""
     outside = any(e.ids[0].startswith(SYMBOLIC) for h in given for e in h.effects)
     if verdict == "set" or (weak and outside and len(given) > 1):
-        return _separating(given[:COMPARED], records, rate, workers)
+        return _separating(given[:records.settings.budget.compared], records, rate, workers)
     if not given:
         return EXPLORE
     return STRENGTHEN if weak else EXPLORE if proves else PROVE
@@ -65,7 +63,7 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     if found is None:
         return text + "choose another excitation; of the usual ones none can be simulated with all."
     apart = f"{found.value:.2g} standard deviations apart"
-    if found.value < TELLS_APART:
+    if found.value < found.separated:
         return (f"No usual profile tells {' from '.join(names)} (at best {apart}): only a larger "
                 "stroke, less noise or a second sensor would.")
     outcome = (f"expected to set them {apart} (now {found.before:.2g}; repeating the last "
@@ -79,11 +77,13 @@ def _best(models: Mapping[str, Model], records: Records, driven: Input, rate: fl
     models; None where nothing can.
     """
     sigma = {o: level.sigma for o, level in records.levels[0].items()}
+    settings = records.settings
     for recorded in (records.recordings, ()):
         try:
-            offered = profiles(min(rate / (2 * np.pi), 5.0), duration=LONGEST,
+            offered = profiles(min(rate / (2 * np.pi), 5.0), duration=settings.budget.profile,
                                channel=driven.name, unit=driven.unit, draws=1)
-            return next_experiment(models, recorded, sigma, offered, workers=workers)
+            return next_experiment(models, recorded, sigma, offered, workers=workers,
+                                   settings=settings)
         except errors.PikanidError:
             continue
     return None

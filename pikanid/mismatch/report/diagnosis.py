@@ -27,7 +27,7 @@ class Diagnosis(DiagnosisData):
             (found, but not proved on other data), "unnamed" (something is missing that neither the
             catalogue nor a confirmed formula explains).
         p_value: Of a mismatch as large as seen, if there is none.
-        alpha: Rate of false alarms that was asked for.
+        settings: What was taken as given: error rates, thresholds, budgets.
         where: In which channel, equation, states and seconds.
         hypotheses: Explanations given, most probable first.
         rejected: The closest ones that lost, and why.
@@ -69,6 +69,7 @@ class Diagnosis(DiagnosisData):
             "undetectable_below": {
                 n: {"value": v.value, "unit": v.unit} for n, v in self.undetectable_below.items()},
             "next_experiment": self.next_experiment,
+            "settings": self.settings.to_dict(),
         }
 
     def plot(self) -> matplotlib.figure.Figure:

@@ -39,7 +39,7 @@ def plot_diagnosis(dx: DiagnosisData) -> matplotlib.figure.Figure:
     axes = np.atleast_1d(upper.subplots(rows, 1))
     _train(axes[0], dx)
     if force is not None:
-        _force(axes[1], force)
+        _force(axes[1], force, 1 - dx.settings.band)
         axes[1].sharex(axes[0])
     why = "band excludes zero" if force is not None and force.resolved else "louder than noise"
     for axis in axes[:first]:
@@ -57,7 +57,7 @@ def plot_diagnosis(dx: DiagnosisData) -> matplotlib.figure.Figure:
             below[0].plot(proof.t, proof.after, color=AFTER, lw=1, label="extended model")
             below[1].plot(proof.t, proof.measured - proof.after, color=AFTER, lw=0.8,
                          label=f"extended, RMSE {proof.rmse_after:.3g}")
-        if dx.hypotheses and proof.sensitive:
+        if dx.hypotheses and proof.sensitive(dx.settings):
             below[0].plot(proof.t, proof.moved, color=MOVED, lw=1, label="within its errors")
             below[1].plot(proof.t, proof.measured - proof.moved, color=MOVED, lw=0.8,
                           label=f"within its errors, RMSE {proof.rmse_moved:.3g}")
@@ -83,8 +83,8 @@ def _train(axis: matplotlib.axes.Axes, dx: DiagnosisData) -> None:
     axis.set(ylabel=fit.unit or "residual", title="What the model leaves of the recording")
 
 
-def _force(axis: matplotlib.axes.Axes, force: ForceOverTime) -> None:
-    for width, alpha, name in ((force.critical, 0.12, "95 % band, at once"),
+def _force(axis: matplotlib.axes.Axes, force: ForceOverTime, level: float) -> None:
+    for width, alpha, name in ((force.critical, 0.12, f"{100 * level:g} % band, at once"),
                                (1.96, 0.25, "pointwise")):
         axis.fill_between(force.t, force.values - width * force.std,
                           force.values + width * force.std, color=AFTER, alpha=alpha, lw=0,

@@ -8,16 +8,17 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Predict
 from pikanid.mismatch.judge.verdict import Answer, Test, criterion
 from pikanid.mismatch.report.findings import Explanation, NamedEffect, values_of
+from pikanid.mismatch.settings.verdict import VerdictSettings
 
 
-def explanations(answer: Answer, scale: float, test: Test, predict: Predict
-                 ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
+def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
+                 asks: VerdictSettings) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
     """Given and rejected hypotheses, for reports."""
     pool = [*answer.given, *answer.others]
     if not pool:
         return (), ()
 
-    scores = np.array([criterion(h, predict(h), scale) for h in answer.given] or [0.0])
+    scores = np.array([criterion(h, predict(h), scale, asks) for h in answer.given] or [0.0])
     weights = np.exp(-0.5 * (scores - scores.min()))
     weights = weights / weights.sum()
 

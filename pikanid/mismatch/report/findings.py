@@ -13,11 +13,9 @@ from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.patch import Patch
 from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
-
-# times the held-out RMSE with parameters moved within their errors: more is theirs, not a law's
-SENSITIVE = 1.2
 
 
 @dataclass(frozen=True)
@@ -96,12 +94,11 @@ class Proof:
     after: np.ndarray
     moved: np.ndarray
 
-    @property
-    def sensitive(self) -> bool:
+    def sensitive(self, settings: Settings) -> bool:
         """Whether the prediction depends on how exactly the parameters are known: after impacts, a
         small error makes another motion.
         """
-        return any(e.after > SENSITIVE * e.moved for e in self.outputs.values())
+        return any(e.after > settings.verdict.sensitive * e.moved for e in self.outputs.values())
 
     @property
     def first(self) -> OutputError:
@@ -151,7 +148,7 @@ class DiagnosisData:
 
     verdict: Verdict
     p_value: float
-    alpha: float
+    settings: Settings
     where: Where
     hypotheses: tuple[Explanation, ...]
     rejected: tuple[Explanation, ...]
@@ -167,6 +164,11 @@ class DiagnosisData:
     force_over_time: ForceOverTime | None = None
     patch: Patch | None = None
     doubt: str = ""
+
+    @property
+    def alpha(self) -> float:
+        """Rate of false alarms that was asked for."""
+        return self.settings.alpha
 
     @property
     def mismatch(self) -> bool:

@@ -19,9 +19,6 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Value, Where
 
-WINDOWS = 40
-CLEAR = 5.0  # standard errors from which on an effect counts as detectable
-
 
 def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site],
              candidates: Sequence[Candidate]) -> Site:
@@ -40,7 +37,7 @@ def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site
 
 
 def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
-           shape: ForceShape | None, force: ForceOverTime | None, alpha: float) -> Where:
+           shape: ForceShape | None, force: ForceOverTime | None) -> Where:
     """The place of a mismatch, as far as the answer and the nominal residual tell.
 
     In time it is where the force that would explain it is not zero, or, without a force that the
@@ -62,7 +59,7 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
     if answer.given:
         static = all(e.static for e in best.effects)
     elif shape is not None:
-        states, static = shape.depends_on(alpha), shape.static_law
+        states, static = shape.depends_on(base.whitened.settings), shape.static_law
     spans: tuple[tuple[float, float], ...] = ()
     if force is not None and force.resolved:
         spans = force.windows
@@ -72,19 +69,20 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
 
 
 def smallest(base: Hypothesis, candidates: Sequence[Candidate]) -> dict[str, Value]:
-    """The size of each effect that would stand out by `CLEAR` standard errors, by id.
+    """The size of each effect that would stand out by enough standard errors, by id.
 
     Only of effects that grow from nothing in proportion to one parameter.
     """
     found = directions(base.whitened, base.minimum.theta, [c for c in candidates if c.known])
     _, lengths = unit_columns(found.D, base.minimum.J)
     sizes: dict[str, Value] = {}
+    visible = base.whitened.settings.visible
     for owner, sign, length in zip(found.owner, found.directions, lengths, strict=True):
         candidate = found.candidates[owner]
         if length > 0 and sign.scales and candidate.parameters and sign.start:
             name = next(iter(sign.start))
             unit = next(p.unit for p in candidate.parameters if p.name == name)
-            size = CLEAR / float(length) * abs(sign.start[name])
+            size = visible / float(length) * abs(sign.start[name])
             for key in candidate.ids:
                 if key not in sizes or size < sizes[key].value:
                     sizes[key] = Value(size, 0.0, unit)
@@ -95,17 +93,18 @@ def loud_windows(base: Hypothesis) -> tuple[tuple[float, float], ...]:
     """Seconds in which the whitened nominal residual of an output of the first recording is louder
     than noise can be.
     """
-    outputs = base.whitened.problem.experiments[0].samples
+    outputs, settings = base.whitened.problem.experiments[0].samples, base.whitened.settings
     t = np.concatenate([s.t for s in outputs])
     owner = np.repeat(np.arange(len(outputs)), [len(s.t) for s in outputs])
     r = base.minimum.r[: len(t)]
-    edges = np.linspace(t.min(), t.max(), WINDOWS + 1)
+    edges = np.linspace(t.min(), t.max(), settings.budget.windows + 1)
     loud = []
     for a, b in pairwise(edges):
         inside = (t >= a) & (t < b)
         counts = np.bincount(owner[inside], minlength=len(outputs))
         powers = np.bincount(owner[inside], r[inside] ** 2, len(outputs))
-        if np.any((counts > 3) & (powers > counts + 4 * np.sqrt(2 * counts))):
+        loudest = counts + settings.beyond.louder * np.sqrt(2 * counts)
+        if np.any((counts > 3) & (powers > loudest)):
             loud.append((float(a), float(b)))
     joined: list[tuple[float, float]] = []
     for a, b in loud:

@@ -7,7 +7,7 @@ from pikanid.mismatch.report.findings import DiagnosisData
 
 
 def lines_of(dx: DiagnosisData) -> list[str]:
-    """Verdict, where, what, proof, what to do next and notes, line by line."""
+    """Verdict, where, what, proof, what to do next, notes and settings, line by line."""
     lines = [dx.sentence()]
     if dx.mismatch:
         place = dx.where.channel if dx.where.channel != "undecided" else "channel undecided"
@@ -27,7 +27,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
         told = []
         for output, error in p.outputs.items():
             moved = (f", {error.moved:.3g} with the parameters moved within their errors"
-                     if p.sensitive else "")
+                     if p.sensitive(dx.settings) else "")
             change = f"{error.before:.3g} -> {error.after:.3g} {error.unit}".rstrip()
             whose = f"of '{output}' " if several else ""
             told.append(f"{whose}{change}{moved} (noise {error.noise:.3g})")
@@ -37,4 +37,4 @@ def lines_of(dx: DiagnosisData) -> list[str]:
         lines.append(f"Patch: {dx.patch.sentence(unit)}.")
     if dx.next_experiment:
         lines.append(f"Next: {dx.next_experiment}")
-    return [*lines, *dx.noise, *dx.notes]
+    return [*lines, *dx.noise, *dx.notes, str(dx.settings)]

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.descent import Start
-from pikanid.mismatch.fitting.hypothesis import FAR, Hypothesis
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.screen import Screen, as_strong
 
-WIDER = (0.3, 1.0, 3.0)  # of the last parameter of a wider law, where fits of it begin
+WIDER = (0.3, 1.0, 3.0)  # numerical: of the last parameter of a wider law, where fits of it begin
 Job = tuple[Sequence[Candidate], Sequence[Start | Mapping[str, float]]]
 
 
@@ -90,8 +90,9 @@ def wide(h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
     """Whether a law that one of its effects contains does nearly as well in that one's place: then
     more is added to the simpler one.
     """
+    far = h.whitened.settings.fits.far
     simpler = (fits.get(h.key - {e.key} | {part}) for e in h.effects for part in e.covers)
-    return any(o is not None and o.minimum.chi2 < FAR * h.minimum.chi2 for o in simpler)
+    return any(o is not None and o.minimum.chi2 < far * h.minimum.chi2 for o in simpler)
 
 
 def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:

@@ -11,11 +11,10 @@ from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import unit_columns
 from pikanid.mismatch.detect.tangent import Directions, directions
 from pikanid.mismatch.fitting.decisions import steady
-from pikanid.mismatch.fitting.descent import GLANCE, Start, start_from
+from pikanid.mismatch.fitting.descent import Start, start_from
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 
-FAINT, FAINT_PAIR = 3.0, 6.0  # χ² that one effect, and two, must gain to first order to be tried
-MOSTLY = 0.8  # of a parameter, that an effect may really be
+MOSTLY = 0.8  # numerical: of a parameter, in whose place a fit with an effect begins
 NOWHERE: Mapping[str, float] = {}
 
 
@@ -88,7 +87,8 @@ def best_level(h: Hypothesis, candidate: Candidate, point: Mapping[str, float]) 
         return np.array([named.get(f.label, named.get(f.name, f.guess)) for f in problem.free])
 
     # which one is best is told at a glance
-    whitened.choose_steps(at(candidate.levels[len(candidate.levels) // 2]), misfit=GLANCE)
+    whitened.choose_steps(at(candidate.levels[len(candidate.levels) // 2]),
+                          misfit=whitened.settings.fits.glance)
     best = min(candidate.levels, key=lambda level: whitened.chi2(at(level)))
     return Start({**point, **best}, {**point, **best})
 
@@ -103,6 +103,7 @@ class Screen:
     def __init__(self, about: Hypothesis, candidates: Sequence[Candidate],
                  guess: Mapping[str, float] = NOWHERE):
         self.about, self.guess = about, guess
+        self.faint = about.whitened.settings.search.faint
         self.found: Directions = directions(about.whitened, about.minimum.theta, candidates)
         self.units, self.lengths = unit_columns(self.found.D, about.minimum.J)
         # r = ŷ - y: a sign that is present in y shows as its negative
@@ -148,7 +149,8 @@ class Screen:
                        key=lambda k: -promised[several[k][0]])
         listed: list[tuple[Candidate, list[Start | Mapping[str, float]]]] = []
         for k in order:
-            if self.gain[several[k][0]] < least or (self.gain[several[k][0]] < FAINT and listed):
+            if self.gain[several[k][0]] < least or (
+                    self.gain[several[k][0]] < self.faint and listed):
                 break
             candidate = self.found.candidates[k]
             signs = several[k] if len(candidate.parameters) > 1 or not self.found.directions[
@@ -228,7 +230,7 @@ class Screen:
             i, j = divmod(int(flat), len(z))
             pair = (int(owner[i]), int(owner[j]))
             a, b = (self.found.candidates[k] for k in pair)
-            if gain[i, j] < FAINT_PAIR or len(listed) == count:
+            if gain[i, j] < 2 * self.faint or len(listed) == count:
                 break
             if pair in taken or (a.twin and a.twin == b.twin):
                 continue

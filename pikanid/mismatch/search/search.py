@@ -14,7 +14,7 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below, in_order
 from pikanid.mismatch.fitting.descent import Start
-from pikanid.mismatch.fitting.hypothesis import FAR, Hypothesis, fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
 from pikanid.mismatch.search.neighbours import (
@@ -32,21 +32,10 @@ from pikanid.mismatch.search.neighbours import (
 )
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, law, nothing
+from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
 
-SINGLES, PAIRS = 14, 8  # refits of one effect, of two at once
-MORE, LATER = 8, 4  # of one more beside one, beside two or three
-LEADING = 3  # single effects that a second one is added to
-CARRIED, FEW = 12, 4  # hypotheses refitted to other records; where none explains the first ones
-PROMISING = 0.5  # of what an effect gained, to first order, that another in its place must gain
-EQUAL = 0.05  # of χ²: another fit of the same is no better, and what was tested stands
-KEPT = 0.5  # of what an effect promises, to first order, that a fit of it must gain
-TELLING = 0.1  # of χ² that one more effect must promise where much is left anyway
-ASKED = 2  # hypotheses to be given that are looked at once more
-MOST = 4  # effects in a hypothesis
-EFFORT = 8e6  # states times steps simulated for combinations, before nothing new is begun
-EACH = 6e4  # that setting up one fit takes as much time as, as measured
-NEAR, CLOSE = 6, 6.0  # hypotheses, and how much they may score above the best, to get rivals
 Adequate = Callable[[Hypothesis], bool]
 Starts = Sequence[Start | Mapping[str, float]]
 
@@ -82,9 +71,14 @@ class Search:
     workers: int = 1
 
     @property
+    def settings(self) -> Settings:
+        """By which the records are judged."""
+        return self.records.settings
+
+    @property
     def budget_exhausted(self) -> bool:
         """Whether so much has been simulated that what has been found must do."""
-        return self.spent > EFFORT
+        return self.spent > self.settings.budget.effort
 
     @property
     def choices(self) -> int:
@@ -100,41 +94,43 @@ class Search:
 
     def run(self, adequate: Adequate) -> list[Hypothesis]:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
-        every = [c for c in self.candidates if c.fits and c.suits()]
+        every, budget = [c for c in self.candidates if c.fits and c.suits()], self.settings.budget
         screen = Screen(self.base(), every, self.guess)
         self.tell("single effects")
         always = entry if self.base().far else law
-        self._fit_all([((c,), starts) for c, starts in screen.singles(SINGLES, always=always)],
-                      always=True)
+        self._fit_all([((c,), starts) for c, starts in screen.singles(
+            budget.singles, always=always)], always=True)
         if self.base().far and self.base().pinned:
             # at a bound the model explains as little as it can: effects show about the guess
             about = fitted(self.nominal, (), self.records, [self.guess], self.choices,
                            Closest(self._closest_chi2()))
             self._fit_all([] if about is None else [
-                ((c,), starts) for c, starts in Screen(about, every).singles(SINGLES)],
+                ((c,), starts) for c, starts in Screen(about, every).singles(budget.singles)],
                 again=True, always=True, reach=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
         if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
-            self._fit_all(screen.pairs(PAIRS))
+            self._fit_all(screen.pairs(budget.pairs))
             self._simplify()
         return self.grow(adequate)
 
     def grow(self, adequate: Adequate) -> list[Hypothesis]:
         """Add effects to the best hypotheses as long as something is left and that helps."""
-        for count in range(1, MOST):
+        settings, budget = self.settings, self.settings.budget
+        close = settings.verdict.indistinct
+        for count in range(1, budget.effects):
             if not adequate(best := self.ranked()[0]):
                 self._fit_all([*afresh(best)], again=True)
             if adequate(best := self.ranked()[0]) or self.budget_exhausted:
                 break
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
-            near = rows + FAR * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
+            near = rows + settings.fits.far * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
             simple = [h for h in leading(self.ranked()) if not wide(h, self.fits)] or [best]
-            for h in simple[: LEADING if count == 1 else 1]:
-                if len(h.effects) < MOST and (h is simple[0] or h.minimum.chi2 < near):
-                    self._extend(h, MORE if count == 1 else LATER,
+            for h in simple[: budget.leading if count == 1 else 1]:
+                if len(h.effects) < budget.effects and (h is simple[0] or h.minimum.chi2 < near):
+                    self._extend(h, budget.beside_one if count == 1 else budget.beside_more,
                                  always=law if count == 1 and h is simple[0] else nothing)
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
@@ -144,7 +140,7 @@ class Search:
         if not (best := self.ranked()[0]).known:
             self._exchange(best, anyway=True)
         if not adequate(self.ranked()[0]):
-            for h in leading(self.ranked())[:LEADING]:
+            for h in leading(self.ranked())[:budget.leading]:
                 self._fit_all([job for job in with_wider(h, self.candidates)
                                if all(e.known for e in job[0])], always=True)
         best = self.ranked()[0]
@@ -152,16 +148,16 @@ class Search:
             best = self._fit(best.effects, [best.point], again=True)  # hills left for later
         if adequate(best):
             # what a test of everything misses may still be worth its penalty, or nearly
-            price = float(np.log(best.whitened.rows) + 2 * np.log(self.choices))
-            self._extend(best, LATER, self.scale() * (price - CLOSE), anyway=True)
+            least = price(1, 1, best.whitened.rows, self.choices, settings.choice_weight) - close
+            self._extend(best, budget.beside_more, self.scale() * least, anyway=True)
             for h in self._contenders():
                 self._exchange(h)
-            for h in self.ranked()[:NEAR]:
+            for h in self.ranked()[:budget.rivals]:
                 # fewer effects that explain almost as much may do with another one
                 if 0 < len(h.effects) < len(best.effects) and not self.budget_exhausted and not \
                         adequate(h) \
-                        and below(h.score(self.scale()), best.score(self.scale()) + 2 * CLOSE):
-                    self._extend(h, MORE)
+                        and below(h.score(self.scale()), best.score(self.scale()) + 2 * close):
+                    self._extend(h, budget.beside_one)
             self._simplify()
         # even without budget, no name without the laws that keep wrong ones away, of parts as well
         parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
@@ -172,9 +168,9 @@ class Search:
 
     def _contenders(self) -> Iterator[Hypothesis]:
         """The hypotheses that score about as well as the best."""
-        scale, ranked = self.scale(), self.ranked()
-        for h in ranked[:NEAR]:
-            if below(h.score(scale), ranked[0].score(scale) + CLOSE) and not self.budget_exhausted:
+        scale, ranked, close = self.scale(), self.ranked(), self.settings.verdict.indistinct
+        for h in ranked[:self.settings.budget.rivals]:
+            if below(h.score(scale), ranked[0].score(scale) + close) and not self.budget_exhausted:
                 yield h
 
     def _simplify(self) -> None:
@@ -185,7 +181,7 @@ class Search:
         if self.ranked()[0].far:
             for closest in closest_of_each(self.fits.values()):
                 self._fit_all([*without_one(closest)], again=True, always=True)
-        for _ in range(MOST):
+        for _ in range(self.settings.budget.effects):
             best = self.ranked()[0]
             self._fit_all([*without_one(best), *with_simpler(best, self.candidates)], again=True,
                           always=True, settled=best.key if self.budget_exhausted else frozenset())
@@ -202,14 +198,15 @@ class Search:
                 # a law outside the catalogue takes up what no first step to an entry sees
                 always = (partial(entry, channel=effect.channel) if not effect.known
                           else drag if anyway else nothing)
-                self._extend(without, MORE, PROMISING * gap, always, anyway)
+                self._extend(without, self.settings.budget.beside_one,
+                             self.settings.search.promising * gap, always, anyway)
 
     def closer(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Fit hypotheses with one effect less, or another one in its place, on from where they
         stand; whether that found anything.
         """
         before = {h.fit for h in self.fits.values()}
-        for h in hypotheses[:ASKED]:
+        for h in hypotheses[:self.settings.budget.asked_again]:
             self._fit_all([*without_one(h), *with_twins(h, self.candidates)], again=True,
                           always=True)
             self._exchange(h, anyway=True)
@@ -225,9 +222,10 @@ class Search:
         new = replace(self, records=records, fits={}, begun=set(),
                       failed_searches=set(self.failed_searches))
         new.base()
-        ranked = self.ranked()
-        near = FAR * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
-        new._fit_all([(h.effects, [h.point]) for h in ranked[: FEW if ranked[0].far else CARRIED]
+        budget, ranked = self.settings.budget, self.ranked()
+        near = self.settings.fits.far * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
+        count = budget.carried_far if ranked[0].far else budget.carried
+        new._fit_all([(h.effects, [h.point]) for h in ranked[:count]
                       if h.effects and h.minimum.chi2 < near], always=True,
                      settled=frozenset(c.key for c in self.candidates))
         return new
@@ -244,15 +242,16 @@ class Search:
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
         screen = Screen(hypothesis, beside(hypothesis, self.candidates))
-        least = TELLING * hypothesis.minimum.chi2 if hypothesis.far else least
-        bent = any(e.channel == "input" for e in hypothesis.effects)
+        needs, bent = self.settings.search, any(e.channel == "input" for e in hypothesis.effects)
+        least = needs.much * hypothesis.minimum.chi2 if hypothesis.far else least
         jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
                            for candidate, starts in screen.singles(
                                count, least, lambda c: always(c) or (bent and fixed(c)))]
         # from far off a fit of the same effects may have lost its way
         lost = [] if hypothesis.far else [
             job for job in jobs if (known := self.fits.get(frozenset(e.key for e in job[0])))
-            and known.minimum.chi2 > hypothesis.minimum.chi2 - KEPT * screen.promised(job[0][-1])]
+            and known.minimum.chi2 > hypothesis.minimum.chi2 - needs.kept * screen.promised(
+                job[0][-1])]
         settled = frozenset() if hypothesis.far else hypothesis.key
         self._fit_all(jobs, always=anyway, settled=settled)
         self._fit_all(lost, again=True, settled=settled)
@@ -269,7 +268,7 @@ class Search:
         `settled` are not looked for beyond hills.
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
-        failed = frozenset(self.failed_searches)
+        failed, equal = frozenset(self.failed_searches), self.settings.search.equal
 
         def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
             (effects, starts), closest = job, Closest(chi2)
@@ -280,13 +279,14 @@ class Search:
 
         def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
             found, _ = result
-            self.spent += EACH + (found.whitened.work if found else 0.0)
+            self.spent += self.settings.budget.setup + (found.whitened.work if found else 0.0)
             key = frozenset(e.key for e in job[0])
             self.begun.add(signature(job))
-            if found and hits(found.effects) and lost(found.minimum.chi2, found.whitened.rows):
+            if found and hits(found.effects) and lost(
+                    found.minimum.chi2, found.whitened.rows, self.settings):
                 self.failed_searches.add(key)
             if found and (key not in self.fits
-                          or below(found.minimum.chi2, self.fits[key].minimum.chi2 - EQUAL)):
+                          or below(found.minimum.chi2, self.fits[key].minimum.chi2 - equal)):
                 self.fits[key] = found
 
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])

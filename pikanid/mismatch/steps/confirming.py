@@ -11,33 +11,30 @@ from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer, settle, with_formulas
 
-ASKED = 3  # times that rivals of what is given are looked for
 
-
-def confirmed(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
+def confirmed(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
     """What the held-out recordings leave of the hypotheses, with rivals looked for again."""
     case.clear_later(ranked[0])
     search = case.search
-    answer = _settled(case, ranked, alpha)
-    for _ in range(ASKED):
+    answer = _settled(case, ranked)
+    for _ in range(case.settings.budget.rechecked):
         before = {h.fit for h in search.ranked()}
         if not search.closer(answer.given):
             break
         # one that is better has rivals of its own
         known = search.ranked()[0].fit in before
-        answer = _settled(case, search.ranked() if known else search.grow(case.adequate), alpha)
+        answer = _settled(case, search.ranked() if known else search.grow(case.adequate))
     return answer
 
 
-def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site, alpha: float
-                      ) -> Answer:
+def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site) -> Answer:
     """The answer, once formulas read from the shape of the force have been offered as well."""
     search = case.search
-    search.offer(symbolic_candidates(shape, site, case.candidates))
+    search.offer(symbolic_candidates(shape, site, case.candidates, case.settings))
     return with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
-                         case.later is not None, case.proves, alpha)
+                         case.later is not None, case.proves, case.settings)
 
 
-def _settled(case: Case, ranked: Sequence[Hypothesis], alpha: float) -> Answer:
+def _settled(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
     return settle(ranked, case.search.scale(), case.test, case.predicted, case.later is not None,
-                  case.proves, case.ahead, alpha)
+                  case.proves, case.settings, case.ahead)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pikanid.mismatch.case import SEARCHED, Case, note_outliers
+from pikanid.mismatch.case import Case, note_outliers
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import (
@@ -21,14 +21,15 @@ from pikanid.mismatch.data.preparation import (
 )
 from pikanid.mismatch.fitting.repeats import repeats
 from pikanid.mismatch.search.search import Search
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
 
 def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
-              quiet: tuple[float, float] | None, tell: Callable[[str], None], workers: int = 1
-              ) -> Case:
+              quiet: tuple[float, float] | None, tell: Callable[[str], None], settings: Settings,
+              workers: int = 1) -> Case:
     """A case ready for tests: recordings prepared, noise known, nominal model fitted.
 
     Args:
@@ -37,6 +38,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         later: Held-out recordings, if there are any.
         quiet: Start and stop [s] of a stretch known to show noise only.
         tell: Called with what is being done.
+        settings: What is taken as given.
         workers: Threads of the search.
 
     Raises:
@@ -49,20 +51,20 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     proves = later is not None
     if later is not None:
         check_pair(train, later)
-        later = beginnings(model, later, "the held-out recording", notes)
-    train = beginnings(model, train, "the recording", notes)
+        later = beginnings(model, later, "the held-out recording", notes, settings.budget)
+    train = beginnings(model, train, "the recording", notes, settings.budget)
     if later is None:
-        train, later = set_aside(train, model, notes)
+        train, later = set_aside(train, model, notes, settings.noise)
     model = held_as_recorded(model, train)
     sites(model, train)  # a model in which nothing can be looked for is refused before any fit
     tell("nominal fit")
-    together = oversampling(model, train)
+    together = oversampling(model, train, settings.budget)
     if together > 1:
         notes.append(f"{together} neighbouring samples of the outputs count as one: nothing in "
                      "them moves fast enough to need more.")
-    records = prepared(model, train, quiet, notes, together)
+    records = prepared(model, train, quiet, notes, settings, together)
     check_freedom(model, records)
-    short = records.beginning(SEARCHED)
+    short = records.beginning(settings.budget.rows_searched)
     before = NLS().fit(model, with_sigma(short, model))
     if short is not records:
         before = NLS(starts=1).fit(before.fitted_model, with_sigma(records, model))
@@ -72,7 +74,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     note_outliers(count, "the recording", notes)
     held, excuse = None, ""
     if later is not None:
-        held = prepared(model, later, None, notes, together, records.levels[0])
+        held = prepared(model, later, None, notes, settings, together, records.levels[0])
         count, _, needed = freedom(model, held)
         if count < needed:
             held, proves = None, False

@@ -10,7 +10,6 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate
 from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import least_proof
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.advice import advice
 from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -20,29 +19,31 @@ from pikanid.mismatch.report.locate import locate, smallest
 
 
 def reported(case: Case, detection: Detection, answer: Answer, site: Site,
-             shape: ForceShape | None, alpha: float) -> Diagnosis:
+             shape: ForceShape | None) -> Diagnosis:
     """The diagnosis of a case, with proof, place, advice and notes."""
+    alpha, asked = case.settings.alpha, case.settings.least_proof
     if case.excuse:
         case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
     best = answer.given[0] if answer.given else case.base
     after = as_estimate(best, case.before) if answer.given else case.before
-    given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted)
+    given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
+                                   case.settings.verdict)
     proof = _proof(case, answer, best)
     if answer.verdict == "none" and proof is not None and proof.p_value < alpha:
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
     if case.proves and (base := case.predicted(case.base)) and below(
-            base.motion, least_proof(alpha)):
+            base.motion, asked):
         case.notes.append(
             "The held-out recording is at rest, or too short: all that moves in it is worth "
-            f"{base.motion:.2g} of chi-squared, and {least_proof(alpha):.0f} are needed to confirm "
+            f"{base.motion:.2g} of chi-squared, and {asked:.0f} are needed to confirm "
             "anything.")
     levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, site)
     return Diagnosis(
-        answer.verdict, detection.p_value, alpha,
-        locate(case.base, best, answer, site, shape, force, alpha),
+        answer.verdict, detection.p_value, case.settings,
+        locate(case.base, best, answer, site, shape, force),
         given, rejected, case.before, after, proof, tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates),
         advice(answer.verdict, given, case.records, case.rate, case.proves,

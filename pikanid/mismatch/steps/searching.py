@@ -7,8 +7,6 @@ from collections.abc import Callable
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 
-RELEVELLED = 3  # times that the noise is read from what the best explanation leaves, at most
-
 
 def searched(case: Case, tell: Callable[[str], None]) -> list[Hypothesis]:
     """Hypotheses that explain the recordings best, the closest first."""
@@ -29,7 +27,7 @@ def with_noise_of_the_rest(case: Case, ranked: list[Hypothesis], quiet: tuple[fl
 
     The first reading was made through the mismatch itself, which is out of the way by now.
     """
-    for _ in range(RELEVELLED):
+    for _ in range(case.settings.budget.relevelled):
         if not case.relevelled(ranked[0], quiet):
             break
         tell("noise again")

@@ -1,0 +1,1 @@
+"""What a diagnosis takes as given: error rates, what counts as evidence, budgets."""

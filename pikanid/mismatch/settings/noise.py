@@ -1,0 +1,59 @@
+"""What counts as noise, as an outlier, as a repeat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """How the noise of an output is told from its motion, and gross errors from noise.
+
+    Attributes:
+        above: Natural frequencies from which on a residual is noise: missing physics reaches to
+            harmonics, hardly beyond the fifth.
+        begins: Shares of the band between which that lies in any case: impacts and steps reach far
+            up even where the oscillator is slow, and a third of the band is left to read from.
+        line: Means of the noise's spectrum from which on an ordinate counts as a line: of
+            exponentially distributed ordinates one in a thousand is larger (e^-7).
+        order_only: Relative standard error of a power, at most: then it is known by its order only.
+        less: Standard errors of a power by which a fit has to leave less to refute it.
+        same: Relative change of σ below which a level read again is the same.
+        same_correlation: Change of the correlation of neighbours below which it is.
+        spike: [σ] by which a sample must leave its neighbours before there is a fit.
+        lone: Median gaps by which it must once a fit is taken away: of white noise one sample in
+            4000 does, counted.
+        together: Neighbours that are alone together are none: a sensor may have been at its end.
+        most_outliers: Share of the samples: where more are alone, nothing is.
+        freedom: Samples beyond the free parameters: σ² read off n of them has a relative standard
+            error of √(2/n), so that σ is 16 % uncertain at 20.
+        aside: Share of a recording that is set aside where there is no held-out one.
+        least_aside: Samples of an output that must be there for that.
+        driven_alike: Share of an input's r.m.s.: larger differences drive another experiment.
+        moved_alike: Share of an output's half range: beyond it the same missing law leaves
+            something else.
+        covered: Share of the longest repeat that the shortest has to last.
+        flat: Ratio of the frequencies between which a spectrum counts as flat.
+        caution: Share of the number of independent modes that is believed: so much allows for the
+            error of that number.
+    """
+
+    above: float = 6.0
+    begins: tuple[float, float] = (0.25, 0.6)
+    line: float = 7.0
+    order_only: float = 0.6
+    less: float = 2.0
+    same: float = 0.05
+    same_correlation: float = 0.06
+    spike: float = 5.0
+    lone: float = 9.0
+    together: int = 3
+    most_outliers: float = 0.1
+    freedom: int = 20
+    aside: float = 0.3
+    least_aside: int = 300
+    driven_alike: float = 0.01
+    moved_alike: float = 0.2
+    covered: float = 0.8
+    flat: float = 1.25
+    caution: float = 0.25
