@@ -468,3 +468,10 @@ def test_level_5_files_of_the_other_byte_order() -> None:
     head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x01\x00MI"
     found = dict(mat5.leaves(head + struct.pack(">II", 14, len(body)) + body))
     assert found["y"].tolist() == [[1.0, 2.0]]
+
+
+@pytest.mark.parametrize("content", [b",", b";;\n", b"\t\n\t\n"])
+def test_delimiters_alone_are_no_rows(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "run.csv").write_bytes(content)
+    with pytest.raises(BadRecording, match="no rows of data"):
+        Recording.read(tmp_path / "run.csv")

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from pikanid.errors import PikanidError
 from pikanid.recording.reading import csv
+from pikanid.recording.reading.table import Options
 
 ODD = [
     "", " ", "nan", "NaN", "inf", "-inf", "Infinity", "1e400", "-1e-400", "1_000", "0x1A", "1,5",
@@ -27,7 +28,7 @@ CELLS = st.one_of(FLOATS, FLOATS, st.decimals(allow_nan=False, allow_infinity=Fa
 def outcome(content: bytes, delimiter: str | None = None) -> Any:
     """What reading gives: headers, defects, row numbers and the bits of all values, or why not."""
     try:
-        table = csv.read(content, "run.csv", delimiter, None)
+        table = csv.read(content, "run.csv", Options(delimiter=delimiter))
     except PikanidError as problem:
         return type(problem), str(problem)
     return ([(c.header, c.defect, c.text, c.unit, c.is_clock, c.values.tobytes())
@@ -58,7 +59,7 @@ def test_a_long_file_of_numbers_is_parsed_by_pandas(monkeypatch: pytest.MonkeyPa
     """Cell by cell is for what is not plain: the two ways differ by a factor of five."""
     monkeypatch.setattr(csv, "from_rows", None)
     rows = [f"{k / 7!r};{k};{'' if k % 3 else -k / 3}" for k in range(6000)]
-    table = csv.read("\r\n".join(["t [s];a;b", *rows, ""]).encode(), "run.csv", None, None)
+    table = csv.read("\r\n".join(["t [s];a;b", *rows, ""]).encode(), "run.csv", Options())
     assert [c.header for c in table.columns] == ["t [s]", "a", "b"]
     np.testing.assert_array_equal(table.columns[0].values, np.arange(6000) / 7)
     assert np.isnan(table.columns[2].values).sum() == 4000
@@ -69,5 +70,5 @@ def test_a_long_file_of_numbers_is_parsed_by_pandas(monkeypatch: pytest.MonkeyPa
 def test_a_bad_cell_of_a_long_file_is_named(where: int) -> None:
     rows = [f"{k},{k}" for k in range(6000)]
     rows[where] = f"{where},volts"
-    table = csv.read("\n".join(["t,a", *rows]).encode(), "run.csv", None, None)
+    table = csv.read("\n".join(["t,a", *rows]).encode(), "run.csv", Options())
     assert f"row {where + 2}" in table.columns[1].defect and "volts" in table.columns[1].defect

@@ -8,6 +8,7 @@ import typer
 
 from pikanid.commands.options import Quiet, Sigma, assignments, check_outputs, quantity
 from pikanid.commands.simulate import sigmas
+from pikanid.recording.formats import written_endings
 
 EXAMPLES = """Examples:
 
@@ -25,7 +26,7 @@ def design(
         show_default=False)],
     out: Annotated[str, typer.Option(
         "--out", "-o", metavar="FILE", show_default=False,
-        help="profile to run (.csv, .csv.gz, .tsv, .parquet)")],
+        help=f"profile to run ({', '.join(written_endings())})")],
     sigma: Sigma = [],  # noqa: B006
     recorded: Annotated[list[str], typer.Option(
         metavar="FILE", show_default=False, help="what was recorded before")] = [],  # noqa: B006
@@ -49,7 +50,7 @@ def design(
     quiet: Quiet = False,
 ) -> int:
     """Choose the next experiment among feasible ones, and write it ready to run."""
-    check_outputs({"--out": (out, [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".pq"]),
+    check_outputs({"--out": (out, written_endings()),
                    "--plot": (plot, [".png", ".svg", ".pdf"])}, [*models, *recorded, *candidate])
     from pikanid import errors
     from pikanid.estimate.plots import image_for

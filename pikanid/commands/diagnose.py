@@ -20,6 +20,7 @@ from pikanid.commands.options import (
     check_outputs,
     quantity,
 )
+from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
     from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -38,7 +39,7 @@ Exit codes: 0 diagnosed, whatever was found; 2 bad input."""
 
 def diagnose(
     train: Annotated[list[str], typer.Argument(
-        metavar="TRAIN...", help="recordings to explain: CSV, Excel, Parquet, MAT or NPZ",
+        metavar="TRAIN...", help=f"recordings to explain: {readable()}",
         show_default=False)],
     model: ModelName,
     held_out: Annotated[list[str], typer.Option(

@@ -9,6 +9,7 @@ import typer
 
 from pikanid import errors
 from pikanid.commands.options import check_outputs
+from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,7 +34,7 @@ def extract(
         metavar="MODEL_OR_ESTIMATE", show_default=False, help="a saved KAN, or a saved estimate")],
     data: Annotated[str | None, typer.Option(
         metavar="FILE", show_default=False,
-        help="the points that the KAN was trained on: CSV, Excel, Parquet, MAT, NPZ")] = None,
+        help=f"the points that the KAN was trained on: {readable()}")] = None,
     input_: Annotated[list[str] | None, typer.Option(
         "--input", "-i", metavar="NAME", show_default=False,
         help="a column of the data that enters the KAN, in the KAN's order")] = None,

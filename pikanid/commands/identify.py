@@ -23,6 +23,7 @@ from pikanid.commands.options import (
     check_outputs,
     quantity,
 )
+from pikanid.recording.formats import readable
 from pikanid.strategies import STRATEGIES
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the re
 
 def identify(
     recordings: Annotated[list[str], typer.Argument(
-        metavar="RECORDING...", help="CSV, Excel, Parquet, MAT or NPZ; several are fitted jointly",
+        metavar="RECORDING...", help=f"{readable()}; several are fitted jointly",
         show_default=False)],
     model: ModelName,
     strategy: Annotated[str, typer.Option(

@@ -21,6 +21,7 @@ from pikanid.commands.options import (
     check_outputs,
     quantity,
 )
+from pikanid.recording.formats import written_endings
 
 if TYPE_CHECKING:
     from pikanid.model import Model
@@ -41,7 +42,7 @@ def simulate(
     model: ModelName,
     out: Annotated[str, typer.Option(
         "--out", "-o", metavar="FILE", show_default=False,
-        help="recording to write (.csv, .csv.gz, .tsv, .parquet)")],
+        help=f"recording to write ({', '.join(written_endings())})")],
     excitation: Excitation = "two_pulse",
     sigma: Sigma = [],  # noqa: B006
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the noise")] = 0,
@@ -52,7 +53,7 @@ def simulate(
     quiet: Quiet = False,
 ) -> int:
     """Simulate a model and write what would be recorded."""
-    check_outputs({"--out": (out, [".csv", ".csv.gz", ".tsv", ".tsv.gz", ".parquet", ".pq"])},
+    check_outputs({"--out": (out, written_endings())},
                   [excitation, model])
     from pikanid.model import systems
     from pikanid.simulation import simulate as run

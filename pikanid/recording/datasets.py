@@ -27,6 +27,7 @@ from pikanid.recording.channel import Channel
 from pikanid.recording.excerpts import falling_balls_excerpt, single_pendulum_excerpt
 from pikanid.recording.origins import Origin
 from pikanid.recording.reading import csv, mat, spreadsheet
+from pikanid.recording.reading.table import Options
 from pikanid.recording.recording import Recording
 
 __all__ = [
@@ -153,7 +154,7 @@ def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:
     origins.check_known("drop", str(drop), ("1", "2"))
     origin = origins.FALLING_BALLS
     # The workbook ends in .xls and is of the newer kind inside.
-    rows, _ = spreadsheet.cells(_content(origin), origin.name, "xlsx", name)
+    rows, _ = spreadsheet.cells(_content(origin), origin.name, name)
     table = np.array(rows[1:], dtype=float)
     t, h, v = table[table[:, 0] == drop, 1:4].T
     return Recording.from_arrays(
@@ -178,7 +179,7 @@ def slosh_lar(name: str = "LE_2D_0m_5s_900deg") -> Recording:
     """
     origins.check_known("motion", name, SLOSH_MOTIONS)
     motion, heights = origins.slosh(name)
-    table = csv.read(_content(motion), motion.name, ";", ".")
+    table = csv.read(_content(motion), motion.name, Options(delimiter=";", decimal="."))
     t, *pose = (column.values for column in table.columns)
     names = ("x", "y", "z", "qx", "qy", "qz", "qw")
     arrays = mat.arrays(_content(heights), heights.name)

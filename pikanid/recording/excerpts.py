@@ -15,9 +15,11 @@ import numpy as np
 
 from pikanid.recording import origins
 from pikanid.recording.reading import csv as columns
+from pikanid.recording.reading.table import Options
 from pikanid.recording.recording import Recording
 
 FOLDER = Path(__file__).parent / "data"
+PLAIN = Options(delimiter=",", decimal=".")
 
 
 def single_pendulum_excerpt(part: Literal["train", "held_out", "all"] = "train") -> Recording:
@@ -40,7 +42,7 @@ def single_pendulum_excerpt(part: Literal["train", "held_out", "all"] = "train")
     names = {"train": ("train",), "held_out": ("held_out",), "all": ("train", "held_out")}
     origins.check_known("part", part, tuple(names))
     tables = [columns.read((FOLDER / f"single_pendulum_{name}.csv").read_bytes(),
-                           f"single_pendulum_{name}.csv", ",", ".") for name in names[part]]
+                           f"single_pendulum_{name}.csv", PLAIN) for name in names[part]]
     t, theta = (np.concatenate([table.columns[k].values for table in tables]) for k in (0, 1))
     return Recording.from_arrays(t, {"theta": theta}, {"theta": "rad"},
                                  name=f"single pendulum at 100 Hz, {part.replace('_', ' ')}")

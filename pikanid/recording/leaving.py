@@ -34,7 +34,7 @@ class Leaving(Operations):
         return pd.DataFrame(series, index=pd.Index(every, name="t"))
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write a ``.csv``, ``.csv.gz`` or ``.parquet`` file; see `pikanid.recording.writing`."""
+        """Write a file, as ``.csv`` or ``.parquet``; see `pikanid.recording.writing`."""
         from pikanid.recording import writing
 
         if not isinstance(path, str | os.PathLike):

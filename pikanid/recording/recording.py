@@ -157,7 +157,7 @@ class Recording(Leaving):
         decimal: str | None = None,
         name: str | None = None,
     ) -> Recording:
-        """Read a CSV (also gzipped), Excel, Parquet, MAT or NPZ file.
+        """Read a file of a format in `pikanid.recording.formats`: CSV, Excel, Parquet, ...
 
         Args:
             path: The file; its kind is known by its ending, checked against its content.

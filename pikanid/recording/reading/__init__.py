@@ -1,4 +1,4 @@
-"""Files of any supported format as channels; one format a module.
+"""Files of any format as channels; one format a module, listed in `pikanid.recording.formats`.
 
 `door` looks at the file itself, a format's module makes a `Table` of it, and `columns` makes
 channels of the table.
@@ -9,13 +9,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from pikanid.recording.channel import Channel
-from pikanid.recording.reading import csv, mat, npz, parquet, spreadsheet
 from pikanid.recording.reading.columns import Request, channels
-from pikanid.recording.reading.door import kind_and_content
-from pikanid.recording.reading.table import Table
+from pikanid.recording.reading.door import opened
+from pikanid.recording.reading.table import Options, Table
 
 __all__ = ["Found", "read"]
 
@@ -46,25 +46,9 @@ def read(
         BadUnit: If a given unit or the time's unit is unknown.
         BadSetting: If an argument cannot work.
     """
-    kind, content, stem = kind_and_content(path)
+    found, content, stem = opened(path)
     where = Path(path).name
-    table = _table(kind, content, where, sheet, delimiter, decimal)
+    reader = import_module(f"pikanid.recording.reading.{found.file}")
+    table: Table = reader.read(content, where, Options(sheet, delimiter, decimal))
     result = channels(table, Request(columns or {}, rate, units or {}), where)
     return Found(result.channels, result.notes, result.unreadable, stem)
-
-
-def _table(
-    kind: str,
-    content: bytes,
-    where: str,
-    sheet: str | int | None,
-    delimiter: str | None,
-    decimal: str | None,
-) -> Table:
-    if kind == "csv":
-        return csv.read(content, where, delimiter, decimal)
-    if kind in ("xlsx", "xls"):
-        return spreadsheet.read(content, where, kind, sheet)
-    if kind == "parquet":
-        return parquet.read(content, where)
-    return (mat if kind == "mat" else npz).read(content, where)

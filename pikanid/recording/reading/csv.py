@@ -10,15 +10,19 @@ the cell.
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import re
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.recording.reading.table import Column, Table, from_rows, heads
+from pikanid.recording.channel import Channel
+from pikanid.recording.reading.flat import columns as flat
+from pikanid.recording.reading.table import Column, Options, Table, from_rows, heads
 
 _DELIMITERS = ("\t", ";", ",", "|", " ")
 _COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*")
@@ -28,20 +32,20 @@ _LONG = 5000  # lines from which on an import of pandas (0.4 s) pays
 _CONTROLS = bytes((*range(9), 11, *range(14, 32), 127))
 
 
-def read(content: bytes, where: str, delimiter: str | None, decimal: str | None) -> Table:
+def read(content: bytes, where: str, options: Options) -> Table:
     """The table in a text file.
 
     Args:
         content: Bytes of the file.
         where: Its name, for messages.
-        delimiter: One character; found out if None.
-        decimal: ``"."`` or ``","``; found out if None.
+        options: Delimiter and decimal sign.
 
     Raises:
         BadRecording: If it is not text, holds no rows, or a row is shorter or longer than the
             header.
         BadSetting: If `delimiter` or `decimal` cannot be one.
     """
+    delimiter, decimal = options.delimiter, options.decimal
     if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n'):
         raise errors.BadSetting(errors.bad_delimiter(delimiter))
     if decimal not in (None, ".", ",") or (decimal is not None and decimal == delimiter):
@@ -57,6 +61,8 @@ def read(content: bytes, where: str, delimiter: str | None, decimal: str | None)
         return quick
     rows, numbers = _split(lines, numbers, delimiter, where)
     rows, numbers = _squared(rows, numbers, where)
+    if not rows:
+        raise errors.BadRecording(errors.no_rows(where))
     # rows of text are rows of objects, which lists are too strict to say
     return from_rows(where, rows, numbers, decimal or _decimal(rows, delimiter))  # type: ignore[arg-type]
 
@@ -191,3 +197,22 @@ def _decimal(rows: list[list[str]], delimiter: str) -> str:
         if points > 50 * (commas + 1) or commas > 50 * (points + 1):
             break
     return "," if commas > points else "."
+
+
+def content(channels: Mapping[str, Channel], ending: str) -> bytes:
+    """What a file of that ending holds."""
+    delimiter = "\t" if ".tsv" in ending else ","
+    columns = list(flat(channels))
+    length = max(len(values) for _, _, values, _ in columns)
+    cells = [
+        ["" if value != value else repr(value) for value in values.tolist()]
+        + [""] * (length - len(values))
+        for _, _, values, _ in columns
+    ]
+    text = io.StringIO()
+    writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
+    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit, _, _ in columns])
+    writer.writerows(zip(*cells, strict=True))
+    plain = text.getvalue().encode()
+    # no time stamp inside: the same recording gives the same bytes
+    return gzip.compress(plain, mtime=0) if ending.endswith(".gz") else plain

@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 
 from pikanid import errors
+from pikanid.recording.formats import called
 from pikanid.recording.reading import mat5
 from pikanid.recording.reading.arrays import columns
-from pikanid.recording.reading.door import FOREIGN_FAILURES, NAMES
-from pikanid.recording.reading.table import Table
-from pikanid.storage.limits import MOST_UNPACKED
+from pikanid.recording.reading.table import Options, Table
+from pikanid.storage.limits import DAMAGE, MOST_UNPACKED
 
 _DEEPEST = 8
 _MOST_CELLS = 1000
 
 
-def read(content: bytes, where: str) -> Table:
+def read(content: bytes, where: str, options: Options) -> Table:
     """The vectors in a MAT file, each a column named by its path.
 
     Raises:
@@ -44,8 +44,8 @@ def arrays(content: bytes, where: str) -> dict[str, np.ndarray]:
 def _v5(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
     try:
         return list(mat5.leaves(content))
-    except FOREIGN_FAILURES:
-        raise errors.BadRecording(errors.damaged(where, NAMES["mat"])) from None
+    except DAMAGE:
+        raise errors.BadRecording(errors.damaged(where, called(".mat"))) from None
 
 
 def _v73(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
@@ -62,8 +62,8 @@ def _v73(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
                 if not name.startswith("#") and _inside(file, name)
                 for leaf in _flat_hdf5(name, file[name], file, 0, room)
             ]
-    except FOREIGN_FAILURES:
-        raise errors.BadRecording(errors.damaged(where, NAMES["mat"])) from None
+    except DAMAGE:
+        raise errors.BadRecording(errors.damaged(where, called(".mat"))) from None
 
 
 def _inside(group: Any, name: str) -> bool:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pikanid import errors
 from pikanid.recording.reading.arrays import columns
-from pikanid.recording.reading.table import Table
+from pikanid.recording.reading.table import Options, Table
 from pikanid.storage.limits import archived
 
 
-def read(content: bytes, where: str) -> Table:
+def read(content: bytes, where: str, options: Options) -> Table:
     """The vectors in an archive, each a column; matrices give a column per row or column.
 
     Raises:

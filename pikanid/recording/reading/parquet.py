@@ -1,19 +1,22 @@
-"""Parquet files; those written here carry units, sigma and hold with each column."""
+"""Parquet files, read and written; those written here carry units, sigma and hold."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.recording.reading.door import FOREIGN_FAILURES, NAMES
-from pikanid.recording.reading.table import Column, Table, from_cells
-from pikanid.storage.limits import MOST_UNPACKED
+from pikanid.recording.channel import Channel
+from pikanid.recording.formats import called
+from pikanid.recording.reading.flat import columns as flat
+from pikanid.recording.reading.table import Column, Options, Table, from_cells
+from pikanid.storage.limits import DAMAGE, MOST_UNPACKED
 
 
-def read(content: bytes, where: str) -> Table:
+def read(content: bytes, where: str, options: Options) -> Table:
     """The table in a Parquet file.
 
     Raises:
@@ -36,8 +39,8 @@ def read(content: bytes, where: str) -> Table:
             _column(where, table.schema.field(k), table.column(k), rows)
             for k in range(table.num_columns)
         )
-    except (*FOREIGN_FAILURES, pa.ArrowException):
-        raise errors.BadRecording(errors.damaged(where, NAMES["parquet"])) from None
+    except (*DAMAGE, pa.ArrowException):
+        raise errors.BadRecording(errors.damaged(where, called(".parquet"))) from None
     if not columns or not len(rows):
         raise errors.BadRecording(errors.no_rows(where))
     return Table(columns, rows)
@@ -65,3 +68,26 @@ def _column(where: str, field: Any, data: Any, rows: range) -> Column:
         hold=meta.get("hold"),
         is_clock=column.is_clock,
     )
+
+
+def content(channels: Mapping[str, Channel], ending: str) -> bytes:
+    """What a file holds; each column carries its unit, a scalar sigma and its hold."""
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise errors.BadSetting(errors.extra_missing(".parquet", "pyarrow", "parquet")) from None
+    columns = list(flat(channels))
+    length = max(len(values) for _, _, values, _ in columns)
+    fields, arrays = [], []
+    for name, unit, values, ch in columns:
+        meta = {"unit": unit}
+        if ch is not None and isinstance(ch.sigma, float):
+            meta["sigma"] = repr(ch.sigma)
+        if ch is not None and ch.hold is not None:
+            meta["hold"] = ch.hold
+        fields.append(pa.field(name, pa.float64(), metadata=meta))
+        arrays.append(pa.array(np.pad(values, (0, length - len(values)), constant_values=np.nan)))
+    buffer = io.BytesIO()
+    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), buffer)
+    return buffer.getvalue()

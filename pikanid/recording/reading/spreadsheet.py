@@ -8,35 +8,37 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from pikanid import errors
-from pikanid.recording.reading.door import FOREIGN_FAILURES, NAMES
-from pikanid.recording.reading.table import Table, from_rows
+from pikanid.recording.formats import by_content, called
+from pikanid.recording.reading.table import Options, Table, from_rows
+from pikanid.storage.limits import DAMAGE
 
 MOST_CELLS = 20_000_000  # of a sheet, up to the last one of each row that holds something
 
 
-def read(content: bytes, where: str, kind: str, sheet: str | int | None) -> Table:
+def read(content: bytes, where: str, options: Options) -> Table:
     """The table on one sheet; row numbers are those that Excel shows.
 
     Args:
         content: Bytes of the file.
         where: Its name, for messages.
-        kind: ``"xlsx"`` or ``"xls"``.
-        sheet: By name, or number counted from 0; the first if None.
+        options: The sheet.
 
     Raises:
         BadRecording: If the workbook is damaged, or the sheet is missing or empty.
     """
-    rows, numbers = cells(content, where, kind, sheet)
+    rows, numbers = cells(content, where, options.sheet)
     if not rows:
         raise errors.BadRecording(errors.no_rows(where))
     return from_rows(where, rows, numbers)
 
 
 def cells(
-    content: bytes, where: str, kind: str, sheet: str | int | None
+    content: bytes, where: str, sheet: str | int | None
 ) -> tuple[list[list[object]], list[int]]:
     """The rows of a sheet that are not empty, cut to their common width, and their numbers."""
-    raw = (_xlsx if kind == "xlsx" else _xls)(content, where, sheet)
+    found = by_content(content)
+    new = found is not None and ".xlsx" in found.endings
+    raw = (_xlsx if new else _xls)(content, where, sheet)
     kept = [k for k, row in enumerate(raw) if any(not _blank(cell) for cell in row)]
     width = max((k + 1 for row in raw for k, cell in enumerate(row) if not _blank(cell)), default=0)
     squared = [[*raw[k], *[None] * width][:width] for k in kept]
@@ -63,8 +65,8 @@ def _xlsx(content: bytes, where: str, sheet: str | int | None) -> list[list[obje
                 return _within(page.iter_rows(values_only=True), where)
             finally:
                 book.close()
-    except FOREIGN_FAILURES:
-        raise errors.BadRecording(errors.damaged(where, NAMES["xlsx"])) from None
+    except DAMAGE:
+        raise errors.BadRecording(errors.damaged(where, called(".xlsx"))) from None
 
 
 def _within(rows: Iterable[Sequence[object]], where: str) -> list[list[object]]:
@@ -90,8 +92,8 @@ def _xls(content: bytes, where: str, sheet: str | int | None) -> list[list[objec
         page = book.sheet_by_name(_sheet(book.sheet_names(), sheet, where))
         return _within(([_xls_cell(cell, book.datemode) for cell in page.row(k)]
                         for k in range(page.nrows)), where)
-    except (*FOREIGN_FAILURES, xlrd.XLRDError, xlrd.compdoc.CompDocError):
-        raise errors.BadRecording(errors.damaged(where, NAMES["xls"])) from None
+    except (*DAMAGE, xlrd.XLRDError, xlrd.compdoc.CompDocError):
+        raise errors.BadRecording(errors.damaged(where, called(".xls"))) from None
 
 
 def _xls_cell(cell: Any, datemode: int) -> object:

@@ -17,6 +17,21 @@ _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 _EMPTY = frozenset(["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"])
 
 
+@dataclass(frozen=True)
+class Options:
+    """What a reader may be told; a format takes what concerns it.
+
+    Attributes:
+        sheet: By name, or number counted from 0; the first if None.
+        delimiter: One character; found out if None.
+        decimal: ``"."`` or ``","``; found out if None.
+    """
+
+    sheet: str | int | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Column:
     """One column of numbers, or why it is none.
