@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,7 +12,8 @@ from scipy.optimize import minimize
 
 import pikanid as pk
 from pikanid import errors
-from pikanid.mismatch.design.confusable import Confusable, confusable
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.design.confusable import Confusable, _visible, confusable
 from pikanid.mismatch.design.response import Watched, response
 from pikanid.model import Parameter, systems
 from pikanid.recording import excitation
@@ -132,3 +135,11 @@ def test_what_cannot_be_asked() -> None:
         "equations": {"x": "-k*x"}, "outputs": {"x": {"expression": "x"}}})
     with pytest.raises(errors.BadModel):
         confusable(decay, excitation.free_decay(1.0), 0.1)
+
+
+def test_an_effect_that_nothing_shows_has_no_size() -> None:
+    one = SimpleNamespace(key="shy", ids=("shy",), name="a shy effect", parameters=())
+    shown = _visible(cast(Candidate, one), None, None, ())
+    assert (shown.parameter, shown.smallest, shown.falling) == ("", np.inf, False)
+    assert (shown.value, shown.strength, shown.rivals) == (0.0, 0.0, ())
+    assert "not at all" in str(Confusable((shown,), 4.0))

@@ -16,9 +16,10 @@ from tanks import coarse, recording, tank
 
 import pikanid as pk
 from pikanid import errors
-from pikanid.discrepancy import Discrepancy, Edge, api
+from pikanid.discrepancy import Discrepancy, Edge, api, functional
 from pikanid.discrepancy.edges import EdgePlan
 from pikanid.discrepancy.level import Level
+from pikanid.formula.expressions import symbol
 from pikanid.problem.problem import Problem
 from pikanid.uncertainty import cramer_rao
 
@@ -148,6 +149,36 @@ def test_clean_data_show_nothing(seed: int) -> None:
     assert clean.significant == () and clean.adequate
     assert clean.edge("x").share_inside(lambda x: 0.0 * x) >= 0.5
     assert "nothing" in str(clean)
+
+
+def test_the_relaxation_sees_the_prior_as_data(found: Discrepancy,
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outputs whose squares add up to the penalty of the coefficients, recorded as zero."""
+    class Asked(Exception):
+        pass
+
+    seen: list[Problem] = []
+
+    def asked(problem: Problem, settings: object) -> None:
+        seen.append(problem)
+        raise Asked
+
+    monkeypatch.setattr(functional, "fit_relaxed", asked)
+    level = coarse()
+    with pytest.raises(Asked):
+        functional.relaxed_level(found.nominal, Problem(found.nominal.fitted_model,
+                                                        recording(0.3, 0)), "x", level.plans, 8)
+    (problem,) = seen
+    rows = [o for o in problem.model.outputs if o.name.startswith("prior_")]
+    labels, prior = [f.label for f in problem.free], level.fit.smoothness
+    theta = np.random.default_rng(0).normal(size=len(labels))
+    at = dict(zip(map(symbol, labels), theta, strict=True))
+    values = np.array([float(o.expression.subs(at)) for o in rows])
+    for o in rows:
+        channel = problem.recordings[0][o.name]
+        assert channel.values.mean() == 0.0 and channel.sigma == pytest.approx(np.sqrt(2.0))
+    wanted = theta @ prior.precision(prior.stiff) @ theta
+    assert values @ values == pytest.approx(wanted, rel=1e-6)
 
 
 @pytest.mark.slow

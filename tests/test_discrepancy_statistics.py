@@ -22,7 +22,7 @@ from pikanid.discrepancy.edges import EdgePlan
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import Gauge, Visited, fix_gauges
 from pikanid.discrepancy.mixture import View, mixed_edge
-from pikanid.discrepancy.smoothness import EdgePrior, Smoothness
+from pikanid.discrepancy.smoothness import ROUGHEST, EdgePrior, Smoothness
 
 G = 8
 SIGMA = 0.05
@@ -288,3 +288,33 @@ def test_wald_is_the_fall_of_chi_square_beside_what_the_gauge_takes_out(
     # priors on offset and coefficients are weak, but there; one degree more or less were 15 %
     assert chi2.isf(p, count) == pytest.approx(fall[0] - fall[1], rel=0.03)
     assert 1e-8 < p < 0.5
+
+
+def test_likelihood_of_an_edge_leaves_parameters_at_their_best() -> None:
+    """χ² of coefficients, parameters refitted by least squares, up to a constant."""
+    y = np.random.default_rng(4).normal(size=400) + design()[:, 5]
+    J, (S, g) = design(), likelihood(linear_fit(y), 0)
+
+    def left(c: np.ndarray) -> float:
+        rest = y - J[:, 2:] @ c
+        return float(np.sum((rest - J[:, :2] @ np.linalg.lstsq(J[:, :2], rest, rcond=None)[0])**2))
+
+    first, second = np.random.default_rng(5).normal(size=(2, plan().size))
+    wanted = left(first) - left(second)
+    assert abs(wanted) > 100.0
+    assert first @ S @ first - 2 * g @ first - second @ S @ second + 2 * g @ second == (
+        pytest.approx(wanted, rel=1e-8))
+
+
+def test_a_grid_goes_a_little_beyond_what_was_visited() -> None:
+    placed = plan().over(np.array([0.3, -1.0, 0.5]), 12)
+    assert placed.intervals == 12
+    assert placed.limits == pytest.approx((-1.0 - 0.05 * 1.5, 0.5 + 0.05 * 1.5))
+
+
+def test_smoothness_stays_within_its_limits() -> None:
+    """However large, a curve without any smoothness asks for no more than the roughest."""
+    J, smooth = design(), smoothness()
+    c = 1e7 * np.random.default_rng(6).normal(size=plan().size)
+    rho, _ = smooth.choose(J.T @ J, J.T @ (J[:, 2:] @ c), smooth.stiff)
+    assert rho == pytest.approx(ROUGHEST)

@@ -22,6 +22,7 @@ from pikanid.validation.equivalence import (  # noqa: E402
 )
 from pikanid.validation.equivalence.checks import apart, compare_paths, settings  # noqa: E402
 from pikanid.validation.equivalence.controls import uniqueness  # noqa: E402
+from pikanid.validation.equivalence.delivery import delivered_curve  # noqa: E402
 from pikanid.validation.equivalence.ipda import IpdaObjective  # noqa: E402
 from pikanid.validation.equivalence.network import NetworkLoss  # noqa: E402
 from pikanid.validation.equivalence.optimisers import Path as Iterates  # noqa: E402
@@ -258,3 +259,9 @@ def test_a_failure_is_reported_as_one() -> None:
 def test_every_setting() -> None:
     report = run_checks(seed=1)
     assert report.passed, report.failures
+
+
+def test_what_is_handed_over_is_compared_with_its_slope() -> None:
+    found = delivered_curve()
+    assert [r.quantity for r in found] == ["curve", "time derivative"] * 3
+    assert all(r.passed for r in found)

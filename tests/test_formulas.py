@@ -40,6 +40,14 @@ def test_the_missing_law_is_among_the_formulas(case: Case) -> None:
     assert f"{SYMBOLIC}a_theta*theta**3" not in formulas  # the catalogue's own
 
 
+def test_constants_of_a_formula_have_units(case: Case) -> None:
+    shape = force_shape(case.base, case.sites[0], case.candidates)
+    for c in symbolic_candidates(shape, case.sites[0], case.candidates):
+        assert all(isinstance(p.unit, str) for p in c.parameters)
+        force = [p.unit for p in c.parameters if p.name.startswith("force_0")]
+        assert force in ([], [shape.unit])
+
+
 def test_a_patch_predicts_better_inside_its_range(case: Case) -> None:
     shape = force_shape(case.base, case.sites[0], case.candidates)
     found = patch(case.base, case.model, shape, case.sites[0], case.records, case.later,

@@ -187,3 +187,8 @@ def test_more_unknowns_than_rows() -> None:
     found = levenberg_marquardt(lambda z: wide @ z - target, lambda z: (wide @ z - target, wide),
                                 np.zeros(9), lower=-none, upper=none)
     assert found.cost < 1e-10
+
+
+def test_devices_that_torch_has() -> None:
+    assert gradient.present("cpu") and not gradient.present("abacus")
+    assert gradient.present("cuda") == torch.cuda.is_available()

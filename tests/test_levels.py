@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,11 @@ import pytest
 from tanks import coarse, searching
 
 from pikanid.discrepancy import levels
+from pikanid.discrepancy.edges import EdgePlan
 from pikanid.discrepancy.fit import penalised_fit
 from pikanid.discrepancy.level import Level
 from pikanid.discrepancy.levels import Search
+from pikanid.discrepancy.offers import step_offers
 from pikanid.objective.shooting import Accuracy, Shooting
 
 
@@ -25,6 +28,24 @@ def test_a_finer_grid_is_taken_where_its_fit_is_more_evident(
     monkeypatch.setattr(Search, "again", again)
     found = searching().finer(coarse(), 16)
     assert (found is not None) == (rise > levels.FINER)
+
+
+def test_a_step_that_is_not_there_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    level = coarse()
+    (offer,) = step_offers(level, "x")
+    asked: list[list[bool]] = []
+
+    def again(search: Search, stepped: Level, plans: Sequence[EdgePlan], pieces: object) -> Level:
+        asked.append([p.step for p in plans])
+        return level
+
+    monkeypatch.setattr(Search, "again", again)
+    assert searching().pruned(replace(level, plans=offer.plans, fit=offer.fit)) is level
+    assert asked == [[False]]
+    sure = np.array(offer.fit.theta)
+    sure[-1] = 1e3
+    stepped = replace(level, plans=offer.plans, fit=replace(offer.fit, theta=sure))
+    assert searching().pruned(stepped) is stepped and len(asked) == 1
 
 
 def test_a_grid_within_another_begins_with_the_same_curve() -> None:

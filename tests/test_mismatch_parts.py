@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pikanid import Recording
-from pikanid.mismatch.beyond.patch import _Basis
+from pikanid.mismatch.beyond.patch import DEGREE, INTERVALS, _Basis
 from pikanid.mismatch.beyond.penalised import Penalised, _prior
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import averaged, oversampling
@@ -106,6 +106,8 @@ def test_a_patch_is_the_same_curve_as_what_was_fitted() -> None:
     (site,) = sites(model, (quick(np.linspace(0.0, 5.0, 101), 0.5),))
     edge: Any = SimpleNamespace(argument="theta", curve=SimpleNamespace(low=-0.3, high=0.5))
     basis = _Basis(edge)
+    # all cubic splines on these intervals, but for the straight line
+    assert len(basis.names) == INTERVALS + DEGREE - 1
     rng = np.random.default_rng(2)
     delta = dict(zip(basis.names, rng.normal(size=len(basis.names)), strict=True))
     found: Any = SimpleNamespace(values=delta)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,7 +14,16 @@ import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
-from pikanid.mismatch.search.neighbours import with_simpler, with_twins, with_wider, without_one
+from pikanid.mismatch.search.neighbours import (
+    Job,
+    closest_of_each,
+    with_simpler,
+    with_twins,
+    with_wider,
+    without_one,
+)
+from pikanid.mismatch.search.screen import Screen, as_strong, drag, law, nothing
+from pikanid.mismatch.search.search import CARRIED, FEW, MORE, Search
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 
@@ -89,3 +100,110 @@ def test_nothing_is_fitted_twice_from_one_place(case: Case) -> None:
     assert search.spent == spent
     search._fit_all([(job[0], [{"l_theta": 0.04}])], again=True, always=True)
     assert search.spent > spent
+
+
+def stand_ins(case: Case, rise: float, *names: str, best: float = 1.0) -> Search:
+    """A search that has fitted each of these effects alone: χ² per row `best`, and `rise` more from
+    one to the next.
+    """
+    search, rows = case.begin_search(), case.base.whitened.rows
+    listed = {c.key: c for c in case.candidates}
+    fits = {frozenset(): replace(case.base, minimum=replace(
+        case.base.minimum, r=np.full(rows, np.sqrt(2.0 * best))))}
+    for k, name in enumerate(names):
+        r = np.full(rows, np.sqrt(best + k * rise / rows))
+        fits[frozenset({name})] = replace(case.base, effects=(listed[name],), minimum=replace(
+            case.base.minimum, r=r))
+    return replace(search, fits=fits, begun=set())
+
+
+def test_most_effects_come_first() -> None:
+    made = [SimpleNamespace(effects=(1,) * n, known=known, minimum=SimpleNamespace(chi2=chi2))
+            for n, known, chi2 in ((1, True, 1.0), (2, True, 9.0), (2, True, 7.0), (3, True, 8.0),
+                                   (3, False, 2.0), (4, True, 6.0))]
+    found = closest_of_each(cast(list[Hypothesis], made))
+    assert [(len(h.effects), h.minimum.chi2) for h in found] == [(4, 6.0), (3, 8.0), (2, 7.0)]
+
+
+def test_a_law_in_anothers_place_takes_as_much_energy(case: Case) -> None:
+    h = hypothesis(case, "quadratic_drag", q2=0.01)
+    listed = {c.key: c for c in case.candidates}
+    at = h.model.state_names.index("theta_dot")
+    (response,) = h.whitened.responses(h.minimum.theta, states=True)
+    speed = np.abs(response.states[:, at])
+    lost = h.values["q2"] * np.mean(speed**3)
+    for name, more, power in (("power_drag", [2.6], 2.6), ("power_drag", [0.5], 0.5),
+                              ("coulomb_friction", [], 0.0)):
+        size = as_strong(h, h.effects[0], listed[name], more)
+        assert size * np.mean(speed ** (1.0 + power)) == pytest.approx(lost, rel=1e-9)
+    # a spring takes none: then nothing is known
+    assert as_strong(h, h.effects[0], listed["cubic_stiffness"]) == h.values["q2"]
+
+
+def test_no_pair_begins_with_a_law_that_gives_energy(case: Case) -> None:
+    screen = Screen(case.base, [c for c in case.candidates if c.fits and c.suits()])
+    listed = screen.pairs(200)
+    sided = [(start.values[e.parameters[0].name], e.key) for both, (start,) in listed
+             for e in both if drag(e)]
+    assert sided and min(sided)[0] > 0.0
+    assert all(len({e.key for e in both}) == 2 for both, _ in listed)
+
+
+MANY = ("sensor_offset", "sensor_drift", "sensor_gain", "sensor_lag", "input_gain", "input_delay",
+        "quadratic_drag", "coulomb_friction", "cubic_stiffness", "quadratic_stiffness",
+        "input_saturation", "input_dead_zone", "sensor_saturation", "actuator_lag")
+
+
+@pytest.mark.parametrize("best", [1.0, 1e4])
+def test_the_best_go_along_to_other_records(case: Case, best: float,
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few where none of them explains the first ones."""
+    names = [n for n in MANY if n in {c.key for c in case.candidates}]
+    assert len(names) > CARRIED
+    search, asked = stand_ins(case, best, *names, best=best), list[list[frozenset[str]]]()
+
+    def noted(self: Search, jobs: Sequence[Job], **_: object) -> None:
+        asked.append([frozenset(e.key for e in effects) for effects, _ in jobs])
+
+    monkeypatch.setattr(Search, "_fit_all", noted)
+    monkeypatch.setattr(Search, "base", lambda self: None)
+    new = search.carried_over(case.records)
+    assert new.fits == {} and new.records is case.records
+    assert asked == [[frozenset({n}) for n in names[: FEW if best > 1.0 else CARRIED]]]
+
+
+def test_contenders_score_about_as_well_as_the_best(case: Case) -> None:
+    search = stand_ins(case, 2.5, "sensor_offset", "sensor_drift", "sensor_gain", "sensor_lag")
+    assert [set(h.key) for h in search._contenders()] == [
+        {"sensor_offset"}, {"sensor_drift"}, {"sensor_gain"}]
+
+
+def test_laws_are_added_to_the_best_hypothesis_whatever_they_promise(
+        case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    search, asked = stand_ins(case, 5.0, "sensor_offset", "sensor_drift"), list[object]()
+
+    def noted(self: Search, h: Hypothesis, count: int, least: float = 0.0,
+              always: object = nothing, anyway: bool = False) -> None:
+        asked.append((set(h.key), count, always))
+
+    monkeypatch.setattr(Search, "_extend", noted)
+    for name in ("_fit_all", "_simplify"):
+        monkeypatch.setattr(Search, name, lambda *_, **__: None)
+    ranked = search.grow(lambda h: False)
+    assert asked == [({"sensor_offset"}, MORE, law), ({"sensor_drift"}, MORE, nothing)]
+    assert [set(h.key) for h in ranked] == [{"sensor_offset"}, {"sensor_drift"}, set()]
+
+
+def test_a_search_goes_on_with_other_records(case: Case) -> None:
+    other, given = SimpleNamespace(base=lambda: hypothesis(case)), list[object]()
+
+    def carried_over(records: object) -> object:
+        given.append(records)
+        return other
+
+    same = replace(case, tests={(frozenset(), 1.0): cast(Any, None)},
+                   predictions={(frozenset(), 1.0): None})
+    search = cast(Search, SimpleNamespace(carried_over=carried_over))
+    assert same.resumed(search) is cast(Any, other) and same.search is cast(Any, other)
+    assert given == [case.records] and not same.tests and not same.predictions
+    assert same.base.key == frozenset()

@@ -148,3 +148,13 @@ def test_memory_of_what_never_ends_is_infinite() -> None:
     # a pair of complex poles of modulus √0.81
     assert AR(np.array([0.5, -0.81]), 1.0, 1.0, 0.1).memory == pytest.approx(
         -1 / np.log(0.9))
+
+
+def test_series_that_are_all_or_nothing_have_a_stable_model() -> None:
+    """Zeros, a constant, and one that changes its sign every time."""
+    still = burg(np.zeros(40), 2)
+    assert still.coefficients.tolist() == [0.0, 0.0] and still.sigma == 0.0
+    for series in (np.ones(40), (-1.0) ** np.arange(40)):
+        model = burg(series, 1)
+        assert 0.999 < abs(model.coefficients[0]) < 1.0
+        assert model.innovation > 0.0 and np.isfinite([model.sigma, model.memory]).all()

@@ -49,6 +49,8 @@ def test_interval_of_a_straight_line_by_hand(name: str, level: float, stated: bo
     assert found.interval == pytest.approx((BEST[k] - half, BEST[k] + half), abs=1e-6 * half)
     assert (found.name, found.level) == (name, level)
     assert np.all(np.diff(found.values) > 0) and BEST[k] in found.values
+    at = int(np.searchsorted(found.values, BEST[k]))  # by the same step to either side
+    assert found.values[at + 1] - BEST[k] == pytest.approx(BEST[k] - found.values[at - 1])
     parabola = ((found.values - BEST[k]) / half) ** 2 * chi2.ppf(level, 1)
     np.testing.assert_allclose(found.excess, parabola, atol=1e-6)
 

@@ -262,3 +262,19 @@ def test_bad_data_are_refused() -> None:
         extract(kan, np.zeros((10, 2)), np.zeros(10), inputs=["one"])
     with pytest.raises(errors.BadSetting, match="alpha"):
         prune(kan, np.zeros((10, 2)), np.zeros(10), alpha=2.0)
+
+
+def test_a_network_is_read_over_the_inputs_that_it_saw_last() -> None:
+    import torch
+
+    x, y = points(lambda a, b: a**2 + b**3, 0.0, n=100)
+    kan = fit_points(build_kan([2, 1], grid=4), x, y).kan
+    with torch.no_grad():
+        value = kan(torch.from_numpy(x)).numpy()[:, 0]
+    few = [FORMS["quadratic"], FORMS["cubic"]]
+    reading = extract(kan, library=few)
+    assert list(reading.forms.values()) == ["quadratic", "cubic"]
+    np.testing.assert_allclose(reading.ranges, np.column_stack([x.min(axis=0), x.max(axis=0)]))
+    off = np.sqrt(np.mean((reading(x) - value) ** 2))
+    assert reading.error_network == pytest.approx(off, rel=1e-6, abs=1e-12)
+    assert reading.spread == pytest.approx(np.std(value), rel=1e-6) and reading.ok

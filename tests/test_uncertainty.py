@@ -227,3 +227,10 @@ def test_profile_of_an_unknown_parameter_is_refused() -> None:
     with pytest.raises(errors.BadModel, match="k"):
         profile(MODEL.with_parameters(Parameter("k", 1.0, free=False)), noisy(),
                 np.array([0.045, 0.15]), "k")
+
+
+def test_without_coefficients_all_information_is_left() -> None:
+    parameters = np.random.default_rng(0).normal(size=(6, 2))
+    part = information_partition(np.empty((6, 0)), parameters)
+    np.testing.assert_allclose(part.effective, part.alone)
+    np.testing.assert_allclose(part.shares, 1.0)

@@ -249,6 +249,11 @@ def test_the_most_probable_explanation_comes_first() -> None:
     part = answered([BASE, hypothesis(1000.0, A), hypothesis(1001.0, B)], refused=("a", "b"),
                     misfit={"a": 0.22, "b": 0.21})
     assert part.verdict == "unconfirmed" and [h.key for h in part.given] == [{"a"}, {"b"}]
+    # also a law of whole exponent, that no law of free exponent stands beside
+    square = replace(A, exponent=2.0)
+    part = answered([BASE, hypothesis(1000.0, square), hypothesis(1001.0, B)],
+                    refused=("a", "b"), misfit={"a": 0.22, "b": 0.21})
+    assert part.verdict == "unconfirmed" and [h.key for h in part.given] == [{"a"}, {"b"}]
 
 
 def test_what_is_sure_is_given_whatever_weak_effect_may_be_there_besides() -> None:
