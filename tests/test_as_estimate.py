@@ -9,6 +9,7 @@ import pikanid as pk
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.as_estimate import as_estimate
 from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 from pikanid.strategies.nls import NLS
 
@@ -18,7 +19,8 @@ SIGMA = 0.002
 def test_it_says_what_least_squares_of_the_model_say() -> None:
     model = pk.systems.sloshing()
     recording = pk.simulate(model, pk.excitation.two_pulse(), sigma=SIGMA, seed=0)
-    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},))
+    records = Records((recording,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},),
+                      DEFAULTS)
     like = NLS().fit(model, recording)
     h = fitted(model, (), records, [{}], 1)
     assert h is not None

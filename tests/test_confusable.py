@@ -15,6 +15,7 @@ from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.design.confusable import Confusable, _visible, confusable
 from pikanid.mismatch.design.response import Watched, response
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Parameter, systems
 from pikanid.recording import excitation
 
@@ -139,7 +140,7 @@ def test_what_cannot_be_asked() -> None:
 
 def test_an_effect_that_nothing_shows_has_no_size() -> None:
     one = SimpleNamespace(key="shy", ids=("shy",), name="a shy effect", parameters=())
-    shown = _visible(cast(Candidate, one), None, None, ())
+    shown = _visible(cast(Candidate, one), None, None, (), DEFAULTS)
     assert (shown.parameter, shown.smallest, shown.falling) == ("", np.inf, False)
     assert (shown.value, shown.strength, shown.rivals) == (0.0, 0.0, ())
     assert "not at all" in str(Confusable((shown,), 4.0))

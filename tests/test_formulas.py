@@ -42,7 +42,7 @@ def test_the_missing_law_is_among_the_formulas(case: Case) -> None:
 
 def test_constants_of_a_formula_have_units(case: Case) -> None:
     shape = force_shape(case.base, case.sites[0], case.candidates)
-    for c in symbolic_candidates(shape, case.sites[0], case.candidates):
+    for c in symbolic_candidates(shape, case.sites[0], case.candidates, DEFAULTS):
         assert all(isinstance(p.unit, str) for p in c.parameters)
         force = [p.unit for p in c.parameters if p.name.startswith("force_0")]
         assert force in ([], [shape.unit])

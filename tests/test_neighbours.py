@@ -23,7 +23,7 @@ from pikanid.mismatch.search.neighbours import (
     without_one,
 )
 from pikanid.mismatch.search.screen import Screen, as_strong, drag, law, nothing
-from pikanid.mismatch.search.search import CARRIED, FEW, MORE, Search
+from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 
@@ -159,7 +159,8 @@ def test_the_best_go_along_to_other_records(case: Case, best: float,
                                             monkeypatch: pytest.MonkeyPatch) -> None:
     """Few where none of them explains the first ones."""
     names = [n for n in MANY if n in {c.key for c in case.candidates}]
-    assert len(names) > CARRIED
+    budget = DEFAULTS.budget
+    assert len(names) > budget.carried > budget.carried_far
     search, asked = stand_ins(case, best, *names, best=best), list[list[frozenset[str]]]()
 
     def noted(self: Search, jobs: Sequence[Job], **_: object) -> None:
@@ -169,11 +170,12 @@ def test_the_best_go_along_to_other_records(case: Case, best: float,
     monkeypatch.setattr(Search, "base", lambda self: None)
     new = search.carried_over(case.records)
     assert new.fits == {} and new.records is case.records
-    assert asked == [[frozenset({n}) for n in names[: FEW if best > 1.0 else CARRIED]]]
+    count = budget.carried_far if best > 1.0 else budget.carried
+    assert asked == [[frozenset({n}) for n in names[:count]]]
 
 
 def test_contenders_score_about_as_well_as_the_best(case: Case) -> None:
-    search = stand_ins(case, 2.5, "sensor_offset", "sensor_drift", "sensor_gain", "sensor_lag")
+    search = stand_ins(case, DEFAULTS.verdict.indistinct / 2.4, *MANY[:4])
     assert [set(h.key) for h in search._contenders()] == [
         {"sensor_offset"}, {"sensor_drift"}, {"sensor_gain"}]
 
@@ -189,8 +191,8 @@ def test_laws_are_added_to_the_best_hypothesis_whatever_they_promise(
     monkeypatch.setattr(Search, "_extend", noted)
     for name in ("_fit_all", "_simplify"):
         monkeypatch.setattr(Search, name, lambda *_, **__: None)
-    ranked = search.grow(lambda h: False)
-    assert asked == [({"sensor_offset"}, MORE, law), ({"sensor_drift"}, MORE, nothing)]
+    ranked, count = search.grow(lambda h: False), DEFAULTS.budget.beside_one
+    assert asked == [({"sensor_offset"}, count, law), ({"sensor_drift"}, count, nothing)]
     assert [set(h.key) for h in ranked] == [{"sensor_offset"}, {"sensor_drift"}, set()]
 
 
