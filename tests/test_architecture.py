@@ -243,3 +243,39 @@ def test_docstrings_have_one_style() -> None:
              for number, line in enumerate(path.read_text("utf-8").splitlines(), 1)
              if re.fullmatch(r"\s+-{4,}", line)]
     assert found == []
+
+
+def unexplained_numbers(source: str) -> list[str]:
+    """Upper-case names that hold numbers, and no comment on the last line that says `numerical:`,
+    and why.
+    """
+    lines, found = source.splitlines(), []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
+            continue
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        names = [n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)]
+        numbers = any(isinstance(n, ast.Constant) and type(n.value) in (int, float)
+                      for n in ast.walk(node.value))
+        explained = re.search(r"# numerical: \S.{9,}$", lines[(node.end_lineno or 1) - 1])
+        if numbers and not explained and any(n.isupper() and len(n) > 1 for n in names):
+            found += names
+    return found
+
+
+@pytest.mark.parametrize("planted", [
+    "CLEAR = 5.0", "CLEAR = 5.0  # standard errors that make an effect clear",
+    "CLEAR: float = 5.0", "CLEAR, FAINT = 5.0, 1.0", "CLEAR = (5.0, 6.0)  # numerical:",
+    "CLEAR = np.array([5.0])", "def f():\n    CLEAR = 5\n", "class A:\n    CLEAR = -5\n"])
+def test_a_planted_number_is_seen(planted: str) -> None:
+    assert "CLEAR" in unexplained_numbers(planted)
+
+
+def test_numbers_that_mean_something_are_settings() -> None:
+    """What decides in a diagnosis is a field of `Settings`; a tolerance says why it is none."""
+    assert unexplained_numbers("DAMPING = 1e-3  # numerical: of a first step, any would do") == []
+    assert unexplained_numbers("NAME = 'a 5'\nSTEPS = steps(settings)\ncount = 3") == []
+    found = {name: numbers for name, path in modules().items()
+             if name.startswith("pikanid.mismatch.")
+             and (numbers := unexplained_numbers(path.read_text("utf-8")))}
+    assert found == {}, "make it a field of pikanid.Settings, or end its line in '# numerical: why'"

@@ -83,7 +83,7 @@ def truth(law: str, seed: int, force: ForceOverTime) -> np.ndarray:
 
 def flat(values: np.ndarray, **other: float) -> ForceOverTime:
     numbers = {"critical": 3.0, "resolution": 0.2, "freedom": 50.0, "left": 1.0, "spacing": 0.1,
-               "period": 0.4, **other}
+               "period": 0.4, "enough": 4, **other}
     t = np.linspace(0.0, 10.0, len(values))
     return ForceOverTime(t, values, np.ones(len(values)), unit="rad/s^2", **numbers)
 

@@ -38,7 +38,7 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Input
 from pikanid.recording.channel import Channel
 
-DEGREE = 3  # numerical: cubic
+DEGREE = 3  # numerical: cubic, as smooth as a motion is
 POINTS = 4  # numerical: of the drawn grid to a knot interval
 
 
@@ -59,7 +59,7 @@ class ForceOverTime:
         unit: Of q''.
         spacing: Of the knots [s].
         period: Natural period [s]; 0 without a restoring force.
-        resolved: Whether the knots are fine enough for a force that follows the motion.
+        enough: Knots in a natural period from which on a force that follows the motion shows.
     """
 
     t: np.ndarray
@@ -72,7 +72,12 @@ class ForceOverTime:
     unit: str
     spacing: float
     period: float
-    resolved: bool
+    enough: int
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the knots are fine enough for a force that follows the motion."""
+        return self.enough * self.spacing <= self.period or not self.period
 
     @property
     def windows(self) -> tuple[tuple[float, float], ...]:
@@ -133,15 +138,14 @@ def force_over_time(base: Hypothesis, site: Site) -> ForceOverTime | None:
         motion = pushed
     assert fitted is not None
     t = np.linspace(start, stop, POINTS * intervals + 1)
-    spacing = (stop - start) / intervals
     resolution = (stop - start) / max(fitted.freedom, 1.0)
     means = _means(t, knots, resolution)
     spread = solve_triangular(fitted.root, (means @ fitted.gauge).T, lower=True)
     spread *= max(fitted.left, 1.0) ** 0.5
     return ForceOverTime(t, means @ force, np.linalg.norm(spread, axis=0),
                          critical_value(spread, 1 - settings.band), resolution, fitted.freedom,
-                         fitted.left, f"{site.unit}/s^2", spacing, period,
-                         not period or settings.beyond.resolved * spacing <= period)
+                         fitted.left, f"{site.unit}/s^2", (stop - start) / intervals, period,
+                         settings.beyond.resolved)
 
 
 def _intervals(span: float, period: float, rows: int, settings: Settings) -> int:

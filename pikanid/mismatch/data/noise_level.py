@@ -21,7 +21,7 @@ from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
 LONGEST = 50  # numerical: samples of a gap beyond which a line across it leaves nothing that counts
-GRID = np.linspace(0.0, 0.95, 191)  # correlations of neighbours that are compared
+GRID = np.linspace(0.0, 0.95, 191)  # numerical: correlations of neighbours that are compared
 Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
 
 

@@ -13,10 +13,8 @@ from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.noise.level import high_band_sigma
 from pikanid.recording import Recording
 
-# the cubic through two neighbours on either side
-CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
-# straight on from three neighbours on the left
-LINE = np.array([-2.0, 1.0, 4.0]) / 3.0
+CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0  # numerical: through two neighbours a side
+LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
 def without_outliers(recording: Recording, output: str, noise: NoiseSettings

@@ -25,7 +25,7 @@ from pikanid.simulation.vectorfield import VectorField
 TOGETHER = 100  # numerical: signs integrated at once
 CELLS = 400_000  # numerical: signs times steps at once, to keep memory small
 STABLE = 1.5  # numerical: rate times step that the Runge-Kutta method follows well enough
-MOST_PARTS = 64  # numerical: of a step
+MOST_PARTS = 64  # numerical: of a step: stiffer motions are not followed
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,196 @@
+"""Settings of a diagnosis: documented, checked, from files, printed, and taken by every step."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from dataclasses import fields, is_dataclass, replace
+from math import log
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import pikanid as pk
+from pikanid import errors
+from pikanid.cli import app
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.report.locate import smallest
+from pikanid.mismatch.search.search import Search
+from pikanid.mismatch.settings import thresholds
+from pikanid.mismatch.settings.settings import DEFAULTS, RATES, Settings
+from pikanid.mismatch.steps.opening import open_case
+
+GROUPS = [DEFAULTS, *(value for f in fields(DEFAULTS)
+                      if is_dataclass(value := getattr(DEFAULTS, f.name)))]
+
+
+@pytest.mark.parametrize("group", GROUPS, ids=lambda g: type(g).__name__)
+def test_every_field_is_described(group: Any) -> None:
+    text = inspect.getdoc(type(group)) or ""
+    described = set(re.findall(r"^    (\w+): \S", text, re.MULTILINE))
+    assert described >= {f.name for f in fields(group)}
+
+
+def test_thresholds_follow_from_their_rates() -> None:
+    z = NormalDist().inv_cdf
+    usual = Settings()
+    assert usual.adequate == 0.005 and usual.separated == 4.0 and usual.visible == 5.0
+    assert usual.louder == 1.64 and usual.contradiction == 4.6
+    careful = Settings(alpha=1e-4, refusal=0.002, confusion=1e-3, noise_excess=0.001,
+                       noise_conflict=1e-6)
+    assert careful.adequate == 0.001
+    assert careful.visible == pytest.approx(z(0.9) - z(1e-6), abs=0.05)
+    assert careful.separated == pytest.approx(-2 * z(1e-3), abs=0.05)
+    assert careful.louder == pytest.approx(-z(1e-3), abs=0.005)
+    assert careful.contradiction == pytest.approx(-log(1e-6), abs=0.05)
+    assert careful.least_proof == pytest.approx((z(0.9) - z(1e-4)) ** 2)
+    assert thresholds.price(3, 2, 1000, 50, 0.5) == pytest.approx(3 * log(1000) + 2 * log(50))
+    assert thresholds.bic(1000) == pytest.approx(log(1000) / 2)
+
+
+def test_the_separation_of_two_hypotheses_errs_at_its_rate() -> None:
+    """The likelihood ratio of two predictions D apart, drawn under either of them."""
+    drawn = np.random.default_rng(0).standard_normal(200_000)
+    distance = Settings(confusion=0.01).separated
+    assert np.mean(drawn > distance / 2) == pytest.approx(0.01, abs=0.001)
+
+
+def test_a_table_describes_settings_and_back() -> None:
+    own = Settings(alpha=0.05).with_values({"search.faint": 4.0, "budget.force_knots": (9, 90)})
+    assert own.changed() == {"alpha": 0.05, "search.faint": 4.0, "budget.force_knots": (9, 90)}
+    assert Settings.from_dict(json.loads(json.dumps(own.to_dict()))) == own
+    assert str(own) == ("Settings: alpha = 0.05, search.faint = 4, budget.force_knots = (9, 90); "
+                        "all others defaults.")
+
+
+@pytest.mark.parametrize(("values", "told"), [
+    ({"alpha": 0.0}, "alpha.*between 0 and 1"),
+    ({"power": 1.0}, "power.*between 0 and 1"),
+    ({"alpha": "0.05"}, "alpha"),
+    ({"kinds": (0.9, 0.2, 0.2)}, "kinds.*shares of 1"),
+    ({"budget.singles": 2.5}, "budget.singles.*whole number"),
+    ({"budget.singles": 0}, "budget.singles.*whole number"),
+    ({"budget.pairs": True}, "budget.pairs.*whole number"),
+    ({"search.faint": -1.0}, "search.faint.*0 or more"),
+    ({"search.faint": float("nan")}, "search.faint.*0 or more"),
+    ({"verdict.strong": (1.0, 2.0)}, "verdict.strong.*4 of these"),
+    ({"search.fainter": 1.0}, "no setting 'search.fainter'.*search.faint"),
+    ({"verdict": 1.0}, "no setting 'verdict'"),
+    ({"budget.singles.x": 1}, "no setting 'budget.singles.x'"),
+])
+def test_what_is_no_setting_is_refused(values: dict[str, Any], told: str) -> None:
+    with pytest.raises(errors.BadSetting, match=told):
+        DEFAULTS.with_values(values)
+
+
+def test_a_group_of_another_kind_is_refused() -> None:
+    with pytest.raises(errors.BadSetting, match="search"):
+        replace(DEFAULTS, search={"faint": 3.0})  # type: ignore[arg-type]  # what a user may do
+    with pytest.raises(errors.BadSetting, match="settings"):
+        pk.diagnose(pk.systems.sloshing(), run(1),
+                    settings={"alpha": 0.1})  # type: ignore[arg-type]  # what a user may do
+
+
+@pytest.mark.parametrize("content", [
+    b"alpha = ", b"\xff\xfe", b"alpha = 2", b"[search]\nfainter = 1", b"search = 3",
+    b"[a.b]\nc = 1", b"alpha = nan", b"x = " + b"[" * 2000])
+def test_a_file_of_wrong_settings_is_refused(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "own.toml"
+    file.write_bytes(content)
+    with pytest.raises(errors.BadSetting):
+        Settings.read(file)
+
+
+def run(seed: int) -> pk.Recording:
+    return pk.simulate(pk.systems.sloshing(), pk.excitation.planar_moves(3, 6.0, seed=seed),
+                       sigma=0.002, seed=seed)
+
+
+def test_a_result_says_by_which_settings_it_came(tmp_path: Path) -> None:
+    """The page, the file and the text; --alpha and --settings meet in one."""
+    run(1).write(tmp_path / "run.csv")
+    (tmp_path / "own.toml").write_text("[budget]\nsingles = 3\n")
+    said = CliRunner().invoke(app, [
+        "diagnose", str(tmp_path / "run.csv"), "--model", "sloshing", "--alpha", "0.02",
+        "--settings", str(tmp_path / "own.toml"), "--json", str(tmp_path / "why.json"),
+        "--report", str(tmp_path / "why.html")])
+    assert said.exit_code == 0, said.output
+    words = "Settings: alpha = 0.02, budget.singles = 3; all others defaults."
+    assert said.output.rstrip().endswith(words)
+    assert words in (tmp_path / "why.html").read_text("utf-8")
+    found = json.loads((tmp_path / "why.json").read_text("utf-8"))
+    assert found["alpha"] == 0.02
+    assert Settings.from_dict(found["settings"]).changed() == {"alpha": 0.02, "budget.singles": 3}
+
+
+def test_no_step_falls_back_to_the_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever is whitened, in opening, search, prediction, force and advice, has the settings."""
+    own = Settings().with_values({"budget.singles": 2, "budget.pairs": 1, "budget.effort": 0.0})
+    seen: list[Settings] = []
+    made = Whitened.__init__
+
+    def watched(self: Whitened, model: pk.Model, records: Records) -> None:
+        seen.append(records.settings)
+        made(self, model, records)
+
+    monkeypatch.setattr(Whitened, "__init__", watched)
+    truth = pk.systems.sloshing().with_term("theta_dot", "-k*theta**3", [pk.Parameter("k", 200.0)])
+    train, other = (pk.simulate(truth, pk.excitation.planar_moves(3, 6.0, seed=seed), sigma=0.002,
+                                seed=seed) for seed in (1, 2))
+    dx = pk.diagnose(pk.systems.sloshing(), train, other, settings=own, workers=1)
+    assert dx.settings is own and dx.mismatch
+    assert len(seen) > 5 and all(settings is own for settings in seen)
+
+
+def test_the_rate_of_false_alarms_decides_what_is_missing() -> None:
+    """A faint effect: missing for who accepts false alarms, nothing for who does not."""
+    truth = pk.systems.sloshing().with_term("theta_dot", "-k*theta**3", [pk.Parameter("k", 17.0)])
+    rec = pk.simulate(truth, pk.excitation.planar_moves(3, 6.0, seed=4), sigma=0.002, seed=4)
+    case = open_case(pk.systems.sloshing(), (rec,), None, None, lambda text: None, DEFAULTS)
+    p = case.detected().p_value
+    assert 1e-6 < p < 0.3
+    for alpha, missing in ((0.5 * p, False), (min(2 * p, 0.9), True)):
+        dx = pk.diagnose(pk.systems.sloshing(), rec, settings=Settings(alpha=alpha), workers=1)
+        assert dx.mismatch is missing and dx.alpha == alpha
+
+
+def test_settings_act_where_they_are_looked_up() -> None:
+    """One of each kind: price of an effect, budget of a search, size that can be seen, iterations.
+    """
+    rec = run(1)
+    usual = open_case(pk.systems.sloshing(), (rec,), None, None, lambda text: None, DEFAULTS)
+    effect = next(c for c in usual.candidates if c.key == "cubic_stiffness")
+
+    def cost(weight: float) -> float:
+        records = replace(usual.records, settings=Settings(choice_weight=weight))
+        found = fitted(usual.model, [effect], records, [{}], 40)
+        assert found is not None
+        return found.penalty
+
+    assert cost(2.0) - cost(1.0) == pytest.approx(2 * log(40))
+
+    sizes = [_sizes(usual.base, own, effect) for own in (DEFAULTS, Settings(alpha=1e-6))]
+    ratio = sizes[1]["cubic_stiffness"].value / sizes[0]["cubic_stiffness"].value
+    assert ratio == pytest.approx(Settings(alpha=1e-6).visible / 5.0)
+
+    stopped = Search(usual.model, replace(usual.records, settings=DEFAULTS.with_values(
+        {"budget.effort": 0.0})), usual.candidates, spent=1.0)
+    assert stopped.budget_exhausted and not replace(stopped, records=usual.records).budget_exhausted
+
+
+def _sizes(base: Any, own: Settings, effect: Any) -> dict[str, Any]:
+    whitened = Whitened(base.model, replace(base.whitened.records, settings=own))
+    assert whitened.choose_steps(base.minimum.theta)
+    return smallest(replace(base, whitened=whitened), [effect])
+
+
+def test_rates_are_probabilities() -> None:
+    assert all(0 < getattr(DEFAULTS, name) < 1 for name in RATES)
+    assert all(isinstance(getattr(DEFAULTS, f.name), float) == (f.name in RATES)
+               for f in fields(DEFAULTS) if f.name not in ("choice_weight",))
