@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 import pikanid as pk
+from pikanid.recording.formats import FORMATS
+from pikanid.strategies import STRATEGIES
 
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -42,3 +44,10 @@ def test_commands_are_make_targets() -> None:
     makefile = (Path(__file__).resolve().parents[1] / "Makefile").read_text(encoding="utf-8")
     assert targets == {"study", "test"}
     assert targets <= set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+
+
+def test_every_strategy_and_every_format_is_named() -> None:
+    table = README.split("| strategy | what it does |")[1].split("\n\n")[0]
+    assert re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) == list(STRATEGIES.values())
+    reads = README.split("reads your own file:")[1].split("\n\n")[0]
+    assert [f.title for f in FORMATS if f.title not in reads] == []
