@@ -59,7 +59,7 @@ def one_sentence(problem: errors.PikanidError) -> None:
 def estimate_used(content: Any) -> bool:
     """Whether it is an estimate; then everything that shows or keeps it works."""
     def wrong(detail: str) -> errors.BadSetting:
-        return errors.BadSetting(errors.estimate_file("fit.json", detail.rstrip(".")))
+        return errors.BadSetting(errors.unreadable("estimate file", "fit.json", detail))
 
     try:
         found = estimate_file.from_content(content, wrong, Estimate)

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 
-def kan_not_installed(module: str) -> str:
-    return f"KANs need '{module}', which is not installed: pip install 'pikanid[kan]'."
-
-
 def kan_width(width: object) -> str:
     return (
         f"width = {width} cannot make a KAN: list the nodes of at least two layers, each 1 or more "
@@ -71,9 +67,6 @@ def kan_kink_elsewhere(time: float) -> str:
         "over together, with `refined`."
     )
 
-
-def kan_file(path: str, detail: str) -> str:
-    return f"'{path}' is not a saved KAN that can be read: {detail}."
 
 
 def kan_points(x: object, y: object, inputs: int, outputs: int) -> str:

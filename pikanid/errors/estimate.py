@@ -10,9 +10,6 @@ def undetermined(name: str, value: float, std: float) -> str:
     )
 
 
-def estimate_file(path: str, detail: str) -> str:
-    return f"The estimate file '{path}' cannot be read: {detail}."
-
 
 def sigma_unknown(output: str) -> str:
     return f"The noise of output '{output}' is not known: pass sigma, in the output's unit."

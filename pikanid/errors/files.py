@@ -55,9 +55,6 @@ def binary_junk(where: str) -> str:
     return f"'{where}' is not text: it holds binary data, so it is no CSV."
 
 
-def extra_missing(what: str, module: str, extra: str) -> str:
-    return f"Reading {what} needs {module}, which is missing: pip install 'pikanid[{extra}]'."
-
 
 def no_rows(where: str) -> str:
     return f"'{where}' holds no rows of data."
@@ -169,3 +166,11 @@ def entry_negative(where: str) -> str:
 
 def entry_too_deep(where: str) -> str:
     return f"{where} is nested too deeply: nothing of ours writes that."
+
+
+def unreadable(what: str, path: str, detail: str) -> str:
+    return f"The {what} '{short(path, 200)}' cannot be read: {detail.rstrip('.')}."
+
+
+def not_installed(what: str, module: str, extra: str) -> str:
+    return f"{what} needs '{module}', which is not installed: pip install 'pikanid[{extra}]'."

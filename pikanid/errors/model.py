@@ -63,9 +63,6 @@ def bad_value(what: str, value: object, wanted: str) -> str:
     return f"{what} is {value!r}; it must be {wanted}."
 
 
-def model_file_unreadable(path: str, detail: str) -> str:
-    return f"The model file '{path}' cannot be read: {detail}."
-
 
 def model_file_key(path: str, where: str, key: str, known: Sequence[str]) -> str:
     return f"'{path}': {where} has the unknown key '{key}' (known: {listed(known)})."

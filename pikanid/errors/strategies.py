@@ -92,9 +92,6 @@ def not_converged(lam: float) -> str:
     )
 
 
-def torch_not_installed(module: str) -> str:
-    return f"A PINN needs '{module}', which is not installed: pip install 'pikanid[kan]'."
-
 
 def no_such_device(device: str) -> str:
     return f"There is no device '{device}' here: choose device='cpu'."

@@ -50,9 +50,6 @@ def conceal_other_settings(place: str) -> str:
     )
 
 
-def truth_unreadable(path: str, detail: str) -> str:
-    return f"The truth file '{short(path, 200)}' cannot be read: {detail}."
-
 
 def truth_case(detail: str) -> str:
     return f"A case of the truth file cannot be compared with: {detail}."

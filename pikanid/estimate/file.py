@@ -68,7 +68,7 @@ def load(path: str | os.PathLike[str], kind: Callable[..., E]) -> E:
         BadModel: The model in it is none.
     """
     def wrong(detail: str) -> errors.BadSetting:
-        return errors.BadSetting(errors.estimate_file(str(path), detail.rstrip(".")))
+        return errors.BadSetting(errors.unreadable("estimate file", str(path), detail))
 
     content = json_content(path, wrong)
     if not isinstance(content, dict) or content.get("pikanid_estimate") != SCHEMA:

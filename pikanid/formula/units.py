@@ -172,16 +172,6 @@ def factor(source: str, target: str) -> float:
     return float(_registry().Quantity(1.0, unit_a).to(unit_b).magnitude)
 
 
-def si(text: str) -> str:
-    """The coherent SI unit of the same kind, with radians kept.
-
-    >>> si("deg/s"), si("mm"), si("g")
-    ('rad/s', 'm', 'kg')
-    """
-    quantity = _registry().Quantity(1.0, _unit(parse(text))).to_base_units()
-    return parse(str(quantity.units).replace(" ", ""))
-
-
 @dataclass(frozen=True)
 class Measure:
     """What a unit measures and how large it is.

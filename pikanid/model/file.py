@@ -47,7 +47,7 @@ def load(path: str | os.PathLike[str], kind: Callable[..., M]) -> M:
         BadModel: Not a file, not TOML, or not a consistent model.
     """
     def wrong(detail: str) -> errors.BadModel:
-        return errors.BadModel(errors.model_file_unreadable(str(path), detail))
+        return errors.BadModel(errors.unreadable("model file", str(path), detail))
 
     try:
         content = tomllib.loads(file_bytes(path, wrong, MOST_MODEL).decode("utf-8"))

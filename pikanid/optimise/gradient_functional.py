@@ -56,7 +56,6 @@ class TorchFunctional:
         self._unit = self._tensor(self.unit)
         self._scale = self._tensor(1.0 / functional.scale)
         self.times, self.nets, self.data, self.physics = [], [], [], []
-        self._orders: list[list[int]] = []
         for part in functional.parts:
             times = np.unique(np.concatenate([s.t for s in (*part.data, part.physics)]))
             self.times.append(times)

@@ -155,10 +155,6 @@ class Operations(ABC):
                 )
         return self._with({**self.channels, **{ch.name: ch for ch in channels}})
 
-    def with_channel(self, channel: Channel) -> Self:
-        """With one channel added or replaced."""
-        return self.with_channels(channel)
-
     def without(self, *names: str) -> Self:
         """Without these channels.
 

@@ -36,8 +36,6 @@ from pikanid.strategies.data_noise import row_noise
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.relaxation import GRID_SETTLED, RELATIVE, RelaxedFit, Setup
 
-Width = Sequence[int | Sequence[int]]
-
 NEAR_END = 0.9  # of a hidden grid's half width
 ROOM = 1.6  # of a hidden grid's half width to the start's amplitude in it
 ITERATIONS = 30  # at one λ

@@ -239,6 +239,7 @@ def _need_torch(device: str) -> None:
     try:
         import pikanid.optimise.gradient as descent
     except ImportError as missing:
-        raise errors.BadSetting(errors.torch_not_installed(missing.name or "torch")) from missing
+        module = missing.name or "torch"
+        raise errors.BadSetting(errors.not_installed("A PINN", module, "kan")) from missing
     if not descent.present(device):
         raise errors.BadSetting(errors.no_such_device(device))

@@ -84,15 +84,6 @@ class RelaxedFit:
         """Gauss-Newton iterations over all stages."""
         return sum(stage.iterations for stage in self.stages)
 
-    def trajectory(self, r: int, t: Array) -> Array:
-        """Approximated states (M, n) of recording r at times t (M,) [s]."""
-        part, chains, c = self.functional.parts[r], self.chains, self.coefficients[r]
-        columns = []
-        for i, q in zip(chains.root, chains.order, strict=True):
-            spline, own = part.approximators[i], part.physics.tops[i].part
-            columns.append(spline.basis(t, q) @ c[own])  # type: ignore[union-attr]  # linear
-        return np.column_stack(columns)
-
 
 @dataclass(frozen=True, eq=False)
 class Setup:

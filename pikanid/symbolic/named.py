@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from html import escape
 
 import numpy as np
@@ -18,7 +17,6 @@ from pikanid.symbolic.library import NOTHING, Form, X
 
 NO_SIMPLE_FORM = "no simple form"
 SHOWN = 5
-CHANCE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +119,6 @@ class NamedEdge:
         if self.name == NO_SIMPLE_FORM:
             return self.unnamed
         return float(sum(c.probability for c in self.candidates if c.agrees))
-
-    @cached_property
-    def equivalent(self) -> tuple[Candidate, ...]:
-        """Other forms with a real chance that the data cannot tell from the best one."""
-        return tuple(c for c in self.candidates[1:] if c.agrees and c.probability >= CHANCE)
 
     @property
     def std(self) -> np.ndarray | None:

@@ -51,7 +51,8 @@ def save(kan: Any, path: str | os.PathLike[str]) -> None:
         "kinks": kinks,
     }
     if path.suffix not in (".npz", ".json"):
-        raise errors.BadSetting(errors.kan_file(str(path), "the ending must be .npz or .json"))
+        raise errors.BadSetting(errors.unreadable(
+            "saved KAN", str(path), "the ending must be .npz or .json"))
     content = io.BytesIO()
     if path.suffix == ".json":
         lists = {name: values.tolist() for name, values in arrays.items()}
@@ -69,7 +70,7 @@ def load(path: str | os.PathLike[str], device: str = "cpu") -> Any:
         BadSetting: If the file is missing, foreign or damaged.
     """
     def wrong(detail: str) -> errors.BadSetting:
-        return errors.BadSetting(errors.kan_file(str(path), detail.rstrip(".")))
+        return errors.BadSetting(errors.unreadable("saved KAN", str(path), detail))
 
     if Path(path).suffix == ".json":
         header = json_content(path, wrong)

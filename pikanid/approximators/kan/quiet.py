@@ -54,7 +54,8 @@ def pykan_module() -> ModuleType:
             # Not `import kan.MultKAN as m`: the package hides its submodule behind the class.
             return import_module("kan.MultKAN")
         except ImportError as missing:
-            raise errors.BadSetting(errors.kan_not_installed(missing.name or "kan")) from missing
+            module = missing.name or "kan"
+            raise errors.BadSetting(errors.not_installed("A KAN", module, "kan")) from missing
 
 
 @contextmanager

@@ -52,7 +52,7 @@ def _v73(content: bytes, where: str) -> list[tuple[str, np.ndarray]]:
     try:
         import h5py
     except ImportError:
-        raise errors.BadSetting(errors.extra_missing("MAT 7.3", "h5py", "mat")) from None
+        raise errors.BadSetting(errors.not_installed("MAT 7.3", "h5py", "mat")) from None
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             room = [MOST_UNPACKED]

@@ -26,7 +26,7 @@ def read(content: bytes, where: str, options: Options) -> Table:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError:
-        raise errors.BadSetting(errors.extra_missing(".parquet", "pyarrow", "parquet")) from None
+        raise errors.BadSetting(errors.not_installed(".parquet", "pyarrow", "parquet")) from None
     try:
         about = pq.read_metadata(io.BytesIO(content))
         # runs of one value take no bytes of the file
@@ -76,7 +76,7 @@ def content(channels: Mapping[str, Channel], ending: str) -> bytes:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError:
-        raise errors.BadSetting(errors.extra_missing(".parquet", "pyarrow", "parquet")) from None
+        raise errors.BadSetting(errors.not_installed(".parquet", "pyarrow", "parquet")) from None
     columns = list(flat(channels))
     length = max(len(values) for _, _, values, _ in columns)
     fields, arrays = [], []

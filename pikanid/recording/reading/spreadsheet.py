@@ -53,7 +53,7 @@ def _xlsx(content: bytes, where: str, sheet: str | int | None) -> list[list[obje
     try:
         import openpyxl
     except ImportError:
-        raise errors.BadSetting(errors.extra_missing(".xlsx", "openpyxl", "excel")) from None
+        raise errors.BadSetting(errors.not_installed(".xlsx", "openpyxl", "excel")) from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # on styles and extensions that hold no data
@@ -86,7 +86,7 @@ def _xls(content: bytes, where: str, sheet: str | int | None) -> list[list[objec
     try:
         import xlrd
     except ImportError:
-        raise errors.BadSetting(errors.extra_missing(".xls", "xlrd", "excel")) from None
+        raise errors.BadSetting(errors.not_installed(".xls", "xlrd", "excel")) from None
     try:
         book: Any = xlrd.open_workbook(file_contents=content, logfile=io.StringIO())
         page = book.sheet_by_name(_sheet(book.sheet_names(), sheet, where))

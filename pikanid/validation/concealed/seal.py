@@ -89,7 +89,7 @@ def read_truth(path: str | Path) -> dict[str, object]:
         BadSetting: If it cannot be read or is no truth file.
     """
     def wrong(detail: str) -> errors.BadSetting:
-        return errors.BadSetting(errors.truth_unreadable(str(path), detail.rstrip(".")))
+        return errors.BadSetting(errors.unreadable("truth file", str(path), detail))
 
     content = json_content(path, wrong)
     if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
