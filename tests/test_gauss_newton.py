@@ -13,6 +13,7 @@ import pikanid as pk
 from pikanid.objective.functional import Functional
 from pikanid.optimise.box import box_minimum
 from pikanid.optimise.covariance import (
+    _trace_of_quotient,
     effective_parameters,
     error_bound,
     invert,
@@ -246,3 +247,24 @@ def test_hard_limit_is_least_squares_on_the_model() -> None:
     nls = pk.NLS().fit(guessed(), slosh(0.1))
     std = np.sqrt(np.diag(nls.covariance))
     assert np.all(np.abs(found.at.point.theta - nls.theta) < 0.05 * std)
+
+
+def test_iterations_that_run_out_are_no_convergence() -> None:
+    system = BandedSystem(collocated(guessed(), slosh(0.1)))
+    start, bounds = random_point(system.functional), (system.lower, system.upper)
+    for count in (1, 2):
+        found = gauss_newton(system, start, 1.0, *bounds, iterations=count)
+        assert (found.iterations, found.converged) == (count, False)
+    assert gauss_newton(system, start, 1.0, *bounds).converged
+
+
+def test_trace_of_a_quotient_of_bands_that_are_hardly_definite() -> None:
+    """Closed forms; a pivot that is zero is lifted by rounding, a negative one is refused."""
+    share = np.array([[1.0, 3.0, 0.0], [0.0, 0.0, 0.0]])
+    band = np.array([[2.0, 4.0, 5.0], [0.0, 0.0, 0.0]])
+    assert _trace_of_quotient(share, band) == pytest.approx(1 / 2 + 3 / 4)
+    ones = np.array([[1.0, 1.0], [1.0, 0.0]])
+    assert _trace_of_quotient(ones, ones) == pytest.approx(1.0, abs=0.01)
+    band[0, 2] = -1.0
+    with pytest.raises(np.linalg.LinAlgError):
+        _trace_of_quotient(share, band)

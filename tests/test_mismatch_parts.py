@@ -78,6 +78,8 @@ def test_samples_are_put_together_only_where_nothing_moves_between() -> None:
     count = oversampling(model, (quick(t, 0.5),), DEFAULTS.budget)
     assert isinstance(count, int) and count % 2 == 1 and count > 1
     assert oversampling(model, (quick(t, 30.0),), DEFAULTS.budget) == 1
+    uneven = t + 0.0001 * np.sin(np.arange(len(t)))
+    assert oversampling(model, (quick(uneven, 0.5),), DEFAULTS.budget) == 1
     assert oversampling(model, (quick(t[::100], 0.5),), DEFAULTS.budget) == 1
     # never so many that a period keeps fewer than thirty
     slow = averaged(quick(t, 0.5)["theta"], count)

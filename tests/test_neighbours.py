@@ -193,7 +193,9 @@ def test_laws_are_added_to_the_best_hypothesis_whatever_they_promise(
         monkeypatch.setattr(Search, name, lambda *_, **__: None)
     ranked, count = search.grow(lambda h: False), DEFAULTS.budget.beside_one
     assert asked == [({"sensor_offset"}, count, law), ({"sensor_drift"}, count, nothing)]
-    assert [set(h.key) for h in ranked] == [{"sensor_offset"}, {"sensor_drift"}, set()]
+    wanted = [{"sensor_offset"}, {"sensor_drift"}, set()]
+    assert [set(h.key) for h in ranked] == wanted
+    assert [set(h.key) for h in search.grow(lambda h: True)] == wanted
 
 
 def test_a_search_goes_on_with_other_records(case: Case) -> None:
@@ -209,3 +211,22 @@ def test_a_search_goes_on_with_other_records(case: Case) -> None:
     assert same.resumed(search) is cast(Any, other) and same.search is cast(Any, other)
     assert given == [case.records] and not same.tests and not same.predictions
     assert same.base.key == frozenset()
+
+
+@pytest.mark.parametrize("failed", [False, True])
+def test_what_was_looked_for_beyond_hills_in_vain_is_settled(
+        case: Case, failed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And a fit that comes to nothing leaves no trace among the fits."""
+    search, asked = stand_ins(case, 1.0, "sensor_offset"), list[object]()
+    job = [c for c in case.candidates if c.key == "sensor_drift"]
+    key, settled = frozenset({"sensor_drift"}), frozenset({"sensor_gain"})
+    search = replace(search, failed_searches={key} if failed else set())
+    before = dict(search.fits)
+
+    def no_fit(*arguments: object) -> None:
+        asked.append(arguments[-1])
+
+    monkeypatch.setattr("pikanid.mismatch.search.search.fitted", no_fit)
+    search._fit_all([(job, [{}])], always=True, settled=settled)
+    assert asked == [key if failed else settled]
+    assert search.fits == before and len(search.begun) == 1

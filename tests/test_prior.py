@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
 import pikanid as pk
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.prior import elsewhere, of_fit
+from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 
@@ -52,3 +55,20 @@ def test_far_from_the_estimates_chi_squared_is_that_of_a_simulation(fit: Hypothe
     assert found == pytest.approx(truth, rel=1e-9)
     # so far away the ellipsoid of the estimates says something else
     assert abs(float(np.sum(prior.residual(away) ** 2)) / truth - 1) > 1e-3
+
+
+def test_a_prior_is_not_taken_where_nothing_can_be_simulated() -> None:
+    problem = SimpleNamespace(lower=np.full(2, -9.0), upper=np.full(2, 9.0))
+    known = Prior(np.eye(1), np.zeros(1), np.zeros(1), 0.0, np.zeros(2), np.eye(2)[:, :1], (0,))
+
+    def after(residual: object) -> Prior | None:
+        whitened = SimpleNamespace(problem=problem, residual=lambda theta: residual)
+        h = SimpleNamespace(whitened=whitened, minimum=SimpleNamespace(chi2=1.0))
+        return elsewhere(known, cast(Any, h), np.array([0.5]))
+
+    J = np.array([[2.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    assert after(None) is None
+    assert after((np.ones(3), np.full((3, 2), np.nan))) is None
+    found = after((np.ones(3), J))
+    assert found is not None and found.all.tolist() == [0.5, 0.0]
+    assert np.abs(found.root).tolist() == [[2.0]]

@@ -168,3 +168,13 @@ def test_past_inputs_span_the_input_at_every_lag_of_a_period() -> None:
     later -= later.mean()
     assert np.linalg.norm(later - columns @ (columns.T @ later)) > 0.2 * np.linalg.norm(later)
     assert past_inputs(t, [], 5.0).shape == (301, 0)
+
+
+def test_without_a_natural_rate_inputs_act_over_a_twentieth_of_the_record() -> None:
+    t = np.linspace(3.0, 13.0, 1001)
+    pulse = (np.abs(t - 5.0) < 0.05).astype(float)
+    columns = past_inputs(t, [(t, pulse)], 0.0)
+    moved = np.abs(np.diff(columns, axis=0)).max(axis=1) > 1e-6
+    where = t[1:][moved]
+    assert where.min() == pytest.approx(4.95, abs=0.02)
+    assert where.max() == pytest.approx(5.05 + 0.5, abs=0.02)

@@ -12,7 +12,7 @@ from pikanid.approximators.bspline import BSpline
 from pikanid.formula.expressions import symbol
 from pikanid.symbolic import name_edge
 from pikanid.symbolic.curve import Curve
-from pikanid.symbolic.fitting import fit_form
+from pikanid.symbolic.fitting import _covariance, fit_form
 from pikanid.symbolic.library import LIBRARY, NOTHING, Form, user_form
 
 X = np.linspace(-1.0, 1.0, 400)
@@ -254,3 +254,19 @@ def test_a_sigma_that_is_stated_is_the_noise() -> None:
                    if c.form.name == "linear")
     a, b = np.polyfit(x, y, 1, w=1 / by_sample)
     assert (weighed.values["a"], weighed.values["d"]) == pytest.approx((a, b))
+
+
+def test_a_form_that_is_a_constant_on_the_range_is_none() -> None:
+    x = np.linspace(1.0, 2.0, 50)
+    curve = Curve.of_points(x, x + 0.1 * np.random.default_rng(0).normal(size=50))
+    assert fit_form(FORMS["sign"], curve) is None
+    assert fit_form(FORMS["linear"], curve) is not None
+
+
+def test_constants_at_a_pole_have_no_known_error() -> None:
+    x = np.linspace(0.0, 1.0, 50)
+    curve, form = Curve.of_points(x, np.sqrt(x)), FORMS["shifted square root"]
+    raw, one = np.sqrt(x)[:, None], np.ones((50, 1))
+    with np.errstate(all="ignore"):
+        found = _covariance(form, curve, np.array([0.0]), raw, np.ones(1), one)
+    assert found.shape == (3, 3) and np.isnan(found).all()

@@ -1,0 +1,81 @@
+"""Effects of sensors and inputs: their parameters, and where fits of them begin."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.catalogue import channels
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.cross_axis import cross_axis
+from pikanid.mismatch.catalogue.site import Site, sites
+
+T = np.linspace(0.0, 10.0, 1001)
+
+
+@pytest.fixture(scope="module")
+def site() -> Site:
+    model = pk.systems.sloshing()
+    return sites(model, (pk.simulate(model, pk.excitation.two_pulse(), sigma=0.002),))[0]
+
+
+def view() -> Any:
+    return SimpleNamespace(t=T, y={"theta": 0.2 * np.sin(3 * T)}, u={"u_x": np.cos(2 * T)})
+
+
+def every(site: Site) -> list[Candidate]:
+    return [c for make in (
+        channels.sensor_offset, channels.sensor_drift, channels.sensor_gain,
+        channels.sensor_nonlinearity, channels.sensor_saturation, channels.delay, channels.lags,
+        channels.input_gain, channels.input_limits, channels.input_backlash, channels.input_hold)
+        for c in make(site)]
+
+
+def test_parameters_have_the_names_that_files_hold(site: Site) -> None:
+    names = {c.key: [p.name for p in c.parameters] for c in every(site)}
+    assert names == {
+        "sensor_offset": ["offset"], "sensor_drift": ["beta"], "sensor_gain": ["k_out"],
+        "sensor_nonlinearity": ["k_y3"], "sensor_saturation": ["limit"], "input_delay": ["tau"],
+        "sensor_lag": ["tau_s"], "actuator_lag": ["tau_a"], "input_gain": ["k_in"],
+        "input_saturation": ["u_max"], "input_dead_zone": ["u_dead"],
+        "hysteresis[backlash]": ["half_play"], "input_hold": []}
+
+
+def test_twins_are_what_small_motions_cannot_tell_apart(site: Site) -> None:
+    groups: dict[str, set[str]] = {}
+    for c in every(site):
+        groups.setdefault(c.twin, set()).add(c.key)
+    assert groups == {
+        "offset": {"sensor_offset"}, "delay": {"input_delay"},
+        "gain": {"sensor_gain", "input_gain"}, "lag": {"sensor_lag", "actuator_lag"},
+        "": {"sensor_drift", "sensor_nonlinearity", "sensor_saturation", "input_saturation",
+             "input_dead_zone", "hysteresis[backlash]", "input_hold"}}
+
+
+def test_limits_begin_where_the_signal_meets_them(site: Site) -> None:
+    for c, name, top in ((channels.sensor_saturation(site)[0], "limit", 0.2),
+                         (channels.input_limits(site)[0], "u_max", 1.0)):
+        begun = [d.start[name] for d in c.directions(view())]
+        assert len(begun) == 6 and max(begun) < top and min(begun) > 0.4 * top
+        assert all(np.any(d.seen if d.seen is not None else d.push["u_x"])
+                   for d in c.directions(view()))
+
+
+def test_lags_begin_among_those_that_are_looked_for(site: Site) -> None:
+    for c in channels.lags(site):
+        (tau,) = c.parameters
+        low, high = tau.bounds
+        assert low < min(channels.LAGS) <= tau.value <= max(channels.LAGS) < high
+
+
+@pytest.mark.parametrize("inputs", [("u",), ()])
+def test_a_channel_beside_can_act_directly_only_beside_an_input(inputs: tuple[str, ...]) -> None:
+    model: Any = SimpleNamespace(input=lambda u: SimpleNamespace(unit="m/s^2"))
+    made: Any = SimpleNamespace(inputs=inputs, extra=("w",), v="v", unit="rad", model=model,
+                                name=lambda n: n)
+    (candidate,) = cross_axis(made)
+    assert (candidate.other is not None) == bool(inputs)
