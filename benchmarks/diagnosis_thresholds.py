@@ -44,7 +44,7 @@ REMEMBERED = ((noise_level, "estimate"), (NLS, "fit"), (search, "fitted"), (sear
 UNREAD = frozenset({
     "alpha", "power", "refusal", "refusal_together", "needless", "noise_excess", "noise_conflict",
     "search.promising", "search.kept", "search.much", "search.equal",
-    *(name for name, _ in DEFAULTS.items() if name.startswith(("noise.", "verdict."))
+    *(name for name, _ in DEFAULTS.items() if name.startswith(("quiet.", "noise.", "verdict."))
       and name not in ("verdict.linear", "verdict.missed")),
     *(f"budget.{name}" for name in (
         "singles", "pairs", "beside_one", "beside_more", "leading", "effects", "carried",

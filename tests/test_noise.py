@@ -13,6 +13,7 @@ from pikanid.errors import BadRecording
 from pikanid.noise import autoregressive as noise_ar
 from pikanid.noise import level as noise
 from pikanid.noise.quiet import _is_quiet, even_parts, find_quiet
+from pikanid.noise.settings import USUAL, QuietSettings
 from pikanid.recording.channel import Channel
 
 DT = 0.01
@@ -202,7 +203,7 @@ def test_noise_alone_is_quiet_as_often_as_stated(rho: float) -> None:
     quiet = 0
     for seed in range(100):
         y = Channel("y", np.arange(340) * DT, coloured(340, rho, seed) + shape)
-        quiet += _is_quiet(y.values[:300], float(np.var(y.values)))
+        quiet += _is_quiet(y.values[:300], float(np.var(y.values)), USUAL)
     assert quiet >= binom.ppf(0.001, 100, 0.95)
 
 
@@ -215,7 +216,7 @@ def test_noise_alone_is_quiet_as_often_as_stated(rho: float) -> None:
 def test_noise_with_something_in_it_is_not_quiet(extra: Callable[[np.ndarray], np.ndarray]) -> None:
     t = np.arange(300) * DT
     for seed in range(5):
-        assert not _is_quiet(coloured(300, 0.0, seed) + extra(t), 1e4)
+        assert not _is_quiet(coloured(300, 0.0, seed) + extra(t), 1e4, USUAL)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
@@ -236,7 +237,19 @@ def test_coloured_noise_counts_as_quiet_only_beside_something_louder() -> None:
     """What is as loud as all the rest may be a motion."""
     for seed in range(5):
         y = coloured(300, 0.6, seed)
-        assert not _is_quiet(y, 2.0 * float(np.var(y)))
-    quiet = sum(_is_quiet(y, 8.0 * float(np.var(y)))
+        assert not _is_quiet(y, 2.0 * float(np.var(y)), USUAL)
+    quiet = sum(_is_quiet(y, 8.0 * float(np.var(y)), USUAL)
                 for y in (coloured(300, 0.6, seed) for seed in range(20)))
     assert quiet >= 16
+
+
+def test_settings_say_what_is_quiet() -> None:
+    """A stretch of 60 samples at rest, in a swing: for who asks for 100 there is none."""
+    rng, t = np.random.default_rng(5), np.arange(300) * DT
+    y = Channel("y", t, 0.002 * rng.standard_normal(300)
+                + np.where(t < t[60], 0.0, np.sin(40 * (t - t[60]))))
+    usual = find_quiet(y)
+    assert usual is not None and usual[1] < t[75]
+    assert find_quiet(y, QuietSettings(shortest=100)) is None
+    known = noise.estimate(y, (0.0, float(t[59])), settings=QuietSettings(low=50))
+    assert known.stretch is not None and noise.estimate(y, (0.0, float(t[59]))).stretch is None

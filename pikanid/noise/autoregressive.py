@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pikanid.noise.settings import USUAL
 from pikanid.recording.channel import Array
-
-HIGHEST = 4  # order tried
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class AR:
         return float(-1 / np.log(radius)) if radius < 1 else float("inf")
 
 
-def fit(series: Array, highest: int = HIGHEST) -> AR:
+def fit(series: Array, highest: int = USUAL.order) -> AR:
     """The AR model with the smallest BIC among orders 0 to `highest`.
 
     BIC = n·ln(innovation²) + p·ln n (G. Schwarz, Ann. Stat. 6, 1978).

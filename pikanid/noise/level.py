@@ -16,11 +16,9 @@ import numpy as np
 from pikanid import errors
 from pikanid.noise.autoregressive import autocorrelation, fit
 from pikanid.noise.floor import rounding_noise
-from pikanid.noise.quiet import SHORTEST, even_parts, find_quiet, without_moves
+from pikanid.noise.quiet import even_parts, find_quiet, without_moves
+from pikanid.noise.settings import USUAL, QuietSettings
 from pikanid.recording.channel import Array, Channel, check_times, check_values
-
-QUIET = 100  # samples of a quiet stretch that say something about low frequencies
-STEEPEST = 0.98  # correlation of neighbours that a quiet stretch can show: beyond it, it drifts
 
 
 @dataclass(frozen=True)
@@ -72,16 +70,17 @@ class NoiseModel:
 
 
 def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
-             drives: Sequence[Channel] = ()) -> NoiseModel:
+             drives: Sequence[Channel] = (), settings: QuietSettings = USUAL) -> NoiseModel:
     """The noise of a signal, from a quiet stretch if it has one.
 
     Args:
         channel: Samples may be missing.
         quiet: Start and stop [s] of a stretch known to be quiet; looked for if None.
         drives: Inputs; a stretch that is looked for is quiet while none of them moves.
+        settings: What counts as quiet.
 
     Raises:
-        BadRecording: If there are fewer than `SHORTEST` samples (in `quiet`), or none vary.
+        BadRecording: If there are fewer samples (in `quiet`) than `shortest`, or none vary.
 
     >>> t = np.arange(1000) / 100.0
     >>> noise = 0.002 * np.random.default_rng(1).standard_normal(1000)
@@ -91,11 +90,11 @@ def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
     """
     check_times(channel, channel.name)
     check_values(channel, channel.name, missing_allowed=True)
-    stretch = find_quiet(channel) if quiet is None else quiet
+    stretch = find_quiet(channel, settings) if quiet is None else quiet
     if stretch is None:
         return _from_highest(channel)
-    return _from_quiet(channel, *(without_moves(channel, drives, *stretch)
-                                  if quiet is None else stretch))
+    return _from_quiet(channel, *(without_moves(channel, drives, *stretch, settings)
+                                  if quiet is None else stretch), settings)
 
 
 def high_band_sigma(channel: Channel) -> tuple[float, float]:
@@ -131,24 +130,25 @@ def high_band_sigma(channel: Channel) -> tuple[float, float]:
     return sigma, float(spread)
 
 
-def _from_quiet(channel: Channel, start: float, stop: float) -> NoiseModel:
+def _from_quiet(channel: Channel, start: float, stop: float, settings: QuietSettings
+                ) -> NoiseModel:
     inside = (channel.time >= start) & (channel.time <= stop) & np.isfinite(channel.values)
     time, values = channel.time[inside], channel.values[inside]
     n = len(values)
-    if n < SHORTEST:
+    if n < settings.shortest:
         raise errors.BadRecording(errors.noise_short(channel.name, n))
     least = rounding_noise(channel.values)
     if np.ptp(values) == 0 and not least:
         raise errors.BadRecording(errors.noise_none(channel.name))
     sigma, rho, spread = least, 0.0, 2 / float(np.sqrt(2 * n))
     if np.ptp(values) > 0:  # else all that is known of the noise is that rounding hides it
-        found = fit(values - values.mean())
+        found = fit(values - values.mean(), settings.order)
         sigma, spread = max(found.sigma, least), 2 * found.sigma_std / found.sigma
-        rho = float(np.clip(autocorrelation(found.coefficients, 2)[1], 0.0, STEEPEST))
+        rho = float(np.clip(autocorrelation(found.coefficients, 2)[1], 0.0, settings.steepest))
     first, last = float(time[0]), float(time[-1])
-    return NoiseModel(sigma, rho if n >= QUIET else 0.0, spread, channel.interval,
+    return NoiseModel(sigma, rho if n >= settings.low else 0.0, spread, channel.interval,
                       f"the quiet stretch ({first:g} s to {last:g} s)",
-                      (first, last) if n >= QUIET else None)
+                      (first, last) if n >= settings.low else None)
 
 
 def _from_highest(channel: Channel) -> NoiseModel:

@@ -7,16 +7,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pikanid.noise.autoregressive import AR, fit, innovations
+from pikanid.noise.settings import USUAL, QuietSettings
 from pikanid.recording.channel import Array, Channel
 
-SHORTEST = 20  # samples in a quiet stretch
-# A correlation time must fit this often into a quiet stretch.
-_MEMORIES = 10.0
 _POSITIONS = 200  # windows tried of each length
-MOVES, JITTER = 0.01, 4.0  # of an input's range, and times its noise: a move
 
 
-def find_quiet(channel: Channel) -> tuple[float, float] | None:
+def find_quiet(channel: Channel, settings: QuietSettings = USUAL
+               ) -> tuple[float, float] | None:
     """The longest stretch [s] in which nothing but noise can be seen, or None.
 
     A stretch counts as quiet if it is among the calmest of the recording, at most an AR(1)
@@ -31,7 +29,7 @@ def find_quiet(channel: Channel) -> tuple[float, float] | None:
     """
     best: tuple[float, float] | None = None
     for time, values in even_parts(channel):
-        found = _longest_quiet(values)
+        found = _longest_quiet(values, settings)
         if found is None:
             continue
         span = (float(time[found[0]]), float(time[found[1] - 1]))
@@ -40,8 +38,8 @@ def find_quiet(channel: Channel) -> tuple[float, float] | None:
     return best
 
 
-def without_moves(channel: Channel, drives: Sequence[Channel], start: float, stop: float
-                  ) -> tuple[float, float]:
+def without_moves(channel: Channel, drives: Sequence[Channel], start: float, stop: float,
+                  settings: QuietSettings = USUAL) -> tuple[float, float]:
     """The longest part of a stretch [s] in which no input leaves the value that it has for most of
     it: what is driven at random can look like coloured noise.  The stretch where that is too short.
     """
@@ -54,11 +52,13 @@ def without_moves(channel: Channel, drives: Sequence[Channel], start: float, sto
         here = np.interp(t, drive.time, u)
         # fourth differences show the noise of what is well sampled, and nothing else
         noisy = float(np.median(np.abs(np.diff(u, 4)))) / 0.6745 / np.sqrt(70.0)
-        moves |= np.abs(here - np.median(here)) > max(MOVES * np.ptp(u), JITTER * noisy)
+        moves |= np.abs(here - np.median(here)) > max(
+            settings.still * np.ptp(u), settings.still_noise * noisy)
     ends = np.flatnonzero(np.concatenate([[True], moves, [True]]))
     longest = int(np.argmax(np.diff(ends)))
     first, last = int(ends[longest]), int(ends[longest + 1]) - 2
-    return (float(t[first]), float(t[last])) if last - first + 1 >= SHORTEST else (start, stop)
+    enough = last - first + 1 >= settings.shortest
+    return (float(t[first]), float(t[last])) if enough else (start, stop)
 
 
 def even_parts(channel: Channel) -> Iterator[tuple[Array, Array]]:
@@ -72,10 +72,10 @@ def even_parts(channel: Channel) -> Iterator[tuple[Array, Array]]:
         yield time[a:b], values[a:b]
 
 
-def _longest_quiet(values: Array) -> tuple[int, int] | None:
+def _longest_quiet(values: Array, settings: QuietSettings) -> tuple[int, int] | None:
     n, loudest = len(values), float(np.var(values))
     length = n
-    while length >= SHORTEST:
+    while length >= settings.shortest:
         step = max(length // 4, (n - length) // _POSITIONS, 1)
         starts = list(range(0, n - length + 1, step))
         if (n - length) % step:
@@ -83,13 +83,14 @@ def _longest_quiet(values: Array) -> tuple[int, int] | None:
         windows = sorted((float(np.var(values[a : a + length])), a) for a in starts)
         calmest = windows[0][0]
         for variance, a in windows[:20]:
-            if variance <= 2 * calmest and _is_quiet(values[a : a + length], loudest):
+            if variance <= settings.calmest * calmest and _is_quiet(
+                    values[a : a + length], loudest, settings):
                 return a, a + length
         length = int(length * 0.75)
     return None
 
 
-def _is_quiet(values: Array, loudest: float) -> bool:
+def _is_quiet(values: Array, loudest: float, settings: QuietSettings) -> bool:
     """Whether a window holds nothing but stationary noise of short memory."""
     n = len(values)
     centred = values - values.mean()
@@ -97,37 +98,40 @@ def _is_quiet(values: Array, loudest: float) -> bool:
         return False  # a stuck sensor shows no noise at all
     # One real pole: an oscillation needs a pair of complex ones, and must not pass for noise.
     model = fit(centred, highest=1)
-    if model.memory * _MEMORIES > n:
+    if model.memory * settings.memories > n:
         return False
     # A busy signal can look like coloured noise: it must at least be much louder elsewhere.
-    if len(model.coefficients) and float(np.var(centred)) > 0.25 * loudest:
+    if len(model.coefficients) and float(np.var(centred)) > settings.quieter * loudest:
         return False
-    if not (_flat_spectrum(innovations(centred, model)) and _stationary(centred, model)):
+    if not (_flat_spectrum(innovations(centred, model), settings.chance)
+            and _stationary(centred, model, settings.chance)):
         return False
     # An oscillation or a drift is predictable over the whole stretch, noise is not.
-    return fit(centred).memory * _MEMORIES <= n
+    return fit(centred, settings.order).memory * settings.memories <= n
 
 
-def _flat_spectrum(white: Array) -> bool:
+def _flat_spectrum(white: Array, chance: float) -> bool:
     """Whether a series may be white: no line, and no band that stands out.
 
     Fisher's test on the largest periodogram ordinate (R. A. Fisher, Proc. R. Soc. A 125, 1929)
-    and Bartlett's on the cumulative periodogram, each at about 1 %.
+    and Bartlett's on the cumulative periodogram, each at a rate of about `chance`.  The largest of
+    m ordinates exceeds x means by e^-x·m; the largest distance times √m of the cumulative ones
+    exceeds d by 2·e^(-2d²) (A. Kolmogorov, 1933), to two decimals.
     """
     m = (len(white) - 1) // 2
     power = np.abs(np.fft.rfft(white - white.mean())[1 : m + 1]) ** 2
     share = power / power.sum()
-    line = m * float(share.max()) < float(np.log(m / 0.01))
+    line = m * float(share.max()) < float(np.log(m / chance))
     uneven = float(np.max(np.abs(np.cumsum(share) - np.arange(1, m + 1) / m)))
-    return line and uneven * np.sqrt(m) < 1.63
+    return line and uneven * np.sqrt(m) < round(float(np.sqrt(-np.log(chance / 2) / 2)), 2)
 
 
-def _stationary(centred: Array, model: AR) -> bool:
+def _stationary(centred: Array, model: AR, chance: float) -> bool:
     """Whether both halves spread alike (F test); correlated samples count for fewer."""
     from scipy.stats import f as f_distribution
 
     n = len(centred)
     freedom = max(n / (2 * (1 + 2 * model.memory)), 2.0)
     ratio = float(np.var(centred[: n // 2])) / max(float(np.var(centred[n // 2 :])), 1e-300)
-    high = float(f_distribution.ppf(0.995, freedom, freedom))
+    high = float(f_distribution.ppf(1 - chance / 2, freedom, freedom))
     return 1 / high < ratio < high

@@ -16,7 +16,8 @@ from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.thresholds import bic
 from pikanid.noise.floor import rounding_noise
-from pikanid.noise.level import QUIET, NoiseModel, estimate
+from pikanid.noise.level import NoiseModel, estimate
+from pikanid.noise.settings import QuietSettings
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
@@ -26,7 +27,7 @@ Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, wei
 
 
 def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None,
-                inputs: Sequence[str] = ()) -> NoiseModel:
+                settings: QuietSettings, inputs: Sequence[str] = ()) -> NoiseModel:
     """What the recording alone says, before any fit; a stretch is quiet while no input moves.
 
     Raises:
@@ -35,7 +36,7 @@ def first_level(recording: Recording, output: str, quiet: tuple[float, float] | 
     channel = recording[output]
     if channel.sigma is not None:
         return NoiseModel(float(np.median(channel.sigma)), 0.0, 0.0, channel.interval, "given")
-    return estimate(channel, quiet, [recording[u] for u in inputs if u in recording])
+    return estimate(channel, quiet, [recording[u] for u in inputs if u in recording], settings)
 
 
 def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
@@ -74,7 +75,7 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
         inside = (channel.time >= found[0]) & (channel.time <= found[1]) & np.isfinite(
             channel.values)
         values = channel.values[inside]
-        if len(values) >= QUIET:
+        if len(values) >= settings.quiet.low:
             p = np.abs(np.fft.rfft(values - values.mean())) ** 2 / len(values)
             spectra.append((np.linspace(0, np.pi, len(p))[1:], p[1:], 1.0))
             source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"

@@ -57,7 +57,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
                 continue
             # of a signal at rest the noise is seen where it still holds all its samples
             whole = recording.with_channels(own)
-            level = first_level(whole, output.name, quiet, model.input_names)
+            level = first_level(whole, output.name, quiet, settings.quiet, model.input_names)
             found[output.name] = loud_enough(level, own)
             if found[output.name] is not level:
                 notes.append(f"Recording '{recording.name}': noise of '{output.name}' below "

@@ -16,6 +16,7 @@ from pikanid.mismatch.settings.checks import check
 from pikanid.mismatch.settings.fits import FitSettings, SearchSettings
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.verdict import BeyondSettings, VerdictSettings
+from pikanid.noise.settings import QuietSettings
 from pikanid.storage.limits import MOST_MODEL, file_bytes
 
 
@@ -47,6 +48,7 @@ class Settings:
         choice_weight: γ of the extended Bayesian information criterion, the price of a choice; at 1
             the criterion is consistent for any number of choices that grows as a power of the
             number of rows (J. Chen and Z. Chen, Biometrika 95, 2008).
+        quiet: When a stretch of a recording shows noise only.
         noise: What counts as noise, as an outlier, as a repeat.
         fits: When a fit is a misfit.
         search: What one more effect must promise.
@@ -76,6 +78,7 @@ class Settings:
     kinds: tuple[float, float, float] = (0.6, 0.2, 0.2)
     signs: int = 100
     choice_weight: float = 1.0
+    quiet: QuietSettings = field(default_factory=QuietSettings)
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     fits: FitSettings = field(default_factory=FitSettings)
     search: SearchSettings = field(default_factory=SearchSettings)

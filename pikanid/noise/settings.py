@@ -1,0 +1,39 @@
+"""What counts as a quiet stretch of a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class QuietSettings:
+    """When a stretch of a signal shows noise only, and what its noise is known by.
+
+    Attributes:
+        chance: Rate at which white noise is refused by each of the tests for a line (Fisher), for
+            an uneven spectrum (Bartlett) and for halves that spread alike (F).
+        shortest: Samples in a quiet stretch.
+        memories: Correlation times that must fit into one: σ of fewer is not known.
+        order: Of the autoregressive models that are tried: a short memory needs no higher one.
+        calmest: Times the variance of the calmest stretch that another one may have.
+        quieter: Share of the recording's variance that coloured noise may have at most: a busy
+            signal can look like it.
+        still: Share of an input's range that it may leave its resting value by.
+        still_noise: The same [standard deviations of the input's own noise].
+        low: Samples of a quiet stretch that say something about low frequencies.
+        steepest: Correlation of neighbours that a quiet stretch can show: beyond it, it drifts.
+    """
+
+    chance: float = 0.01
+    shortest: int = 20
+    memories: float = 10.0
+    order: int = 4
+    calmest: float = 2.0
+    quieter: float = 0.25
+    still: float = 0.01
+    still_noise: float = 4.0
+    low: int = 100
+    steepest: float = 0.98
+
+
+USUAL = QuietSettings()
