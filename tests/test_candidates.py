@@ -71,8 +71,12 @@ def words(path: Path) -> set[str]:
     return {word for text in texts for word in re.findall(r"\w+", text)}
 
 
-def test_entries_name_entries() -> None:
-    found = made(systems.sloshing())
+@pytest.mark.parametrize("model", [systems.sloshing(), systems.sloshing_2d()],
+                         ids=lambda m: m.name)
+def test_entries_name_entries_of_their_own_coordinate(model: Model) -> None:
+    found = made(model)
+    sited = {c.key: c.site.q for c in found}
+    assert all(sited[key] == c.site.q for c in found for key in c.covers)
     keys, ids = {c.key for c in found}, {i for c in found for i in c.ids}
     named = {key for c in found for key in c.covers}
     assert named and named <= keys

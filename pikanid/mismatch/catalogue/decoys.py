@@ -95,7 +95,8 @@ def stribeck_friction(site: Site) -> list[Candidate]:
 
     return [Candidate(("stribeck_friction",), "friction that rises at low speed", text, "dynamics",
                       site, (c, rise, slow), lambda m: m.with_term(site.v, text), directions,
-                      known=False, covers={"coulomb_friction": {}}, resistance=resistance)]
+                      known=False, covers={"coulomb_friction" + site.suffix: {}},
+                      resistance=resistance)]
 
 
 def dissipating_wall(site: Site) -> list[Candidate]:

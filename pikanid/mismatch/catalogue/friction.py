@@ -57,7 +57,8 @@ def power_drag(site: Site) -> list[Candidate]:
 
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
                       (c, n), lambda m: m.with_term(site.v, text), directions,
-                      covers={"coulomb_friction": {n.name: 0.3}, "quadratic_drag": {n.name: 1.8}},
+                      covers={"coulomb_friction" + site.suffix: {n.name: 0.3},
+                              "quadratic_drag" + site.suffix: {n.name: 1.8}},
                       static=True, resistance=np.power, exponent=n, form="signed power",
                       argument=site.v)]
 
