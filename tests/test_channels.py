@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ import pikanid as pk
 from pikanid.mismatch.catalogue import channels
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
+from pikanid.mismatch.catalogue.forces import disturbance, wall_impact
 from pikanid.mismatch.catalogue.site import Site, sites
 
 T = np.linspace(0.0, 10.0, 1001)
@@ -79,3 +80,45 @@ def test_a_channel_beside_can_act_directly_only_beside_an_input(inputs: tuple[st
                                 name=lambda n: n)
     (candidate,) = cross_axis(made)
     assert (candidate.other is not None) == bool(inputs)
+
+
+def test_play_never_leaves_the_input_further_than_its_half(site: Site) -> None:
+    (candidate,) = channels.input_backlash(site)
+    u = view().u["u_x"]
+    for d in candidate.directions(view()):
+        half = d.start["half_play"]
+        push = d.push["u_x"]
+        assert np.abs(push).max() == pytest.approx(half)
+        acts = u + push
+        # where the input turns round it moves nothing until the play is used up
+        turned = np.abs(np.diff(acts)) < 1e-12
+        assert 0 < turned.sum() < len(u)
+
+
+def test_walls_stand_on_either_side(site: Site) -> None:
+    above, below = wall_impact(site)
+    x = {"theta": np.linspace(-0.2, 0.3, 501)}
+    for wall, sign in ((above, 1.0), (below, -1.0)):
+        for d in wall.directions(cast(Any, SimpleNamespace(x=x))):
+            pushed = d.force != 0.0
+            assert np.all(sign * x["theta"][pushed] > d.start["wall"] - 1e-12)
+            assert np.all(sign * d.force[pushed] < 0.0)
+    assert above.key != below.key
+
+
+def test_soft_springs_have_a_natural_rate_too() -> None:
+    model = pk.Model.from_dict({
+        "name": "soft", "states": {"x": {"unit": "m"}, "v": {"unit": "m/s", "initial": 1.0}},
+        "parameters": {"k": {"guess": 0.25}},
+        "equations": {"x": "v", "v": "-k*x"}, "outputs": {"x": {"expression": "x", "unit": "m"}}})
+    recording = pk.Recording.from_arrays(T, {"x": np.sin(0.5 * T)}, {"x": "m"})
+    assert sites(model, (recording,))[0].rate == pytest.approx(0.5)
+
+
+def test_a_force_that_acts_once_acts_within_the_record(site: Site) -> None:
+    (candidate,) = disturbance(site)
+    first, last = site.span
+    shown = candidate.directions(cast(Any, SimpleNamespace(t=np.linspace(first, last, 501))))
+    begun = np.array([d.start["t_peak"] for d in shown])
+    assert begun.min() > first and begun.max() < last
+    assert all(np.any(d.force) for d in shown)

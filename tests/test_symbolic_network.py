@@ -12,13 +12,14 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.approximators.kan import build_kan, to_state
-from pikanid.approximators.kan.edges import arguments, plain
+from pikanid.approximators.kan.edges import arguments, edges_of, plain
 from pikanid.approximators.kan.train import fit_points
 from pikanid.formula.expressions import symbol
 from pikanid.model import systems
 from pikanid.symbolic import Reading, contributions, extract, prune
 from pikanid.symbolic.composed import Composition
 from pikanid.symbolic.library import LIBRARY
+from pikanid.symbolic.prune import _without_spare
 from pikanid.symbolic.pushing import push
 from pikanid.symbolic.refit import generic_jacobian, refit
 from pikanid.symbolic.significance import table
@@ -278,3 +279,13 @@ def test_a_network_is_read_over_the_inputs_that_it_saw_last() -> None:
     off = np.sqrt(np.mean((reading(x) - value) ** 2))
     assert reading.error_network == pytest.approx(off, rel=1e-6, abs=1e-12)
     assert reading.spread == pytest.approx(np.std(value), rel=1e-6) and reading.ok
+
+
+def test_edges_that_others_can_do_without_go() -> None:
+    """The faintest first; nodes are judged with their edges, and what is needed stays."""
+    x, y = points(lambda a, b: np.sin(2 * a), 0.01, n=50)
+    kan = build_kan([2, 1, 1], grid=3, grid_range=[(-1, 1), (-2, 2)], seed=0)
+    fit = fit_points(kan, x, y, iterations=10)
+    left, removed = _without_spare(fit, x, y, 0.01)
+    assert [(c.layer, c.source, c.target) for c in removed] == [(0, 1, 0)]
+    assert [(e.layer, e.source) for e in edges_of(left.network)] == [(0, 0), (1, 0)]

@@ -234,3 +234,12 @@ def test_without_coefficients_all_information_is_left() -> None:
     part = information_partition(np.empty((6, 0)), parameters)
     np.testing.assert_allclose(part.effective, part.alone)
     np.testing.assert_allclose(part.shares, 1.0)
+
+
+def test_the_condition_that_is_told_is_that_of_the_columns() -> None:
+    rng = np.random.default_rng(1)
+    a, b, c = np.linalg.qr(rng.normal(size=(30, 3)))[0].T[:, :, None]
+    J = np.hstack([a, a + 0.1 * b, a + 0.05 * b + 1e-8 * c]) * [1.0, 40.0, 0.01]
+    (note,) = identifiability_warnings(J, parameters("a", "b", "c"), np.ones(3, bool))
+    condition = np.linalg.cond(J / np.linalg.norm(J, axis=0))
+    assert f"condition {condition:.1g}" in note and 1e8 < condition < 1e10
