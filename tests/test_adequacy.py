@@ -148,3 +148,9 @@ def test_a_misfit_with_stated_noise_is_less_probable_than_alpha() -> None:
     assert judge([1.1 * r], [r], [r], 3).to_dict() == {
         "value": pytest.approx(121), "dof": 97, "p_value": pytest.approx(chi2.sf(121, 97)),
         "verdict": "fits", "sigma_source": "given"}
+
+
+def test_nothing_is_judged_without_samples() -> None:
+    found = judge([], [], [], 2)
+    assert (found.verdict, found.source) == ("unknown", "none")
+    assert np.isnan([found.value, found.p_value]).all()

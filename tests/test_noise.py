@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +64,8 @@ def test_a_busy_signal_has_no_quiet_stretch(seed: int) -> None:
     assert model.rho == 0.0
     assert model.sigma == pytest.approx(SIGMA, rel=0.12)
     assert "white, from the highest frequencies (0 s to 19.99 s)" in model.sentence("y")
+    other = replace(model, rho=0.5).sentence("y")
+    assert "correlation 0.50" in other and "white" not in other
 
 
 @pytest.mark.parametrize("n", [31, 51, 101])

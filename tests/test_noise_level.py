@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pikanid.mismatch.data.noise_level import _whittle, first_level, refined
+from pikanid.mismatch.data.noise_level import GRID, _shape, _whittle, first_level, refined
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 from pikanid.noise.quiet import without_moves
@@ -217,3 +217,12 @@ def test_what_a_recording_states_is_taken() -> None:
     read = first_level(Recording.from_arrays(T, {"y": y}), "y", (0.0, 1.99), DEFAULTS.quiet)
     assert read.sigma == pytest.approx(0.01, rel=0.3) and read.rho == pytest.approx(0.6, abs=0.2)
     assert 0.1 < read.spread < 0.6 and read.stretch == pytest.approx((0.0, 1.99))
+
+
+def test_white_noise_counts_only_where_it_is_likely() -> None:
+    """A faint correlation, seen for certain: the power of the noise is as sure as its samples."""
+    omega = np.linspace(0.3, 3.0, 400)
+    spectrum = (omega, _shape(GRID[1], omega), 1e6)
+    _, rho, spread = _whittle([spectrum], None, DEFAULTS.noise)
+    assert rho == GRID[1]
+    assert spread == pytest.approx(1.0 / np.sqrt(1e6 * 400), rel=0.1)
