@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -268,3 +271,18 @@ def test_trace_of_a_quotient_of_bands_that_are_hardly_definite() -> None:
     band[0, 2] = -1.0
     with pytest.raises(np.linalg.LinAlgError):
         _trace_of_quotient(share, band)
+
+
+@pytest.mark.parametrize(("promised", "converged"), [(0.005, True), (0.02, False)])
+def test_a_stop_without_decrease_counts_where_little_is_promised(promised: float, converged: bool
+                                                                 ) -> None:
+    """Of a hundredth of one datum's share of the cost, here 100/100."""
+    def linearise(at: object, lam: float) -> object:
+        return SimpleNamespace(cost=100.0, point=None, lam=lam)
+
+    stuck = SimpleNamespace(
+        functional=SimpleNamespace(n_data=100, data_square=0.0), linearise=linearise,
+        moved=lambda point, step: point, step=lambda *_: SimpleNamespace(promised=promised))
+    free = np.full(2, np.inf)
+    found = gauss_newton(cast(BandedSystem, stuck), cast(Point, None), 1.0, -free, free)
+    assert (found.iterations, found.converged) == (0, converged)
