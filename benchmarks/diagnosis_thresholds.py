@@ -71,7 +71,7 @@ LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "acts without a held-out recording only": ("noise.aside", "noise.least_aside"),
     "iterations or steps of a numerical method": (
         "budget.relevelled", "budget.rechecked", "budget.iterations", "budget.hurried",
-        "budget.over_hills", "budget.several_starts", "budget.patience", "budget.noise_refit",
+        "budget.hop_iterations", "budget.several_starts", "budget.patience", "budget.noise_refit",
         "budget.hops", "budget.finer", "budget.relinearised", "budget.levels"),
     "number of threads": ("budget.threads",),
     "number of draws": ("budget.draws",),

@@ -97,6 +97,13 @@ def test_a_group_of_another_kind_is_refused() -> None:
                     settings={"alpha": 0.1})  # type: ignore[arg-type]  # what a user may do
 
 
+def test_alpha_alone_may_be_given() -> None:
+    with pytest.raises(errors.BadSetting, match=r"alpha.*between 0 and 1"):
+        pk.diagnose(pk.systems.sloshing(), run(1), alpha=1.5)
+    found = pk.diagnose(pk.systems.sloshing(), run(1), alpha=1e-6)
+    assert found.settings.changed() == {"alpha": 1e-6} and found.alpha == 1e-6
+
+
 @pytest.mark.parametrize("content", [
     b"alpha = ", b"\xff\xfe", b"alpha = 2", b"[search]\nfainter = 1", b"search = 3",
     b"[a.b]\nc = 1", b"alpha = nan", b"x = " + b"[" * 2000])

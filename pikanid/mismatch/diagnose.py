@@ -27,7 +27,8 @@ Recordings = Recording | Sequence[Recording]
 
 
 def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
-             settings: Settings = DEFAULTS, quiet: tuple[float, float] | None = None,
+             alpha: float | None = None, settings: Settings = DEFAULTS,
+             quiet: tuple[float, float] | None = None,
              tell: Callable[[str], None] = lambda text: None,
              workers: int | None = None) -> Diagnosis:
     """What is missing in a model, according to recordings?
@@ -43,6 +44,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         train: Recording, or several, to explain.
         held_out: Recording, or several, with another excitation, to prove it on.  Without one the
             end of the recording is set aside, and the verdict is at most "unconfirmed".
+        alpha: Rate of false alarms, in place of that in `settings`.
         settings: Error rates, thresholds, budgets.
         quiet: Start and stop [s] of a stretch known to show noise only.
         tell: Called with what is being done.
@@ -56,7 +58,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         BadModel: No coordinate is found, or nothing is free.
         BadRecording: A channel is missing or unusable; there are too few samples; train and
             held-out are the same.
-        BadSetting: settings are none, or workers is not positive.
+        BadSetting: alpha is no probability, settings are none, or workers is not positive.
         SimulationFailed: The model cannot be simulated, or not as exactly as the noise asks.
 
     >>> import pikanid as pk
@@ -72,6 +74,8 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     if not isinstance(settings, Settings):
         raise errors.BadSetting(errors.not_of_kind(
             "'settings'", type(settings).__name__, "pikanid.Settings"))
+    if alpha is not None:
+        settings = settings.with_values({"alpha": alpha})
     if workers is not None and workers < 1:
         raise errors.BadSetting(errors.bad_value("workers", workers, "at least 1"))
     if not a_model(model).free_names:

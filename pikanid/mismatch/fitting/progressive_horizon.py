@@ -102,7 +102,7 @@ def _fitted(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray, kno
         for factor in effect.other_minima:
             beside = theta.copy()
             beside[_place(part, effect.parameters[0].name)] *= factor
-            if explained(beside, settings.budget.over_hills):
+            if explained(beside, settings.budget.hop_iterations):
                 return found
     return found
 

@@ -35,7 +35,7 @@ class Budget:
         predicted: Hypotheses behind these of which is found out what they predict.
         iterations: Of a fit.
         hurried: Of a fit among gross misfits.
-        over_hills: Of a fit over a hill.
+        hop_iterations: Of a fit over a hill.
         several_starts: That each of several starts gets before the best one goes on.
         patience: That a fit gets to come near the best one.
         noise_refit: Of a fit where nothing but the noise is another.
@@ -82,7 +82,7 @@ class Budget:
     predicted: int = 8
     iterations: int = 30
     hurried: int = 12
-    over_hills: int = 10
+    hop_iterations: int = 10
     several_starts: int = 5
     patience: int = 6
     noise_refit: int = 5
