@@ -101,19 +101,3 @@ def test_initial_state_depends_on_parameters() -> None:
     x0 = torch_field.TorchField(model).initial(torch.zeros(1, dtype=torch.float64), p)
     (slope,) = torch.autograd.grad(x0[0], p)
     assert x0.tolist() == [1.4, 0.0] and slope.tolist() == [2.0]
-
-
-def test_plain_numbers_become_columns_of_the_states_kind() -> None:
-    like = torch.zeros(3, dtype=torch.float64)
-    for value in (2, 0.1):
-        column = torch_field._column(value, like)
-        assert column.dtype == torch.float64 and column.tolist() == [value] * 3
-
-
-def test_powers_near_zero_keep_the_gradients_that_are_finite() -> None:
-    base = torch.tensor([1e-12, 1e-3], dtype=torch.float64, requires_grad=True)
-    torch_field._positive_power(base, 1.5).sum().backward()
-    np.testing.assert_allclose(base.grad.numpy(), 1.5 * np.sqrt([1e-12, 1e-3]), rtol=1e-12)
-    base.grad = None
-    torch_field._positive_power(base, 0.5).sum().backward()
-    np.testing.assert_allclose(base.grad.numpy(), [0.0, 0.5 / np.sqrt(1e-3)], rtol=1e-12)
