@@ -2,13 +2,16 @@
 
 Usage: python benchmarks/mutants.py run [JOBS [PATTERN...]]
        python benchmarks/mutants.py again [JOBS] [PATTERN [TESTS...]]
+       python benchmarks/mutants.py carry OTHER_CHECKOUT
        python benchmarks/mutants.py report FOLDER
 
 `run` makes the mutants of the sample below mutants/ and tries those that have no verdict, so an
 interrupted run goes on.  `again` tries survivors in processes of their own, where a mutant is there
-when modules are imported, with more of the tests that reach them.  `report` writes
-FOLDER/mutants.md.  Whether a mutation belongs to the sample depends on SEED, its file, function and
-number in the function only, so edits elsewhere do not move it.
+when modules are imported, with more of the tests that reach them.  `carry` takes over from another
+checkout what was killed there by the same change in a function of the same name: after a redesign
+few functions are as they were.  `report` writes FOLDER/mutants.md.  Whether a mutation belongs to
+the sample depends on SEED, its file, function and number in the function only, so edits elsewhere
+do not move it.
 """
 
 from __future__ import annotations
@@ -31,6 +34,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 WORK, MUTANTS = ROOT / "build" / "mutants", ROOT / "mutants"
+CARRIED = WORK / "carried.json"
 REASONS = ROOT / "benchmarks" / "mutants_survivors.toml"
 SEED = 1
 # Share of each room's mutations; "objective" is what builds residuals and judges them.
@@ -193,6 +197,28 @@ def _tested(name: str, tests: Sequence[str], without: Sequence[str] = ()
         r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, re.MULTILINE)
 
 
+def carry(other: str) -> None:
+    """Verdicts of another checkout, for mutants that have none here."""
+    prepare()
+
+    def table() -> dict[tuple[str, str], tuple[Any, str, str]]:
+        return {(place(name).rpartition(".")[2], change(data, name)): (data, name, verdict)
+                for data, name, verdict in verdicts()}
+
+    here = table()
+    os.chdir(other)
+    there = {key for key, (_, _, verdict) in table().items() if verdict in ("killed", "timeout")}
+    os.chdir(ROOT)
+    taken = [(data, name) for key, (data, name, verdict) in here.items()
+             if verdict == "not checked" and key in there]
+    for data, name in taken:
+        data.load()
+        data.exit_code_by_key[name] = 1
+        data.save()
+    CARRIED.write_text(json.dumps([name for _, name in taken]))
+    print(f"{len(taken)} verdicts taken over")
+
+
 def change(data: Any, name: str) -> str:
     """What a mutant alters: lines of before, an arrow, lines of after."""
     from mutmut.mutation.diff_apply import get_diff_for_mutant
@@ -232,7 +258,15 @@ def report(folder: str) -> None:
     (Path(folder) / "mutants.md").write_text(TEXT.format(
         tool=version("mutmut"), seed=SEED, provenance=provenance(), sheet=sheet.to_markdown(),
         shares=", ".join(f"{name} {share:.1%}" for name, share in SHARES.items()),
-        left=left.to_markdown()), encoding="utf-8")
+        carried=_carried(), left=left.to_markdown()), encoding="utf-8")
+
+
+def _carried() -> str:
+    """A sentence on verdicts that are of an earlier state; empty where all are of this one."""
+    if not CARRIED.exists() or not (count := len(json.loads(CARRIED.read_text()))):
+        return ""
+    return (f" Of the killed, {count} were killed in an earlier state of their functions, by the "
+            "same change; the others in this one.")
 
 
 def _row(found: Counter[str]) -> tuple[str, ...]:
@@ -253,7 +287,8 @@ mutmut changes one thing in one function (an operator, a number, a condition, an
 assignment) and runs the quick tests that reach the function. A mutant is dead when a test fails \
 (killed), never ends (timeout) or takes the interpreter down (crashed); the last column is the \
 share of those tried.  Where mutants are "not checked" the run was ended before it came to them: \
-`make mutants` goes on with them.  A survivor that is "open" has no reason yet, and no test.
+`make mutants` goes on with them.  A survivor that is "open" has no reason yet, and no \
+test.{carried}
 
 {sheet}
 
@@ -275,5 +310,7 @@ if __name__ == "__main__":
         run(int(words[0]) if words else 2, words[1:])
     elif what == "again":
         again(int(words[0]) if words else 2, *words[1:2], tests=words[2:])
+    elif what == "carry":
+        carry(words[0])
     elif what == "report":
         report(words[0])
