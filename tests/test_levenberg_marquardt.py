@@ -68,8 +68,8 @@ def test_no_start_and_no_step() -> None:
     assert lost is not None and not lost.converged and lost.theta[0] == 0.0
 
 
-@pytest.mark.parametrize(("reach", "most"), [(np.inf, 200), (1.0, 8)])
-def test_what_is_beyond_reach_is_given_up(reach: float, most: int) -> None:
+@pytest.mark.parametrize(("patience", "most"), [(None, 200), (6, 8)])
+def test_a_fit_is_given_up_when_asked_to(patience: int | None, most: int) -> None:
     """Steps of a twentieth of the way leave nine tenths of the cost each."""
     calls = 0
 
@@ -78,8 +78,11 @@ def test_what_is_beyond_reach_is_given_up(reach: float, most: int) -> None:
         calls += 1
         return np.full(50, 10.0 - q[0]), np.full((50, 1), -20.0)
 
-    found = minimise(slow, np.zeros(1), np.full(1, -99.0), np.full(1, 99.0), 150,
-                     beyond=lambda chi2: chi2 > reach)
+    def give_up(count: int, last: float, cost: float) -> bool:
+        assert 0.8 * last < cost < last
+        return patience is not None and count >= patience
+
+    found = minimise(slow, np.zeros(1), np.full(1, -99.0), np.full(1, 99.0), 150, give_up=give_up)
     assert found is not None
-    assert (found.chi2 < 1.0) == (reach == np.inf)
+    assert (found.chi2 < 1.0) == (patience is None)
     assert 7 <= calls <= most

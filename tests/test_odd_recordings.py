@@ -147,8 +147,7 @@ def test_few_signs_are_followed_at_once_along_a_long_recording(
     assert max(sizes) <= CELLS // 20
 
 
-def test_the_signs_of_a_long_recording_are_shortened_one_after_the_other(
-        monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_signs_of_a_long_recording_are_shortened_one_after_the_other() -> None:
     """All at once they would take gigabytes; what is tested is the same."""
     case = opened(swing())
     h = case.base
@@ -162,7 +161,8 @@ def test_the_signs_of_a_long_recording_are_shortened_one_after_the_other(
     bands, inputs = lines(h.whitened, case.rate, 3, short)
     assert made == [*(b.shape[1] for b in whole), inputs.shape[1]]
     assert all(len(b) == -(-h.whitened.rows // 5) + 3 for b in (*bands, inputs))
-    monkeypatch.setattr("pikanid.mismatch.detect.remainder.MOST_ROWS", h.whitened.rows // 5)
+    h.whitened.records = replace(h.whitened.records, settings=DEFAULTS.with_values(
+        {"budget.rows_tested": h.whitened.rows // 5}))
     found = residual_tests(h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, case.candidates,
                            case.rate)
     assert found.p_value < 1e-6
