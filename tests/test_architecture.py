@@ -279,3 +279,14 @@ def test_numbers_that_mean_something_are_settings() -> None:
              if name.startswith("pikanid.mismatch.")
              and (numbers := unexplained_numbers(path.read_text("utf-8")))}
     assert found == {}, "make it a field of pikanid.Settings, or end its line in '# numerical: why'"
+
+
+def test_no_package_defines_a_function_that_a_module_of_it_is_named_like() -> None:
+    """Importing the module, whenever that is, would put it in the function's place."""
+    found = [f"{package.relative_to(PACKAGE)}: {node.name}"
+             for package in PACKAGE.rglob("__init__.py")
+             for node in ast.parse(package.read_text("utf-8")).body
+             if isinstance(node, ast.FunctionDef | ast.ClassDef)
+             and ((package.parent / node.name).is_dir()
+                  or (package.parent / f"{node.name}.py").exists())]
+    assert found == []

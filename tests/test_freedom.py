@@ -13,7 +13,7 @@ from pikanid.cli import main
 from pikanid.errors import BadRecording, BadSetting
 from pikanid.estimate import Estimate
 from pikanid.problem.problem import FreeParameter, Problem
-from pikanid.strategies import STRATEGIES, strategy
+from pikanid.strategies import STRATEGIES, strategy_class
 from pikanid.uncertainty.information import undetermined_warnings
 
 FULL = pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse())
@@ -29,7 +29,7 @@ def few(count: int, sigma: float | None = 0.002) -> pk.Recording:
 
 
 def fit(name: str, recording: pk.Recording) -> Estimate:
-    found = strategy(name)().fit(pk.systems.sloshing(), recording)
+    found = strategy_class(name)().fit(pk.systems.sloshing(), recording)
     assert isinstance(found, Estimate)
     return found
 

@@ -13,7 +13,7 @@ import pytest
 import pikanid as pk
 from pikanid.estimate import Estimate
 from pikanid.model import Model, systems
-from pikanid.strategies import STRATEGIES, strategy
+from pikanid.strategies import STRATEGIES, strategy_class
 
 DURATION = 4.0
 SIGMA = 0.005
@@ -26,7 +26,7 @@ WIDE = {"pendulum": {"theta_0": 1.2}}  # what swings by itself has to swing well
 def marks(name: str) -> list[pytest.MarkDecorator]:
     """torch and pykan, and strategies that take their time by nature."""
     return [pytest.mark.kan] * (name in ("pinn", "pikan")) + [
-        pytest.mark.slow] * strategy(name).slow
+        pytest.mark.slow] * strategy_class(name).slow
 
 
 ALL = [pytest.param(name, marks=marks(name)) for name in STRATEGIES]
@@ -48,7 +48,7 @@ def recorded(model: Model) -> pk.Recording:
 def test_every_strategy_fits_every_ready_made_problem(name: str, system: str) -> None:
     truth = systems.SYSTEMS[system]().with_values(WIDE.get(system, {}))
     guess = truth.with_values({n: 1.1 * truth.values[n] for n in truth.free_names})
-    found = strategy(name)().fit(guess, recorded(truth))
+    found = strategy_class(name)().fit(guess, recorded(truth))
     assert isinstance(found, Estimate)
     assert found.strategy == name
     physics = [f.name for f in found.free if truth.parameter(f.name).scope == "shared"]
@@ -64,16 +64,16 @@ def test_only_shooting_estimates_a_delay(name: str) -> None:
     model = systems.sloshing().with_parameters(pk.Parameter("late", 0.02, "s", (0.0, 0.5)))
     model = model.map_output("theta", delay="late").fix(d_theta=0.15)
     if name == "nls":
-        found = strategy(name)().fit(model, recorded(model))
+        found = strategy_class(name)().fit(model, recorded(model))
         assert abs(found.value("late") - 0.02) < 5 * found.std("late")
     else:
         with pytest.raises(pk.errors.BadSetting, match="delay"):
-            strategy(name)().fit(model, recorded(model))
+            strategy_class(name)().fit(model, recorded(model))
 
 
 @pytest.mark.parametrize("name", STRATEGIES)
 def test_a_strategy_is_a_file_and_a_frozen_dataclass(name: str) -> None:
-    kind = strategy(name)
+    kind = strategy_class(name)
     assert kind is getattr(pk, STRATEGIES[name])
     assert kind is getattr(import_module(f"pikanid.strategies.{name}"), STRATEGIES[name])
     assert kind.name == name and isinstance(kind.slow, bool)

@@ -69,7 +69,7 @@ def test_a_strategy_that_cannot_be_used_says_why(monkeypatch: pytest.MonkeyPatch
         def fit(self, model: object, recording: object) -> None:
             raise errors.BadSetting("This cannot work.")
 
-    monkeypatch.setattr(slosh, "strategy", lambda name: Refuses)
+    monkeypatch.setattr(slosh, "strategy_class", lambda name: Refuses)
     result = slosh.fit(DENSE_LOW, "nls", seed=0)
     assert result.estimate is None
     assert result.reason == "This cannot work."

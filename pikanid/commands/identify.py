@@ -157,10 +157,10 @@ def _with_sigma(rec: Recording, model: Model, texts: Sequence[str]) -> Recording
 
 
 def _make(name: str, protocol: str, seed: int) -> Strategy:
-    from pikanid.strategies import strategy
+    from pikanid.strategies import strategy_class
 
-    kind: Callable[..., Strategy] = strategy(name)
-    known = {f.name for f in fields(strategy(name))}
+    kind: Callable[..., Strategy] = strategy_class(name)
+    known = {f.name for f in fields(strategy_class(name))}
     options = {"protocol": protocol, "seed": seed}
     return kind(**{key: value for key, value in options.items() if key in known})
 

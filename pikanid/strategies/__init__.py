@@ -30,10 +30,10 @@ __all__ = [
 STRATEGIES = {name.lower(): name for name in __all__}
 
 
-def strategy(name: str) -> type[Strategy]:
+def strategy_class(name: str) -> type[Strategy]:
     """The class of a strategy by its short name.
 
-    >>> strategy("nls").__name__
+    >>> strategy_class("nls").__name__
     'NLS'
     """
     return __getattr__(STRATEGIES[name])

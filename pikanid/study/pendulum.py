@@ -20,7 +20,7 @@ from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.model import Model, systems
 from pikanid.recording import Recording, datasets
 from pikanid.simulation import simulate
-from pikanid.strategies import strategy
+from pikanid.strategies import strategy_class
 from pikanid.strategies.nls import NLS
 
 # The recording itself gives the guess of the initial state, so that one start is enough for NLS.
@@ -75,7 +75,7 @@ def warm_up(swing: Swing) -> None:
 def fit(swing: Swing, name: str) -> Result:
     """One strategy on the training part, judged on the held-out part."""
     try:
-        found = strategy(name)(**SETTINGS.get(name, {})).fit(guess(swing.train), swing.train)
+        found = strategy_class(name)(**SETTINGS.get(name, {})).fit(guess(swing.train), swing.train)
     except errors.PikanidError as problem:
         return Result(name, None, str(problem))
     predicted = run_on(found.fitted_model, swing)

@@ -14,7 +14,7 @@ from multiprocessing.pool import AsyncResult
 from pikanid import errors
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.storage.workers import begin
-from pikanid.strategies import STRATEGIES, strategy
+from pikanid.strategies import STRATEGIES, strategy_class
 from pikanid.study import pendulum, slosh
 
 SEED = 0
@@ -58,7 +58,8 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
     for scenario in (slosh.SCENARIOS[1], slosh.SCENARIOS[3]):
         slosh.fit(scenario, "nls", SEED)
     # A slow fit takes half a minute, and on the long real recording many: only Table III has them.
-    quick, slow = ([n for n in strategies if strategy(n).slow is late] for late in (False, True))
+    quick, slow = ([n for n in strategies if strategy_class(n).slow is late]
+                   for late in (False, True))
     with _meanwhile([(scenario, name) for name in slow for scenario in slosh.SCENARIOS
                      if scenario.stride == 1]) as pending:
         singles = []

@@ -18,7 +18,7 @@ from pikanid.estimate import Estimate
 from pikanid.model import Model, systems
 from pikanid.recording import Recording, excitation
 from pikanid.simulation import simulate
-from pikanid.strategies import strategy
+from pikanid.strategies import strategy_class
 from pikanid.uncertainty import cramer_rao
 
 TRUE = {"l_theta": 0.045, "d_theta": 0.15}
@@ -95,7 +95,7 @@ def recording(scenario: Scenario, seed: int) -> Recording:
 def fit(scenario: Scenario, name: str, seed: int) -> Result:
     """One strategy, started at Table II's p0, on one noisy recording."""
     try:
-        found = strategy(name)().fit(model().with_values(START), recording(scenario, seed))
+        found = strategy_class(name)().fit(model().with_values(START), recording(scenario, seed))
     except errors.PikanidError as problem:
         return Result(scenario, name, None, str(problem))
     return Result(scenario, name, found)
