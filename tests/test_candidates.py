@@ -1,4 +1,4 @@
-"""Every entry of the catalogue and every guard, in models of one and of two coordinates."""
+"""Every entry of the catalogue and every decoy, in models of one and of two coordinates."""
 
 from __future__ import annotations
 

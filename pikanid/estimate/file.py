@@ -147,7 +147,7 @@ def _adequacy(entry: Entry) -> Adequacy:
         value=get["value"].number(low=0.0, finite=False, nan=True),
         dof=get["dof"].integer(1, 10**12), p_value=get["p_value"].number(0.0, 1.0, nan=True),
         verdict=get["verdict"].text(get_args(Verdict)),  # type: ignore[arg-type]  # one of them
-        source=get["source"].text(("given", "differences", "none")))  # type: ignore[arg-type]
+        source=get["source"].text(("given", "differences", "none")))  # type: ignore[arg-type]  # likewise
 
 
 def _arrays(entry: dict[str, Any]) -> dict[str, Any]:

@@ -82,7 +82,7 @@ class Candidate:
         twin: Group of candidates that small motions cannot tell apart.
         per_recording: Whether another recording has its own instance (or none, if `absent`).
         absent: Whether another recording is not expected to show it.
-        known: Whether the catalogue holds it; a guard only keeps wrong names away.
+        known: Whether the catalogue holds it; a decoy only keeps wrong names away.
         fits: Whether it can be added and refitted, not only looked for.
         covers: Keys of candidates that it contains as special cases, each with values of its own
             further parameters from where a fit in that one's place begins; none: from several.

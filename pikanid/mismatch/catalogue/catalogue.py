@@ -38,7 +38,7 @@ ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
     forces.initial_state,
     channels.input_hold,
 )
-GUARDS: tuple[Callable[[Site], list[Candidate]], ...] = (
+DECOYS: tuple[Callable[[Site], list[Candidate]], ...] = (
     decoys.even_stiffness,
     decoys.quintic_stiffness,
     decoys.one_way_friction,
@@ -67,7 +67,7 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, which has one sensor
     first = {s.output.name: s.q for s in reversed(sites)}
-    for table in (ENTRIES, GUARDS):
+    for table in (ENTRIES, DECOYS):
         for site in sites:
             for entry in table:
                 for candidate in entry(site):

@@ -52,7 +52,7 @@ def power_drag(site: Site) -> list[Candidate]:
         v = view.x[site.v]
         return [TangentDirection({c.name: 1.0, n.name: e},
                                  force=-sense(view, site.v) * np.abs(v) ** e,
-                     one_sided=True)
+                                 one_sided=True)
                 for e in (0.2, 0.35, 0.5, 0.7, 1.3, 1.5, 1.75, 2.3, 2.7, 3.2)]
 
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,

@@ -154,9 +154,9 @@ class Search:
                 self._exchange(h)
             for h in self.ranked()[:budget.rivals]:
                 # fewer effects that explain almost as much may do with another one
-                if 0 < len(h.effects) < len(best.effects) and not self.budget_exhausted and not \
-                        adequate(h) \
-                        and below(h.score(self.scale()), best.score(self.scale()) + 2 * close):
+                reach = best.score(self.scale()) + 2 * close
+                if (0 < len(h.effects) < len(best.effects) and not self.budget_exhausted
+                        and not adequate(h) and below(h.score(self.scale()), reach)):
                     self._extend(h, budget.beside_one)
             self._simplify()
         # even without budget, no name without the laws that keep wrong ones away, of parts as well
@@ -292,9 +292,9 @@ class Search:
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])
                 and (again or frozenset(e.key for e in job[0]) not in self.fits)
                 and signature(job) not in self.begun]  # from there it would end there again
-        ordered_parallel_map(jobs, lambda: max(self._closest_chi2(), reach), work, take,
-                lambda: always or not self.budget_exhausted, self.workers,
-                lambda result, chi2: result[1].stands(chi2))
+        ordered_parallel_map(
+            jobs, lambda: max(self._closest_chi2(), reach), work, take, lambda: always or not
+            self.budget_exhausted, self.workers, lambda result, chi2: result[1].stands(chi2))
 
     def _closest_chi2(self) -> float:
         return min((h.minimum.chi2 for h in self.fits.values()), default=np.inf)
