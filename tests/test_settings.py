@@ -6,10 +6,10 @@ import inspect
 import json
 import re
 from dataclasses import fields, is_dataclass, replace
-from math import log
+from math import inf, log, nan
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
@@ -23,8 +23,9 @@ from pikanid.mismatch.fitting.hypothesis import fitted
 from pikanid.mismatch.report.locate import smallest
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings import thresholds
-from pikanid.mismatch.settings.settings import DEFAULTS, RATES, Settings
+from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.mismatch.steps.opening import open_case
+from pikanid.settings import Range, check, ranges_of
 
 GROUPS = [DEFAULTS, *(value for f in fields(DEFAULTS)
                       if is_dataclass(value := getattr(DEFAULTS, f.name)))]
@@ -197,7 +198,63 @@ def _sizes(base: Any, own: Settings, effect: Any) -> dict[str, Any]:
     return smallest(replace(base, whitened=whitened), [effect])
 
 
-def test_rates_are_probabilities() -> None:
-    assert all(0 < getattr(DEFAULTS, name) < 1 for name in RATES)
-    assert all(isinstance(getattr(DEFAULTS, f.name), float) == (f.name in RATES)
-               for f in fields(DEFAULTS) if f.name not in ("choice_weight",))
+def described(group: Any) -> dict[str, str]:
+    """What the documentation says of each field."""
+    text = inspect.getdoc(type(group)) or ""
+    return dict(re.findall(r"^    (\w+): (\S.*)", text, re.MULTILINE))
+
+
+NUMBERS = [(group, f.name, ranges_of(hints[f.name])) for group in GROUPS
+           for hints in [get_type_hints(type(group), include_extras=True)]
+           for f in fields(group) if not is_dataclass(hints[f.name])]
+
+
+@pytest.mark.parametrize(("group", "name", "ranges"), NUMBERS,
+                         ids=[f"{type(g).__name__}.{name}" for g, name, _ in NUMBERS])
+def test_every_field_has_a_range_and_keeps_to_it(group: Any, name: str, ranges: Any) -> None:
+    """Beyond a bound, of another kind or not finite: one sentence.  What is inside is taken."""
+    assert ranges is not None, "annotate it with one of pikanid.settings"
+    each = ranges if isinstance(ranges, tuple) else (ranges,)
+
+    def with_all(*values: Any) -> Any:
+        given = values if isinstance(ranges, tuple) else values[0]
+        made = replace(group, **{name: given})
+        check(made)
+        return made
+
+    for k, r in enumerate(each):
+        usual = [r.low + (1 if r.whole else 0.25) if r.high == inf else (r.low + r.high) / 2
+                 for r in each] if name != "kinds" else [0.1, 0.1, 0.1]
+        assert getattr(with_all(*usual), name) in (usual[0], tuple(usual))
+        outside = [r.low - 1e-9, r.high + 1e-9, inf, -inf, nan, "1", None, True, 10**400]
+        outside += [r.low, r.high] if r.inside else []
+        outside += [float(r.low), r.low + 0.5] if r.whole else []
+        for wrong in outside:
+            with pytest.raises(errors.BadSetting, match=rf"{name} is .*; it must be .+\."):
+                with_all(*usual[:k], wrong, *usual[k + 1:])
+        if not r.inside and r.low > -inf and name != "kinds" and not isinstance(ranges, tuple):
+            with_all(r.low)
+    if isinstance(ranges, tuple):
+        with pytest.raises(errors.BadSetting, match=f"{len(each)} of these"):
+            with_all(*usual[1:])
+
+
+def test_ranges_are_those_that_the_documentation_speaks_of() -> None:
+    """A rate or a probability is none of the sure ones, a share is from 0 to 1."""
+    wrong = []
+    for group, name, ranges in NUMBERS:
+        first = described(group)[name].split()[0]
+        each = ranges if isinstance(ranges, tuple) else (ranges,)
+        if first in ("Rate", "Probability") and any(r != Range(0, 1, inside=True) for r in each):
+            wrong.append(name)
+        if first in ("Share", "Shares") and any((r.low, r.high) != (0, 1) for r in each):
+            wrong.append(name)
+    assert wrong == []
+
+
+@pytest.mark.parametrize("values", [
+    {"quiet.steepest": 1.225}, {"noise.begins": (0.6, 0.25)}, {"budget.force_knots": (800, 8)},
+    {"noise.covered": 1.1}, {"search.kept": 2.0}, {"verdict.alike": 0.9}])
+def test_a_value_beyond_its_meaning_is_refused(values: dict[str, Any]) -> None:
+    with pytest.raises(errors.BadSetting):
+        DEFAULTS.with_values(values)

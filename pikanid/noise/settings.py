@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pikanid.settings import Amount, Count, Factor, Rate, Share, check
+
 
 @dataclass(frozen=True)
 class QuietSettings:
@@ -22,18 +24,24 @@ class QuietSettings:
         still_noise: The same [standard deviations of the input's own noise].
         low: Samples of a quiet stretch that say something about low frequencies.
         steepest: Correlation of neighbours that a quiet stretch can show: beyond it, it drifts.
+
+    Raises:
+        BadSetting: If a value is none that its field can have.
     """
 
-    chance: float = 0.01
-    shortest: int = 20
-    memories: float = 10.0
-    order: int = 4
-    calmest: float = 2.0
-    quieter: float = 0.25
-    still: float = 0.01
-    still_noise: float = 4.0
-    low: int = 100
-    steepest: float = 0.98
+    chance: Rate = 0.01
+    shortest: Count = 20
+    memories: Amount = 10.0
+    order: Count = 4
+    calmest: Factor = 2.0
+    quieter: Share = 0.25
+    still: Share = 0.01
+    still_noise: Amount = 4.0
+    low: Count = 100
+    steepest: Share = 0.98
+
+    def __post_init__(self) -> None:
+        check(self)
 
 
 USUAL = QuietSettings()

@@ -57,7 +57,8 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
 
     h = level.interval
     grid = np.round((t - t[0]) / h).astype(int)
-    if np.max(np.abs((t - t[0]) / h - grid)) > 0.2 or len(t) < 200:
+    uneven = np.max(np.abs((t - t[0]) / h - grid)) > 0.2
+    if uneven or len(t) < settings.noise.least_spectrum:
         return level
     even = np.interp(np.arange(grid[-1] + 1), grid, residual)
     share = len(t) / len(even)

@@ -26,7 +26,7 @@ def without_outliers(recording: Recording, output: str, noise: NoiseSettings
     channel = recording[output]
     seen = np.flatnonzero(np.isfinite(channel.values))
     y = channel.values[seen].copy()
-    if len(y) < 20:
+    if len(y) < noise.least_alone:
         return recording, 0
     try:
         sigma, _ = high_band_sigma(channel)
@@ -54,7 +54,7 @@ def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
     """Which samples (N,) of a residual are far from what its neighbours say, whichever one asks:
     those around it, or those on one side only, beyond which a misfit may bend.
     """
-    if len(residual) < 20:
+    if len(residual) < noise.least_alone:
         return np.zeros(len(residual), bool)
     near = np.lib.stride_tricks.sliding_window_view(
         np.pad(residual, 3, mode="reflect", reflect_type="odd"), 7)

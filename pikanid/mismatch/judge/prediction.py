@@ -108,7 +108,8 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
                                                               for c in candidates}.values()))
         guess = min(guess, begun, key=whitened.chi2)
         first = minimise(whitened.residual, guess, np.where(own, whitened.problem.lower, guess),
-                         np.where(own, whitened.problem.upper, guess), 40)
+                         np.where(own, whitened.problem.upper, guess),
+                         records.settings.budget.beginnings)
         if first is not None:
             guess = first.theta
     found, prior = _moved(hypothesis, whitened, guess, shared, prior)
@@ -148,7 +149,7 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
 
     def suited(before: Prior, begin: np.ndarray) -> Minimum | None:
         return minimise(besides(whitened, functools.partial(known, before)), begin, problem.lower,
-                        problem.upper, 25)
+                        problem.upper, settings.budget.held_out)
 
     found = suited(prior, guess)
     suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects, settings)
@@ -247,7 +248,8 @@ def _fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, le
             for f, v in zip(later.problem.free, apart.theta, strict=True)}
     problem = whitened.problem
     start = np.array([own[f.name, f.recording] for f in problem.free])
-    found = minimise(whitened.residual, start, problem.lower, problem.upper, 25)
+    found = minimise(whitened.residual, start, problem.lower, problem.upper,
+                     first.settings.budget.held_out)
     if found is None:
         return None
     if found.chi2 > hypothesis.minimum.chi2 + left + first.settings.verdict.missed:
@@ -285,6 +287,7 @@ def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> 
             beside = [at(theta, {name: share * size}) for share in (1.0, *effect.other_minima)]
             theta = min(beside, key=whitened.chi2)
             if whitened.choose_steps(theta):
-                other = minimise(whitened.residual, theta, problem.lower, problem.upper, 25)
+                other = minimise(whitened.residual, theta, problem.lower, problem.upper,
+                                 whitened.settings.budget.held_out)
                 found = min(found, other or found, key=lambda m: m.chi2)
     return found

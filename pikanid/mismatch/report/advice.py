@@ -80,8 +80,9 @@ def _best(models: Mapping[str, Model], records: Records, driven: Input, rate: fl
     settings = records.settings
     for recorded in (records.recordings, ()):
         try:
-            offered = profiles(min(rate / (2 * np.pi), 5.0), duration=settings.budget.profile,
-                               channel=driven.name, unit=driven.unit, draws=1)
+            offered = profiles(min(rate / (2 * np.pi), settings.budget.profile_rate),
+                               duration=settings.budget.profile, channel=driven.name,
+                               unit=driven.unit, draws=1)
             return next_experiment(models, recorded, sigma, offered, workers=workers,
                                    settings=settings)
         except errors.PikanidError:

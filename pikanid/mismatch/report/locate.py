@@ -104,7 +104,7 @@ def loud_windows(base: Hypothesis) -> tuple[tuple[float, float], ...]:
         counts = np.bincount(owner[inside], minlength=len(outputs))
         powers = np.bincount(owner[inside], r[inside] ** 2, len(outputs))
         loudest = counts + settings.beyond.louder * np.sqrt(2 * counts)
-        if np.any((counts > 3) & (powers > loudest)):
+        if np.any((counts >= settings.beyond.least_window) & (powers > loudest)):
             loud.append((float(a), float(b)))
     joined: list[tuple[float, float]] = []
     for a, b in loud:

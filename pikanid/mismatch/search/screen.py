@@ -103,7 +103,8 @@ class Screen:
     def __init__(self, about: Hypothesis, candidates: Sequence[Candidate],
                  guess: Mapping[str, float] = NOWHERE):
         self.about, self.guess = about, guess
-        self.faint = about.whitened.settings.search.faint
+        self.settings = about.whitened.settings
+        self.faint = self.settings.search.faint
         self.found: Directions = directions(about.whitened, about.minimum.theta, candidates)
         self.units, self.lengths = unit_columns(self.found.D, about.minimum.J)
         # r = ŷ - y: a sign that is present in y shows as its negative
@@ -166,7 +167,8 @@ class Screen:
         known += [(c, [start]) for k, c in enumerate(self.found.candidates)
                   if always(c) and (c.levels or all(c is not one[0] for one in known))
                   for start in self._anyhow(k)]
-        return known + [one for one in listed if not one[0].known][:max(count // 3, 1)]
+        decoys = [one for one in listed if not one[0].known]
+        return known + decoys[:max(count // self.settings.budget.names_a_decoy, 1)]
 
     def _anyhow(self, candidate: int) -> list[Start | Mapping[str, float]]:
         """Where a fit of a candidate begins that promises nothing."""
@@ -176,7 +178,8 @@ class Screen:
             return [best_level(self.about, c, point) for point in points]
         own = np.flatnonzero((self.found.owner == candidate) & (self.lengths > 0))
         levels = [int(k) for k in own if not self.found.directions[k].scales]
-        some = levels[::-2][:3] if len(levels) > 3 else levels
+        most = self.settings.budget.unpromising
+        some = levels[::-2][:most] if len(levels) > most else levels
         if some:
             return [self._start(c, k, 0.0) for k in some]
         return [Start(self.about.point, self.about.point),
@@ -226,7 +229,8 @@ class Screen:
         gain = np.triu(np.where(bad, 0.0, gain), 1)
         listed: list[tuple[tuple[Candidate, Candidate], list[Start]]] = []
         taken: set[tuple[int, int]] = set()
-        for flat in np.argsort(-steady(gain), axis=None, kind="stable")[:4000]:
+        order = np.argsort(-steady(gain), axis=None, kind="stable")
+        for flat in order[:self.settings.budget.pairs_weighed]:
             i, j = divmod(int(flat), len(z))
             pair = (int(owner[i]), int(owner[j]))
             a, b = (self.found.candidates[k] for k in pair)

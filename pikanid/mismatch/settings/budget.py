@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from pikanid.settings import ASCENDING, Amount, Count
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,9 @@ class Budget:
         draws: Of the distribution of a test.
         singles: Refits of one effect.
         pairs: Refits of two effects at once.
+        pairs_weighed: Pairs of signs that are gone through for these.
+        names_a_decoy: Effects with a name that are fitted for each one without.
+        unpromising: Fits of an effect that promises nothing to first order, from several levels.
         beside_one: Refits of one more effect beside one.
         beside_more: Refits of one more beside two or three.
         leading: Single effects that a second one is added to.
@@ -35,6 +41,8 @@ class Budget:
         predicted: Hypotheses behind these of which is found out what they predict.
         iterations: Of a fit.
         hurried: Of a fit among gross misfits.
+        held_out: Of a fit to held-out recordings, by themselves or with all others.
+        beginnings: Of what held-out recordings have for themselves alone, which goes first.
         hop_iterations: Of a fit over a hill.
         several_starts: That each of several starts gets before the best one goes on.
         patience: That a fit gets to come near the best one.
@@ -53,51 +61,58 @@ class Budget:
         finalists: Profiles that are judged again after refitting simulations.
         compared: Hypotheses in a set, the most probable, that an experiment is planned for.
         profile: Length of a profile that is proposed [s].
+        profile_rate: Natural frequency, at most, that its proposals are made for [Hz].
         threads: That are used where no number is asked for: beyond two, what is begun ahead is too
             often begun in vain.
     """
 
-    samples: int = 25_000
-    put_together: int = 4000
-    samples_a_period: int = 30
-    rows_searched: int = 6000
-    rows_tested: int = 6000
-    modes: int = 800
-    draws: int = 4000
-    singles: int = 14
-    pairs: int = 8
-    beside_one: int = 8
-    beside_more: int = 4
-    leading: int = 3
-    effects: int = 4
-    carried: int = 12
-    carried_far: int = 4
-    effort: float = 8e6
-    setup: float = 6e4
-    rivals: int = 6
-    asked_again: int = 2
-    relevelled: int = 3
-    rechecked: int = 3
-    tested: int = 12
-    predicted: int = 8
-    iterations: int = 30
-    hurried: int = 12
-    hop_iterations: int = 10
-    several_starts: int = 5
-    patience: int = 6
-    noise_refit: int = 5
-    hops: int = 4
-    finer: int = 3
-    relinearised: int = 4
-    levels: int = 4
-    forms: int = 3
-    force_passes: int = 2
-    force_knots: tuple[int, int] = (8, 800)
-    slow_knots: int = 200
-    windows: int = 40
-    planned_refits: int = 4
-    planned_sizes: int = 7
-    finalists: int = 5
-    compared: int = 2
-    profile: float = 20.0
-    threads: int = 2
+    samples: Count = 25_000
+    put_together: Count = 4000
+    samples_a_period: Count = 30
+    rows_searched: Count = 6000
+    rows_tested: Count = 6000
+    modes: Count = 800
+    draws: Count = 4000
+    singles: Count = 14
+    pairs: Count = 8
+    pairs_weighed: Count = 4000
+    names_a_decoy: Count = 3
+    unpromising: Count = 3
+    beside_one: Count = 8
+    beside_more: Count = 4
+    leading: Count = 3
+    effects: Count = 4
+    carried: Count = 12
+    carried_far: Count = 4
+    effort: Amount = 8e6
+    setup: Amount = 6e4
+    rivals: Count = 6
+    asked_again: Count = 2
+    relevelled: Count = 3
+    rechecked: Count = 3
+    tested: Count = 12
+    predicted: Count = 8
+    iterations: Count = 30
+    hurried: Count = 12
+    held_out: Count = 25
+    beginnings: Count = 40
+    hop_iterations: Count = 10
+    several_starts: Count = 5
+    patience: Count = 6
+    noise_refit: Count = 5
+    hops: Count = 4
+    finer: Count = 3
+    relinearised: Count = 4
+    levels: Count = 4
+    forms: Count = 3
+    force_passes: Count = 2
+    force_knots: Annotated[tuple[Count, Count], ASCENDING] = (8, 800)
+    slow_knots: Count = 200
+    windows: Count = 40
+    planned_refits: Count = 4
+    planned_sizes: Count = 7
+    finalists: Count = 5
+    compared: Count = 2
+    profile: Amount = 20.0
+    profile_rate: Amount = 5.0
+    threads: Count = 2

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pikanid.settings import Amount, Count, Factor, Share
+
 
 @dataclass(frozen=True)
 class FitSettings:
@@ -28,18 +30,18 @@ class FitSettings:
         rows_a_parameter: Rows a parameter that make a beginning worth a fit.
     """
 
-    certain: float = 4.0
-    gross: float = 25.0
-    lost: float = 3.0
-    hopeless: float = 300.0
-    rough: float = 3.0
-    glance: float = 1e4
-    wild: float = 1000.0
-    far: float = 2.0
-    slow: float = 0.7
-    other_order: float = 1.0
-    lower_hill: float = 1.0
-    rows_a_parameter: int = 10
+    certain: Amount = 4.0
+    gross: Amount = 25.0
+    lost: Amount = 3.0
+    hopeless: Amount = 300.0
+    rough: Amount = 3.0
+    glance: Amount = 1e4
+    wild: Factor = 1000.0
+    far: Factor = 2.0
+    slow: Share = 0.7
+    other_order: Amount = 1.0
+    lower_hill: Amount = 1.0
+    rows_a_parameter: Count = 10
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,8 @@ class SearchSettings:
             was tested stands; fits stop at a hundredth.
     """
 
-    faint: float = 3.0
-    promising: float = 0.5
-    kept: float = 0.5
-    much: float = 0.1
-    equal: float = 0.05
+    faint: Amount = 3.0
+    promising: Share = 0.5
+    kept: Share = 0.5
+    much: Share = 0.1
+    equal: Amount = 0.05

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from pikanid.settings import ASCENDING, Amount, Count, Factor, Range, Rate, Share
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,7 @@ class NoiseSettings:
         line: Means of the noise's spectrum from which on an ordinate counts as a line: of
             exponentially distributed ordinates one in a thousand is larger (e^-7).
         order_only: Relative standard error of a power, at most: then it is known by its order only.
+        least_spectrum: Samples of a residual from which on its spectrum shows its noise.
         less: Standard errors of a power by which a fit has to leave less to refute it.
         same: Relative change of σ below which a level read again is the same.
         same_correlation: Change of the correlation of neighbours below which it is.
@@ -24,6 +28,7 @@ class NoiseSettings:
         lone: Median gaps by which it must once a fit is taken away: of white noise one sample in
             4000 does, counted.
         together: Neighbours that are alone together are none: a sensor may have been at its end.
+        least_alone: Samples of which some can be alone: neighbours say nothing in fewer.
         most_outliers: Share of the samples: where more are alone, nothing is.
         freedom: Samples beyond the free parameters: σ² read off n of them has a relative standard
             error of √(2/n), so that σ is 16 % uncertain at 20.
@@ -38,22 +43,24 @@ class NoiseSettings:
             error of that number.
     """
 
-    above: float = 6.0
-    begins: tuple[float, float] = (0.25, 0.6)
-    line: float = 7.0
-    order_only: float = 0.6
-    less: float = 2.0
-    same: float = 0.05
-    same_correlation: float = 0.06
-    spike: float = 5.0
-    lone: float = 9.0
-    together: int = 3
-    most_outliers: float = 0.1
-    freedom: int = 20
-    aside: float = 0.3
-    least_aside: int = 300
-    driven_alike: float = 0.01
-    moved_alike: float = 0.2
-    covered: float = 0.8
-    flat: float = 1.25
-    caution: float = 0.25
+    above: Amount = 6.0
+    begins: Annotated[tuple[Share, Share], ASCENDING] = (0.25, 0.6)
+    line: Amount = 7.0
+    order_only: Amount = 0.6
+    least_spectrum: Count = 200
+    less: Amount = 2.0
+    same: Amount = 0.05
+    same_correlation: Share = 0.06
+    spike: Amount = 5.0
+    lone: Amount = 9.0
+    together: Count = 3
+    least_alone: Annotated[int, Range(7, whole=True)] = 20
+    most_outliers: Share = 0.1
+    freedom: Count = 20
+    aside: Rate = 0.3
+    least_aside: Count = 300
+    driven_alike: Share = 0.01
+    moved_alike: Share = 0.2
+    covered: Share = 0.8
+    flat: Factor = 1.25
+    caution: Share = 0.25

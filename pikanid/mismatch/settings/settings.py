@@ -6,17 +6,17 @@ import difflib
 import os
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pikanid import errors
 from pikanid.mismatch.settings import thresholds
 from pikanid.mismatch.settings.budget import Budget
-from pikanid.mismatch.settings.checks import check
 from pikanid.mismatch.settings.fits import FitSettings, SearchSettings
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.verdict import BeyondSettings, VerdictSettings
 from pikanid.noise.settings import QuietSettings
+from pikanid.settings import Amount, Count, Rate, Share, changed, check, items, told
 from pikanid.storage.limits import MOST_MODEL, file_bytes
 
 
@@ -65,19 +65,19 @@ class Settings:
     'Settings: alpha = 0.05, budget.singles = 20; all others defaults.'
     """
 
-    alpha: float = 0.01
-    power: float = 0.9
-    refusal: float = 0.01
-    refusal_together: float = 0.001
-    needless: float = 0.05
-    noise_refusal: float = 0.05
-    noise_excess: float = 0.05
-    noise_conflict: float = 0.01
-    band: float = 0.05
-    confusion: float = 0.023
-    kinds: tuple[float, float, float] = (0.6, 0.2, 0.2)
-    signs: int = 100
-    choice_weight: float = 1.0
+    alpha: Rate = 0.01
+    power: Rate = 0.9
+    refusal: Rate = 0.01
+    refusal_together: Rate = 0.001
+    needless: Rate = 0.05
+    noise_refusal: Rate = 0.05
+    noise_excess: Rate = 0.05
+    noise_conflict: Rate = 0.01
+    band: Rate = 0.05
+    confusion: Rate = 0.023
+    kinds: tuple[Share, Share, Share] = (0.6, 0.2, 0.2)
+    signs: Count = 100
+    choice_weight: Amount = 1.0
     quiet: QuietSettings = field(default_factory=QuietSettings)
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     fits: FitSettings = field(default_factory=FitSettings)
@@ -88,10 +88,6 @@ class Settings:
 
     def __post_init__(self) -> None:
         check(self)
-        for name in RATES:
-            if not 0 < getattr(self, name) < 1:
-                raise errors.BadSetting(errors.bad_value(
-                    name, getattr(self, name), "between 0 and 1"))
         if sum(self.kinds) > 1 + 1e-9:
             raise errors.BadSetting(errors.bad_value("kinds", self.kinds, "shares of 1"))
 
@@ -129,13 +125,7 @@ class Settings:
 
     def items(self) -> Iterator[tuple[str, Any]]:
         """Name, as "search.faint", and value of every field, in their order."""
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if is_dataclass(value):
-                for inner in fields(value):
-                    yield f"{f.name}.{inner.name}", getattr(value, inner.name)
-            else:
-                yield f.name, value
+        return items(self)
 
     def with_values(self, values: Mapping[str, Any]) -> Settings:
         """The same with other values of some fields, by name as in `items`.
@@ -162,8 +152,7 @@ class Settings:
 
     def changed(self) -> dict[str, Any]:
         """The fields that differ from the defaults, by name as in `items`."""
-        return {name: value for (name, value), (_, usual) in zip(
-            self.items(), DEFAULTS.items(), strict=True) if value != usual}
+        return changed(self)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON and TOML: fields by name, groups as tables."""
@@ -208,16 +197,7 @@ class Settings:
         return Settings.from_dict(content)
 
     def __str__(self) -> str:
-        told = ", ".join(f"{name} = {_told(value)}" for name, value in self.changed().items())
-        return f"Settings: {told}; all others defaults." if told else "Settings: defaults."
+        return told(self)
 
 
-RATES = ("alpha", "power", "refusal", "refusal_together", "needless", "noise_refusal",
-         "noise_excess", "noise_conflict", "band", "confusion")
 DEFAULTS = Settings()
-
-
-def _told(value: Any) -> str:
-    if isinstance(value, tuple):
-        return "(" + ", ".join(map(_told, value)) + ")"
-    return f"{value:g}"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pikanid.settings import Amount, Count, Factor, Share
+
 
 @dataclass(frozen=True)
 class VerdictSettings:
@@ -39,30 +41,33 @@ class VerdictSettings:
         open: Standard errors from a whole number within which an exponent may be that.
         narrow: Share of the half range: a hysteresis loop no wider is dry friction that gives
             before it slips.
+        reached: Share of the distance that counts as detectable, which the strongest form of an
+            effect must reach to be one that an experiment can show.
         sensitive: Times the held-out RMSE with parameters moved within their errors: more is
             theirs, not a law's.
     """
 
-    indistinct: float = 6.0
-    behind: float = 3.0
-    side_by_side: float = 2.0
-    same_law: float = 1.0
-    decoy_handicap: float = 4.0
-    improvement: float = 0.9
-    worth: float = 0.05
-    part: float = 0.5
-    alike: float = 1.1
-    strong: tuple[float, float, float, float] = (40.0, 45.0, 90.0, 135.0)
-    shown: float = 12.0
-    needed: float = 4.0
-    worse: float = 1.5
-    linear: float = 3.0
-    missed: float = 15.0
-    sharp: float = 0.12
-    whole: float = 1.0
-    open: float = 3.0
-    narrow: float = 0.03
-    sensitive: float = 1.2
+    indistinct: Amount = 6.0
+    behind: Factor = 3.0
+    side_by_side: Amount = 2.0
+    same_law: Amount = 1.0
+    decoy_handicap: Amount = 4.0
+    improvement: Share = 0.9
+    worth: Share = 0.05
+    part: Share = 0.5
+    alike: Factor = 1.1
+    strong: tuple[Amount, Amount, Amount, Amount] = (40.0, 45.0, 90.0, 135.0)
+    shown: Amount = 12.0
+    needed: Amount = 4.0
+    worse: Factor = 1.5
+    linear: Amount = 3.0
+    missed: Amount = 15.0
+    sharp: Amount = 0.12
+    whole: Amount = 1.0
+    open: Amount = 3.0
+    narrow: Share = 0.03
+    reached: Share = 0.8
+    sensitive: Factor = 1.2
 
 
 @dataclass(frozen=True)
@@ -78,17 +83,19 @@ class BeyondSettings:
         knots_a_period: Knots in a natural period: friction's third harmonic still fits between.
         resolved: Knots in a natural period from which on a force that follows the motion shows.
         rows_a_knot: Samples to a knot interval, at least.
+        least_window: Samples of a window that can say whether it is louder than noise.
         louder: Standard deviations of χ² in a window, √(2n), beyond which it is louder than noise.
         unexplained: [χ² per degree of freedom] from which on no force explains a recording.
     """
 
-    own: float = 0.1
-    line: float = 0.05
-    read: float = 0.6
-    read_beside: float = 0.9
-    inside: float = 0.95
-    knots_a_period: int = 6
-    resolved: int = 4
-    rows_a_knot: int = 5
-    louder: float = 4.0
-    unexplained: float = 1.5
+    own: Share = 0.1
+    line: Share = 0.05
+    read: Share = 0.6
+    read_beside: Share = 0.9
+    inside: Share = 0.95
+    knots_a_period: Count = 6
+    resolved: Count = 4
+    rows_a_knot: Count = 5
+    least_window: Count = 4
+    louder: Amount = 4.0
+    unexplained: Amount = 1.5
