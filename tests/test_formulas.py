@@ -62,6 +62,34 @@ def test_a_patch_predicts_better_inside_its_range(case: Case) -> None:
     np.testing.assert_allclose(bent(found.grid, edge), found.values, atol=1e-9)
 
 
+def test_units_that_need_factors_keep_nothing_from_being_offered() -> None:
+    """A stage that is seen in millimetres and pushed in m/s²; names that a patch would take."""
+    nominal = pk.Model.from_dict({
+        "states": {"x": {"unit": "mm", "initial": 0.0}, "v": {"unit": "mm/s", "initial": 0.0}},
+        "inputs": {"u": {"unit": "m/s^2"}},
+        "parameters": {"omega": {"unit": "rad/s", "guess": 9.0, "bounds": [1.0, 50.0]},
+                       "zeta": {"guess": 0.05, "bounds": [0.0, 1.0]},
+                       "delta_1": {"unit": "mm/s^2", "value": 0.0}},
+        "equations": {"x": "v", "v": "u - omega**2*x - 2*zeta*omega*v + delta_1"},
+        "outputs": {"y": {"unit": "mm", "expression": "x"}}})
+    truth = nominal.with_term("v", "-k*x**2", [pk.Parameter("k", 0.5, "1/(s^2*mm)")])
+    moves = [excitation.planar_moves(4, 8.0, channels=("u",), acceleration=a, seed=s)
+             for s, a in ((1, 1.0), (2, 0.7))]
+    opened = open_case(nominal, (simulate(truth, moves[0], sigma=0.02, seed=1),),
+                       (simulate(truth, moves[1], sigma=0.02, seed=2),), None, lambda text: None,
+                       DEFAULTS)
+    site = opened.sites[0]
+    shape = force_shape(opened.base, site, opened.candidates)
+    offered = [*opened.candidates,
+               *symbolic_candidates(shape, site, opened.candidates, DEFAULTS)]
+    assert len(offered) > 40
+    for candidate in offered:
+        assert candidate.applied(opened.base.model).with_values({})
+    found = patch(opened.base, opened.model, shape, site, opened.records, opened.later,
+                  opened.predicted)
+    assert found is not None and found.rmse_after < found.rmse_before
+
+
 def bent(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Without its best straight line."""
     return y - np.polynomial.Polynomial.fit(x, y, 1)(x)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
+from pikanid.formula import units
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
@@ -72,7 +73,7 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
     if not edges:
         return None
     edge = max(edges, key=lambda e: e.alone)
-    basis = _Basis(edge)
+    basis = _Basis(edge, nominal)
     found = fitted(nominal, [basis.candidate(site)], records, [base.point], 1)
     before = predict(base)
     if found is None or before is None or found.minimum.chi2 >= base.minimum.chi2:
@@ -102,11 +103,14 @@ class _Basis:
     Without the straight line, which belongs to the free parameters.
     """
 
-    def __init__(self, edge: Edge):
-        self.argument = edge.argument
+    def __init__(self, edge: Edge, model: Model):
+        self.argument, self.unit = edge.argument, model.state(edge.argument).unit
         self.low, self.high = edge.curve.low, edge.curve.high
         self.inner = np.linspace(-1.0, 1.0, INTERVALS + 1)[1:-1]
-        self.names = [f"delta_{k}" for k in range(3 + len(self.inner))]
+        self.name = "delta"
+        while any(taken.startswith(self.name) for taken in model.symbols):
+            self.name += "_x"
+        self.names = [f"{self.name}_{k}" for k in range(3 + len(self.inner))]
 
     def _scaled(self, x: np.ndarray) -> np.ndarray:
         return (2 * x - self.low - self.high) / (self.high - self.low)
@@ -121,12 +125,15 @@ class _Basis:
         """The edge as an effect whose coefficients are estimated."""
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         z = f"(({self.argument} - ({middle!r}))/{half!r})"
-        powers = ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
+        shapes = ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
                                               for k in map(float, self.inner))]
-        text = " + ".join(f"{n}*{p}" for n, p in zip(self.names, powers, strict=True))
-        unit = f"{site.unit}/s^2"
+        text = " + ".join(f"{n}*{p}" for n, p in zip(self.names, shapes, strict=True))
+        # z is a number, but carries the unit of what it is made from
+        own = [units.product((f"({site.unit})/s^2", 1), (self.unit or "1", -power))
+               for power in (0, 2, *(3 for _ in shapes[2:]))]
         return Candidate(("patch",), "a KAN edge", text, "dynamics", site,
-                         tuple(Parameter(n, 0.0, unit) for n in self.names),
+                         tuple(Parameter(n, 0.0, unit)
+                               for n, unit in zip(self.names, own, strict=True)),
                          lambda m: m.with_term(site.v, text), lambda view: (), known=False)
 
     def extended(self, nominal: Model, site: Site, found: Hypothesis) -> Model:
@@ -137,7 +144,7 @@ class _Basis:
         values = self.matrix(x) @ np.array([found.values[n] for n in self.names])
         coefficients = np.linalg.lstsq(
             BSpline.design_matrix(x, knots, DEGREE).toarray(), values, rcond=None)[0]
-        spline = Spline("delta", DEGREE, tuple(map(float, knots)))
+        spline = Spline(self.name, DEGREE, tuple(map(float, knots)))
         model = nominal.with_values({n: v for n, v in found.values.items()
                                      if n in nominal.parameter_names})
         return model.with_edge(site.v, self.argument, spline).fix(
