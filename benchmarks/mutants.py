@@ -109,6 +109,10 @@ def prepare() -> None:
     if not note.exists() or note.read_text() != sample:
         shutil.rmtree(MUTANTS, ignore_errors=True)
         note.write_text(sample)
+    # A module that was moved must not be found where it was.
+    for copy in MUTANTS.glob("*/**/*.py"):
+        if not (ROOT / copy.relative_to(MUTANTS)).exists():
+            copy.unlink()
 
 
 def run(jobs: int, patterns: Sequence[str] = ()) -> None:

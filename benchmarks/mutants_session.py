@@ -27,7 +27,7 @@ SLOW = 1.5  # processor seconds: a test that takes longer is left out
 LEFT_OUT = ("architecture", "readme", "concealed", "plots", "datasets", "interrupts", "public_api",
             "no_traces", "study", "test_cli.py", "compiled_cache", "diagnosis_memory", "kan_build",
             "kan_paper", "pinn", "pikan.py", "reading", "mlp", "excitation", "slosh_recording",
-            "units", "hostile", "unforeseen", "excerpt")
+            "units", "contributing", "hostile", "unforeseen", "excerpt")
 _durations: dict[str, float] = {}
 
 
