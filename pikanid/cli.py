@@ -39,9 +39,9 @@ from pikanid.commands.simulate import simulate
 from pikanid.commands.study import EXAMPLES as STUDY
 from pikanid.commands.study import study
 
-EXIT_UNFORESEEN = 70  # EX_SOFTWARE of sysexits.h
-EXIT_INTERRUPTED = 130
-EXIT_PIPE = 141  # 128 + SIGPIPE: what other programs end with when nobody reads on
+EXIT_UNFORESEEN = 70  # definition: EX_SOFTWARE of sysexits.h
+EXIT_INTERRUPTED = 130  # definition: 128 + SIGINT, as shells have it
+EXIT_PIPE = 141  # definition: 128 + SIGPIPE: what other programs end with when nobody reads on
 EXAMPLES = """Examples:
 
   pikanid simulate --model sloshing --sigma 0.1deg --out run.csv

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom, chi2
 
 from pikanid.objective.adequacy import difference_noise, judge
+from pikanid.objective.settings import AdequacySettings
 
 
 def test_value_and_probability_are_those_of_the_chi_square() -> None:
@@ -24,7 +25,7 @@ def test_value_and_probability_are_those_of_the_chi_square() -> None:
 
 def test_right_models_are_blamed_as_often_as_stated() -> None:
     rng, runs, alpha = np.random.default_rng(1), 4000, 0.05
-    blamed = sum(judge([r], [np.ones(50)], [r], 0, alpha).verdict == "misfit"
+    blamed = sum(judge([r], [np.ones(50)], [r], 0, AdequacySettings(alpha)).verdict == "misfit"
                  for r in rng.normal(size=(runs, 50)))
     assert binom.ppf(0.0005, runs, alpha) <= blamed <= binom.ppf(0.9995, runs, alpha)
 
@@ -143,8 +144,8 @@ def test_a_misfit_with_stated_noise_is_less_probable_than_alpha() -> None:
     r = np.ones(100)
     for alpha in (1e-3, 0.05):
         edge = np.sqrt(chi2.isf(alpha, 97) / 100)
-        assert judge([1.001 * edge * r], [r], [r], 3, alpha).verdict == "misfit"
-        assert judge([0.999 * edge * r], [r], [r], 3, alpha).verdict == "fits"
+        assert judge([1.001 * edge * r], [r], [r], 3, AdequacySettings(alpha)).verdict == "misfit"
+        assert judge([0.999 * edge * r], [r], [r], 3, AdequacySettings(alpha)).verdict == "fits"
     assert judge([1.1 * r], [r], [r], 3).to_dict() == {
         "value": pytest.approx(121), "dof": 97, "p_value": pytest.approx(chi2.sf(121, 97)),
         "verdict": "fits", "sigma_source": "given"}

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import inspect
 import json
+import pkgutil
 import re
 from dataclasses import fields, is_dataclass, replace
+from importlib import import_module
 from math import inf, log, nan
 from pathlib import Path
 from statistics import NormalDist
@@ -27,8 +29,19 @@ from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.settings import Range, check, ranges_of
 
-GROUPS = [DEFAULTS, *(value for f in fields(DEFAULTS)
-                      if is_dataclass(value := getattr(DEFAULTS, f.name)))]
+
+def groups() -> list[Any]:
+    """The defaults of every dataclass in a module `settings` of the package."""
+    found = {}
+    for place in pkgutil.walk_packages(pk.__path__, "pikanid."):
+        if ".settings" in place.name:
+            module = import_module(place.name)
+            found |= {kind.__name__: kind() for kind in vars(module).values()
+                      if is_dataclass(kind) and kind is not Range and isinstance(kind, type)}
+    return [found[name] for name in sorted(found)]
+
+
+GROUPS = groups()
 
 
 @pytest.mark.parametrize("group", GROUPS, ids=lambda g: type(g).__name__)

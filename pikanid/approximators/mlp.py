@@ -27,7 +27,7 @@ from torch import Tensor
 from pikanid.approximators import Array
 from pikanid.approximators.decaying import Decaying, exponential
 
-KINK_ORDERS = 3  # a switch shows in the m-th derivative and, less and less, in the next ones
+KINK_ORDERS = 3  # numerical: a switch shows in the m-th derivative and hardly in the third next
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from pikanid.validation.equivalence import EquivalenceReport
 
-EXIT_DIFFERENT = 3
+EXIT_DIFFERENT = 3  # definition: exit code: the two forms differ
 EXAMPLES = """Examples:
 
   pikanid equivalence --quick

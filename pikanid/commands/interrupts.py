@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-AGAIN = 0.05  # s after which an interrupt that was dropped is asked for again
+AGAIN = 0.05  # limit: s after which an interrupt that was dropped is asked for again
 
 
 @contextmanager

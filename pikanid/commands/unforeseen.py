@@ -10,7 +10,7 @@ from pathlib import Path
 from pikanid import errors
 
 DEBUG = "--debug"
-_ROOT = Path(__file__).parents[1]
+_ROOT = Path(__file__).parents[1]  # definition: folder above the package
 
 
 def without_debug(words: Sequence[str]) -> tuple[list[str], bool]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-EXIT_MISFIT = 3  # of the command line, where a fit is done but explains nothing
+EXIT_MISFIT = 3  # definition: of the command line, where a fit is done but explains nothing
 
 
 class PikanidError(Exception):

@@ -7,7 +7,7 @@ import reprlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-LONGEST_PART = 300  # characters that one value may take in a sentence
+LONGEST_PART = 300  # limit: characters that one value may take in a sentence
 
 
 def listed(names: Iterable[str]) -> str:

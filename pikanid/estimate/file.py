@@ -24,7 +24,7 @@ from pikanid.storage.entries import MOST_ENTRIES, Entry
 from pikanid.storage.limits import json_content
 from pikanid.storage.outputs import atomically
 
-SCHEMA = 1
+SCHEMA = 1  # definition: of the format that files name
 E = TypeVar("E", bound=EstimateData)
 
 

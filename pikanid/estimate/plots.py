@@ -28,11 +28,12 @@ MEASURED = "#555555"
 BAND = "#BBBBBB"
 ENDINGS = (".png", ".svg", ".pdf")
 # Curves that lie upon each other stay visible: later ones are thinner, and their gaps differ.
-WIDTHS = (2.2, 1.7, 1.3, 1.0, 0.8, 0.7)
-DASHES = ("-", (0, (5, 3)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 3)), (0, (8, 4)))
+WIDTHS = (2.2, 1.7, 1.3, 1.0, 0.8, 0.7)  # layout: line widths, in points
+DASHES = ("-", (0, (5, 3)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 3)),
+          (0, (8, 4)))  # layout: dashes and gaps, in line widths
 # Beyond this many samples markers merge into a band: draw a thin line instead.
-MANY = 2000
-DPI = 130
+MANY = 2000  # layout: samples of an output
+DPI = 130  # layout: pixels an inch
 
 
 class FitLike(Protocol):

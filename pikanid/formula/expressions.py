@@ -51,7 +51,7 @@ FUNCTIONS: Mapping[str, tuple[int, object]] = {
     "abs": (1, sp.Abs), "sign": (1, sp.sign), "step": (1, _step),
     "min": (2, sp.Min), "max": (2, sp.Max), "clip": (3, clip), "dead_zone": (2, _dead_zone),
     "abs_power": (2, abs_power), "signed_power": (2, signed_power), "log_abs": (1, log_abs),
-}  # fmt: skip
+}  # definition: numbers of arguments  # fmt: skip
 RESERVED = frozenset(FUNCTIONS) | {"pi", "t"}
 
 

@@ -19,8 +19,8 @@ _NOTHING = frozenset(["", "1", "-", "--", "none", "dimensionless", "unitless"])
 _TOKEN = re.compile(r"\s*(\*\*|[*/^()·⋅]|[+-]?\d+(?:\.\d+)?|%|°[CF]?|[^\W\d_]\w*)\s*")
 _POWER = re.compile(r"[+-]?\d{1,4}(\.\d{1,6})?|[+-]?\d{1,4}/\d{1,4}", re.ASCII)
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_LONGEST = 80
-_LARGEST_POWER = 99
+_LONGEST = 80  # limit: characters of a unit
+_LARGEST_POWER = 99  # limit: of a unit: none that has a meaning has more
 
 
 def powers(text: str, symbol: Callable[[str], str]) -> Powers:

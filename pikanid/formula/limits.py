@@ -5,12 +5,12 @@ from __future__ import annotations
 import sympy as sp
 
 # A formula beyond these is none that a person or this package has written.
-MAX_LENGTH = 20_000
-MAX_DEPTH = 60
-MAX_POWER = 1000  # larger whole exponents would be multiplied out into numbers without end
-MAX_NAME = 200
-MAX_BITS = 1100  # of a whole number or of either side of a fraction: beyond any float
-MAX_WORK = 4000.0  # for all formulas of a model; a unit takes SymPy one or two milliseconds
+MAX_LENGTH = 20_000  # limit: characters of a formula
+MAX_DEPTH = 60  # limit: brackets within brackets
+MAX_POWER = 1000  # limit: larger whole exponents would be multiplied out into numbers without end
+MAX_NAME = 200  # limit: characters of a name
+MAX_BITS = 1100  # limit: of a whole number or of either side of a fraction: beyond any float
+MAX_WORK = 4000.0  # limit: for all formulas of a model; a unit takes SymPy one or two milliseconds
 
 _TWICE = ("dead_zone",)  # holds its argument twice
 _COMPARED = ("min", "max", "clip")  # every argument with every other

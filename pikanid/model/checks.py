@@ -19,8 +19,8 @@ from pikanid.storage.entries import Entry, is_integer
 
 # Far more than any model has, and few enough that checking them takes no time.
 MOST = {"states": 1000, "inputs": 200, "parameters": 20_000, "outputs": 500, "splines": 200,
-        "knots": 10_000}
-MAX_DEGREE = 20  # of a spline
+        "knots": 10_000}  # limit: numbers of entries in a model
+MAX_DEGREE = 20  # limit: of a spline
 
 def check_types(model: Lookup) -> None:
     """Raise `BadModel` unless every part of the model is of its type, and of a sensible size.

@@ -12,7 +12,7 @@ import sympy as sp
 
 from pikanid.formula import units
 
-SAME = 1e-9  # relative difference of two scales that are one
+SAME = 1e-9  # numerical: relative difference of two scales that are one
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,10 @@ def _together(a: Iterable[tuple[str, Fraction]], b: Iterable[tuple[str, Fraction
     return tuple(sorted((name, value) for name, value in total.items() if value))
 
 
-ONE = Unit(units.Measure((), (), 1.0))
+ONE = Unit(units.Measure((), (), 1.0))  # definition: no unit at all
 BARE = dataclasses.replace(ONE, bare=True)
-SECOND = Unit(units.Measure((("s", Fraction(1)),), (("[time]", Fraction(1)),), 1.0))
+SECOND = Unit(units.Measure(
+    (("s", Fraction(1)),), (("[time]", Fraction(1)),), 1.0))  # definition: of the SI
 
 
 def declared(text: str, name: str = "") -> Unit:

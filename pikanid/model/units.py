@@ -41,7 +41,7 @@ from pikanid.model.unit_algebra import (
     simple,
 )
 
-_ALIKE = 1e-3  # relative difference of a number and a factor that it may stand for
+_ALIKE = 1e-3  # numerical: relative difference of a number and a factor that it may stand for
 _OF_ANGLES = (sp.sin, sp.cos, sp.tan, sp.sinh, sp.cosh, sp.tanh, sp.exp, sp.log, sp.asin, sp.acos,
               sp.atan)
 _OF_ONE_UNIT = (sp.Max, sp.Min, clip)

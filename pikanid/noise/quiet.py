@@ -10,7 +10,7 @@ from pikanid.noise.autoregressive import AR, fit, innovations
 from pikanid.noise.settings import USUAL, QuietSettings
 from pikanid.recording.channel import Array, Channel
 
-_POSITIONS = 200  # windows tried of each length
+_POSITIONS = 200  # limit: windows tried of each length
 
 
 def find_quiet(channel: Channel, settings: QuietSettings = USUAL

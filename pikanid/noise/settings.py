@@ -1,4 +1,4 @@
-"""What counts as a quiet stretch of a recording."""
+"""What counts as a quiet stretch of a recording, and what as a rounded signal."""
 
 from __future__ import annotations
 
@@ -44,4 +44,25 @@ class QuietSettings:
         check(self)
 
 
+@dataclass(frozen=True)
+class RoundingSettings:
+    """When a signal counts as rounded to the steps of its sensor.
+
+    Attributes:
+        changes: Of the signal, at least, that are compared: one is a multiple of itself.
+        dwell: Equal samples in a row that are as many observations: more are one, as the error of
+            rounding is the same in all of them.
+
+    Raises:
+        BadSetting: If a value is none that its field can have.
+    """
+
+    changes: Count = 2
+    dwell: Count = 5
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
 USUAL = QuietSettings()
+ROUNDING = RoundingSettings()

@@ -18,10 +18,9 @@ from typing import Any, Literal
 import numpy as np
 
 from pikanid.noise.floor import rounding_noise
+from pikanid.objective.settings import USUAL, AdequacySettings
 
 Verdict = Literal["fits", "misfit", "unknown"]
-TWICE, MOSTLY = 2.0, 0.5  # times the noise, and the share of such residuals that a test must see
-SEEN = 12  # samples of an output that show its noise: eight fourth differences
 
 
 @dataclass(frozen=True)
@@ -46,13 +45,14 @@ class Adequacy:
 
 
 def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
-          data: Sequence[np.ndarray], n_free: int, alpha: float = 1e-3) -> Adequacy:
+          data: Sequence[np.ndarray], n_free: int,
+          settings: AdequacySettings = USUAL) -> Adequacy:
     """Judge the residuals of all outputs together.
 
     Args:
         residuals, sigmas, data: One array (N_o,) an output and recording; σ None where unknown.
         n_free: Number of estimated parameters.
-        alpha: Probability of calling a right model a misfit.
+        settings: Rate at which a right model is called a misfit, and what else the test needs.
 
     >>> r = np.random.default_rng(0).normal(0, 2.0, 500)
     >>> judge([r], [np.full(500, 2.0)], [r], 2).verdict
@@ -66,27 +66,28 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
     dof = max(count - n_free, 1)
     if count == 0:
         return Adequacy(np.nan, dof, np.nan, "unknown", "none")
-    otherwise: Verdict = "fits" if decides(count - n_free, alpha) else "unknown"
+    otherwise: Verdict = "fits" if decides(count - n_free, settings) else "unknown"
     if all(s is not None for s in sigmas):
         value = float(sum(np.sum((r / s) ** 2) for r, s in zip(residuals, sigmas, strict=True)))
         p = float(chdtrc(dof, value))
-        return Adequacy(value, dof, p, "misfit" if p < alpha and count > n_free else otherwise,
-                        "given")
+        refuted = p < settings.alpha and count > n_free
+        return Adequacy(value, dof, p, "misfit" if refuted else otherwise, "given")
     value, threshold = 0.0, 0.0
     for r, s, y in zip(residuals, sigmas, data, strict=True):
         noise = difference_noise(y) if s is None else s
         floor = 1e-9 * max(float(np.ptp(y)), 1e-300)
         value += float(np.sum((r / np.maximum(noise, floor)) ** 2))
         threshold += len(r)
-    if not any(s is not None or len(r) >= SEEN for r, s in zip(residuals, sigmas, strict=True)):
+    if not any(s is not None or len(r) >= settings.samples
+               for r, s in zip(residuals, sigmas, strict=True)):
         return Adequacy(value, dof, float(chdtrc(dof, value)), "unknown", "differences")
-    # the noise is itself estimated, and coloured noise fools differences: ask for a factor of four
-    far = value > 4 * threshold and count > n_free
+    # the noise is itself estimated, and coloured noise fools differences: ask for a large factor
+    far = value > settings.far * threshold and count > n_free
     return Adequacy(value, dof, float(chdtrc(dof, value)), "misfit" if far else otherwise,
                     "differences")
 
 
-def decides(dof: int, alpha: float = 1e-3) -> bool:
+def decides(dof: int, settings: AdequacySettings = USUAL) -> bool:
     """Whether a χ² test with so many degrees of freedom sees a residual of twice the noise at least
     every other time.
 
@@ -95,7 +96,8 @@ def decides(dof: int, alpha: float = 1e-3) -> bool:
     """
     from scipy.special import chdtrc, chdtri
 
-    return dof > 0 and float(chdtrc(dof, chdtri(dof, alpha) / TWICE**2)) >= MOSTLY
+    return dof > 0 and float(chdtrc(
+        dof, chdtri(dof, settings.alpha) / settings.times**2)) >= settings.power
 
 
 def difference_noise(y: np.ndarray, order: int = 4) -> float:

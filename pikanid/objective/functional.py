@@ -34,10 +34,9 @@ __all__ = ["Functional", "Part", "Penalty", "Rows", "Sites", "bind"]
 
 Penalty = Literal["physics", "roughness"]
 
-# Rows for an initial state that cannot be eliminated weigh as much as data of this 1/σ: about 1e-6
-# of the units of the model's states.
-START_WEIGHT = 1e6
-ONE = np.ones(1)
+# Rows for an initial state that cannot be eliminated weigh as much as data of this 1/σ.
+START_WEIGHT = 1e6  # numerical: holds them to 1e-6 of the states' units
+ONE = np.ones(1)  # definition: the number one as an array
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from pikanid.problem.problem import Problem, Samples
 from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
 
 Accuracy = Literal["coarse", "fine"]
-HURRY = 16.0  # how many times shorter steps another start may take
+HURRY = 16.0  # limit: how many times shorter steps another start may take
 
 
 class Shooting:

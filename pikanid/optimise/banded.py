@@ -20,7 +20,7 @@ from pikanid.objective.functional import Part, Rows, Sites
 Ints = NDArray[np.int64]
 
 # Slopes that are zero, in the form that the compiled sums take.
-NO_SLOPES = np.zeros((0, 0, 0))
+NO_SLOPES = np.zeros((0, 0, 0))  # definition: an empty array
 
 
 @dataclass(frozen=True, eq=False)

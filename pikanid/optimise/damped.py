@@ -11,7 +11,7 @@ from pikanid.approximators import Array
 from pikanid.optimise.bordered import Bordered, BorderedSystem, Evaluation, evaluate
 from pikanid.optimise.gauss_newton import ROUNDING, Point
 
-LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e15
+LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e15  # numerical: undamped, or no step at all
 
 
 @dataclass(frozen=True, eq=False)

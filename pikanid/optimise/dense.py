@@ -16,7 +16,7 @@ from pikanid.approximators import Array
 
 Residual = Callable[[Array], Array]
 Linearised = Callable[[Array], tuple[Array, Array]]
-FLOOR = 1e-6  # of the mean squared column norm, for columns that hardly matter yet
+FLOOR = 1e-6  # numerical: of the mean squared column norm, for columns that hardly matter yet
 
 
 @dataclass(frozen=True, eq=False)

@@ -179,12 +179,10 @@ def _eliminate(normal: BandedNormal, k: int, held_by_theta: Array | None) -> Eli
                       normal.corner + cross + cross.T + q.T @ leading[:k] @ q, held_by_theta)
 
 
-MAX_ITERATIONS = 100  # at one λ
-# A stop without decrease counts as converged up to this many times one datum's share of the cost:
-# the estimate is then within a tenth of a standard error.
-ROUNDING = 1e-2
-# A promise below this share of the samples' own sum of squares is one of rounding (clean data).
-NOTHING = 1e-16
+MAX_ITERATIONS = 100  # limit: at one λ: of a valley that never ends
+# A stop without decrease counts as converged up to this many times one datum's share of the cost.
+ROUNDING = 1e-2  # numerical: θ is then within a tenth of a standard error
+NOTHING = 1e-16  # numerical: of the samples' sum of squares; a lesser promise is rounding
 
 
 @dataclass(frozen=True, eq=False)

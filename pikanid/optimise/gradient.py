@@ -18,10 +18,10 @@ from torch import Tensor
 from pikanid.approximators import Array
 
 Progress = Callable[[dict[str, float]], None]
-EVERY = 100  # steps between two reports
-BETAS, EPSILON = (0.9, 0.999), 1e-12
-MEMORY = 50  # pairs that L-BFGS remembers
-DIVERGED = 1e6  # times the first loss
+EVERY = 100  # limit: steps between two reports
+BETAS, EPSILON = (0.9, 0.999), 1e-12  # definition: of Adam (2015)
+MEMORY = 50  # limit: pairs that L-BFGS remembers
+DIVERGED = 1e6  # numerical: times the first loss
 
 
 class Loss(Protocol):

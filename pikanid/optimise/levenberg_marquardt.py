@@ -16,7 +16,7 @@ from scipy.linalg import LinAlgError
 from pikanid.approximators import Array
 from pikanid.optimise.box import box_minimum
 
-TRIES = 8  # dampings of one step
+TRIES = 8  # limit: dampings of one step
 Evaluate = Callable[[Array], tuple[Array, Array] | None]
 GiveUp = Callable[[int, float, float], bool]  # number of an iteration, |r|² before and after it
 

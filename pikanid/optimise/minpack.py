@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 Vector = Callable[[np.ndarray], np.ndarray]
-REFUSED = 1e10  # a standardised residual that no step towards it survives
+REFUSED = 1e10  # numerical: a standardised residual that no step towards it survives
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from pikanid.optimise.bordered import Bordered, BorderedSystem, Evaluation, Solv
 from pikanid.optimise.covariance import invert
 from pikanid.optimise.local_rows import Family, Layout
 
-PROBES = 32  # for the trace of the effective parameters
-TRACE = 1e-3  # of damping: χ² charged for a move by one unit
+PROBES = 32  # numerical: for the trace of the effective parameters
+TRACE = 1e-3  # numerical: of damping: χ² charged for a move by one unit
 Noise = Callable[[float], Sequence[Array | float]]
 
 

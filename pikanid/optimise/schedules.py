@@ -13,7 +13,7 @@ import numpy as np
 
 from pikanid.approximators import Array
 
-NOTHING = 1e-8  # of the noise's cost: a physics cost without any influence
+NOTHING = 1e-8  # numerical: of the noise's cost: a physics cost without any influence
 
 
 @dataclass(frozen=True, eq=False)

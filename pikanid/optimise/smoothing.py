@@ -17,7 +17,7 @@ from pikanid.approximators import Array
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, gauss_newton
 
 # The splines use all that they can of the data once a decade adds less than this share to it.
-FLAT = 1e-4
+FLAT = 1e-4  # numerical: of the effective parameters, whose trace is estimated
 
 
 class Score(NamedTuple):

@@ -19,7 +19,7 @@ _TOOLS = {
     "signed_power": lambda x, n: 0.0 if x == 0 else np.sign(x) * abs(x) ** n,
     "log_abs": lambda x: 0.0 if x == 0 else np.log(abs(x)),
     "DiracDelta": lambda x: 0.0,
-}
+}  # definition: values at zero
 
 
 def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:

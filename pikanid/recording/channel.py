@@ -16,10 +16,10 @@ Hold = Literal["zero", "first"]
 Array = NDArray[np.float64]
 
 # Beyond this a square overflows; such values are markers or rubbish, never measurements.
-LARGEST = 1e300
+LARGEST = 1e300  # limit: its square still is a number
 # Time stamps computed as k*dt differ from their decimal by rounding: compare within this share
 # of a sampling interval.
-ROUNDING = 1e-6
+ROUNDING = 1e-6  # numerical: of k*dt against the decimals of a file
 
 
 @dataclass(frozen=True, eq=False)

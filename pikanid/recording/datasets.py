@@ -40,18 +40,18 @@ FOLDER = "PIKANID_DATA"
 
 # Silverbox: 10^7/2^14 Hz, and the ranges (0-based, stop excluded) of the benchmark's official
 # split; the held-out part is the last quarter of the first range.
-_SILVERBOX_RATE = 1e7 / 2**14
+_SILVERBOX_RATE = 1e7 / 2**14  # definition: [Hz], of the benchmark
 _SILVERBOX_PARTS = {
     "train": (40650, 40650 + int(0.75 * (127400 - 40650))),
     "held_out": (40650 + int(0.75 * (127400 - 40650)), 127400),
     "arrow": (100, 40575),
     "arrow_no_extrapolation": (100, 32100),
     "all": (0, 131072),
-}
+}  # definition: official split of the benchmark
 
 BALLS = origins.BALLS
 SLOSH_MOTIONS = tuple(origins.SLOSH_CHECKSUMS)
-_COMMANDED = 0.02  # [s] window of derivatives: a commanded pose has no noise
+_COMMANDED = 0.02  # numerical: [s] window of derivatives: a commanded pose has no noise
 
 
 def single_pendulum(

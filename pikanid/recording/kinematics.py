@@ -19,9 +19,9 @@ from pikanid.recording.channel import Array, Channel, check_times, check_values
 from pikanid.recording.recording import Recording
 
 Method = Literal["savgol", "spline"]
-GRAVITY = 9.81  # [m/s²], as in the sloshing model
+GRAVITY = 9.81  # definition: [m/s²], as in the sloshing model
 QUATERNION = ("qx", "qy", "qz", "qw")
-_DEGREE = 4  # of the local polynomials: unbiased up to the fourth derivative of the motion
+_DEGREE = 4  # numerical: of the polynomials: unbiased up to the 4th derivative of the motion
 
 
 def derivative(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 # Nothing wraps a line that is read by a program.
-PIPE_WIDTH = 400
+PIPE_WIDTH = 400  # layout: characters of a line
 
 
 def console(stream: TextIO | None = None) -> Console:

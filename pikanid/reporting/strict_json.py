@@ -19,7 +19,7 @@ import numpy as np
 if TYPE_CHECKING:
     from pikanid.estimate import Estimate
 
-SCHEMA = 1
+SCHEMA = 1  # definition: of the format that files name
 
 
 def plain(value: Any) -> Any:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SHOWN = 1.0  # noise [deg] of the trajectories drawn
-ENLARGED = 3.0  # seconds of the swing drawn at full width
+SHOWN = 1.0  # layout: noise [deg] of the trajectories drawn
+ENLARGED = 3.0  # layout: seconds of the swing drawn at full width
 
 
 def figures(study: Study) -> Mapping[str, Figure]:

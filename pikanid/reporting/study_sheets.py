@@ -24,7 +24,7 @@ PAPER: dict[tuple[str, float], dict[str, tuple[float, float]]] = {
                       "pinn": (0.0442, 0.292), "pikan": (0.0452, 0.235)},
     ("sparse", 1.0): {"nls": (0.0428, 1.145), "pda": (0.0595, 0.691), "ipda": (0.0569, 0.393),
                       "pinn": (0.0439, 0.468), "pikan": (0.0451, 0.151)},
-}
+}  # definition: of the paper
 
 
 def slosh(study: Study, sampling: str, paper: bool = False) -> Sheet:

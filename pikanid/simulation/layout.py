@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-STEEP = 1e-6  # where n < 1, the slope of bⁿ below this b counts as zero
+STEEP = 1e-6  # numerical: where n < 1, the slope of bⁿ below this b counts as zero
 
 
 class Seen(NamedTuple):

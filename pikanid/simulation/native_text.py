@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-WIDEST = 4  # derivatives that one instruction carries
+WIDEST = 4  # limit: derivatives that one instruction carries
 REGISTERS = "ptr %r, ptr %d"
 
 

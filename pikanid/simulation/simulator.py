@@ -20,9 +20,9 @@ from pikanid.simulation.grid import Grid, build_grid
 from pikanid.simulation.input_paths import split, with_parts
 
 MethodChoice = Literal["auto", "explicit", "implicit"]
-_NOTHING = np.empty(0, np.int64)
-FORETOLD = 64  # times finer: beyond that an error is far from what the order says
-FINEST = 4096  # sub-steps of the median interval beyond which the explicit route gives up
+_NOTHING = np.empty(0, np.int64)  # definition: an empty array
+FORETOLD = 64  # numerical: times finer: beyond that an error is far from what the order says
+FINEST = 4096  # limit: sub-steps of the median interval beyond which the explicit route gives up
 
 
 @dataclass(frozen=True)

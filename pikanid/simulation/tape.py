@@ -30,7 +30,7 @@ from pikanid.simulation.lowering import LoweredModel, lower_model, positive_powe
 from pikanid.simulation.structure import Structure
 
 (ADD, MUL, DIV, SQUARE, POWER, POSITIVE_POWER, SIN, COS, TAN, EXP, LOG, SQRT, TANH, SINH, COSH,
- ATAN, ASIN, ACOS, ATAN2, LOG_ABS, SGN, NEGATE) = range(22)
+ ATAN, ASIN, ACOS, ATAN2, LOG_ABS, SGN, NEGATE) = range(22)  # definition: numbers of the operations
 _UNARY = {sp.sin: SIN, sp.cos: COS, sp.tan: TAN, sp.exp: EXP, sp.log: LOG, sp.tanh: TANH,
           sp.sinh: SINH, sp.cosh: COSH, sp.atan: ATAN, sp.asin: ASIN, sp.acos: ACOS,
           log_abs: LOG_ABS}

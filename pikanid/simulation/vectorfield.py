@@ -21,7 +21,7 @@ from pikanid.simulation.structure import Structure
 
 # So many rows at a time: what a formula leaves on its way then stays in the processor's cache, and
 # takes no fresh memory.
-BLOCK = 16384
+BLOCK = 16384  # limit: rows of 16384 numbers
 
 
 class VectorField:

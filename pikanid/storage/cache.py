@@ -27,7 +27,8 @@ from pathlib import Path
 _DIGEST = hashlib.sha256().digest_size
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 # Neither follow a link nor wait for somebody to write into a pipe; Windows has neither flag.
-_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(
+    os, "O_NONBLOCK", 0)  # definition: of the operating system
 
 
 def kept(name: str, make: Callable[[], bytes]) -> bytes:

@@ -19,10 +19,10 @@ from pikanid import errors
 if TYPE_CHECKING:
     import numpy as np
 
-LONGEST_TEXT = 10_000
-MOST_ENTRIES = 100_000  # of one list or table
+LONGEST_TEXT = 10_000  # limit: characters of one text
+MOST_ENTRIES = 100_000  # limit: of one list or table
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
-DEEPEST = 6  # tables within tables, where any content is allowed
+DEEPEST = 6  # limit: tables within tables, where any content is allowed
 
 
 @dataclass(frozen=True)

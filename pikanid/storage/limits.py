@@ -21,11 +21,11 @@ from pikanid import errors
 if TYPE_CHECKING:
     import numpy as np
 
-MEBI = 2**20
-MOST_MODEL = 2 * MEBI  # bytes of a model file
-MOST_JSON = 512 * MEBI  # bytes of an estimate, a network, a truth or a diagnosis, unpacked
-MOST_UNPACKED = 512 * MEBI  # bytes that a compressed recording may unpack to
-MOST_PARSED = 768 * MEBI  # bytes that the objects in a JSON file may take
+MEBI = 2**20  # definition: bytes in a mebibyte
+MOST_MODEL = 2 * MEBI  # limit: bytes of a model file
+MOST_JSON = 512 * MEBI  # limit: bytes of an estimate, a network, a truth or a diagnosis, unpacked
+MOST_UNPACKED = 512 * MEBI  # limit: bytes that a compressed recording may unpack to
+MOST_PARSED = 768 * MEBI  # limit: bytes that the objects in a JSON file may take
 
 # What the parsers of other people raise on damaged bytes: they promise no closed list.
 DAMAGE: tuple[type[Exception], ...] = (

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
 _Result = TypeVar("_Result")
-OFTEN = 0.3  # [s] between two looks at whether the parent lives
+OFTEN = 0.3  # limit: [s] between two looks at whether the parent lives
 
 
 def unordered(function: Callable[..., _Result], calls: Iterable[Sequence[object]],

@@ -24,8 +24,8 @@ from pikanid.strategies import strategy_class
 from pikanid.strategies.nls import NLS
 
 # The recording itself gives the guess of the initial state, so that one start is enough for NLS.
-SETTINGS: dict[str, dict[str, Any]] = {"nls": {"starts": 1}}
-FIRST = 1.0  # seconds of the held-out part that may serve to find its initial state
+SETTINGS: dict[str, dict[str, Any]] = {"nls": {"starts": 1}}  # definition: of the study
+FIRST = 1.0  # definition: seconds of the held-out part that may serve to find its initial state
 
 
 @dataclass(frozen=True, eq=False)

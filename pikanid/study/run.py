@@ -17,9 +17,9 @@ from pikanid.storage.workers import begin
 from pikanid.strategies import STRATEGIES, strategy_class
 from pikanid.study import pendulum, slosh
 
-SEED = 0
+SEED = 0  # definition: of the study's first recordings
 # Only what is quick is repeated: the study is to stay a matter of minutes.
-REPEATABLE = 1.0  # [s] a fit
+REPEATABLE = 1.0  # limit: seconds of a fit
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,9 +21,9 @@ from pikanid.simulation import simulate
 from pikanid.strategies import strategy_class
 from pikanid.uncertainty import cramer_rao
 
-TRUE = {"l_theta": 0.045, "d_theta": 0.15}
-START = {"l_theta": 0.06, "d_theta": 0.05}  # p0 of Table II
-SPARSE = 10
+TRUE = {"l_theta": 0.045, "d_theta": 0.15}  # definition: of the paper
+START = {"l_theta": 0.06, "d_theta": 0.05}  # definition: of the paper
+SPARSE = 10  # definition: every so manieth sample
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Scenario:
 SCENARIOS = tuple(
     Scenario(sampling, stride, noise)
     for sampling, stride in (("dense", 1), ("sparse", SPARSE))
-    for noise in (0.0, 0.1, 1.0))
+    for noise in (0.0, 0.1, 1.0))  # definition: of the paper
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.problem.problem import FreeParameter
-
-FAR, FURTHER = 10.0, 100.0  # times a parameter's size, from which on its standard error is told of
+from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 
 
 def covariance(jacobian: np.ndarray, estimated: np.ndarray) -> np.ndarray:
@@ -38,7 +37,8 @@ def covariance(jacobian: np.ndarray, estimated: np.ndarray) -> np.ndarray:
 
 
 def identifiability_warnings(jacobian: np.ndarray, free: Sequence[FreeParameter],
-                             estimated: np.ndarray, limit: float = 1e6) -> list[str]:
+                             estimated: np.ndarray, settings: UncertaintySettings = USUAL
+                             ) -> list[str]:
     """Sentences about parameters, or combinations of them, that the data do not determine."""
     names = [f.label for f, e in zip(free, estimated, strict=True) if e]
     if not names:
@@ -50,7 +50,7 @@ def identifiability_warnings(jacobian: np.ndarray, free: Sequence[FreeParameter]
     if seen.sum() < 2:
         return notes
     _, s, vt = np.linalg.svd(J[:, seen] / norms[seen], full_matrices=False)
-    if s[-1] < s[0] / limit:
+    if s[-1] < s[0] / settings.condition:
         visible = [n for n, k in zip(names, seen, strict=True) if k]
         weights = vt[-1] / np.max(np.abs(vt[-1]))
         parts = [f"{w:+.2g}·{n}" for w, n in zip(weights, visible, strict=True) if abs(w) > 0.1]
@@ -59,7 +59,8 @@ def identifiability_warnings(jacobian: np.ndarray, free: Sequence[FreeParameter]
 
 
 def undetermined_warnings(free: Sequence[FreeParameter], theta: np.ndarray,
-                          covariance: np.ndarray) -> list[str]:
+                          covariance: np.ndarray, settings: UncertaintySettings = USUAL
+                          ) -> list[str]:
     """Sentences about parameters whose standard errors say that they could be anything.
 
     Beside a value, and a guess, that are not zero ten times are far; beside an estimate near zero
@@ -69,7 +70,8 @@ def undetermined_warnings(free: Sequence[FreeParameter], theta: np.ndarray,
         std = np.sqrt(np.diag(covariance))
     found = []
     for f, value, error in zip(free, theta, std, strict=True):
-        limit = FAR * max(abs(value), abs(f.guess)) if f.guess else FURTHER * abs(value)
+        limit = (settings.far * max(abs(value), abs(f.guess)) if f.guess
+                 else settings.far_from_zero * abs(value))
         if np.isfinite(error) and error > limit > 0:
             found.append(errors.undetermined(f.label, float(value), float(error)))
     return found

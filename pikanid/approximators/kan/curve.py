@@ -21,8 +21,8 @@ from pikanid.approximators.kan.refine import regrid
 from pikanid.approximators.kan.shallow import ShallowKAN
 from pikanid.approximators.kan.sweeps import LocalJet
 
-HIGHEST = 2  # time derivative that `DeepKAN` evaluates
-_KEPT = 32  # tables of bumps
+HIGHEST = 2  # limit: time derivative that `DeepKAN` evaluates
+_KEPT = 32  # limit: tables of bumps
 
 
 class KanCurve:

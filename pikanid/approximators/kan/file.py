@@ -22,7 +22,7 @@ from pikanid.storage.limits import MOST_JSON, archived, file_bytes, json_content
 from pikanid.storage.outputs import atomically
 
 _FORMAT = "pikanid-kan"
-_VERSION = 1
+_VERSION = 1  # definition: of the format that files name
 
 
 def save(kan: Any, path: str | os.PathLike[str]) -> None:
@@ -83,8 +83,8 @@ def load(path: str | os.PathLike[str], device: str = "cpu") -> Any:
     return kan if kinks is None else ShallowKAN(kan, kinks)
 
 
-MOST_NODES = 1000  # of all layers together
-MOST_EDGES = 50_000  # of all layers together: each is a Python object in pykan
+MOST_NODES = 1000  # limit: of all layers together
+MOST_EDGES = 50_000  # limit: of all layers together: each is a Python object in pykan
 _HEADER = ("format", "version", "width", "k", "base", "arity", "symbols", "kinks")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from pikanid.approximators.kan.plan import Array
 
-BINOMIAL = ((1,), (1, 1), (1, 2, 1))
+BINOMIAL = ((1,), (1, 1), (1, 2, 1))  # definition: Pascal's triangle, row by row
 
 
 def chain(outer: Array, inner: Array) -> Array:

@@ -24,7 +24,7 @@ from pikanid.approximators.kan.refine import change_of_knots, refine
 from pikanid.approximators.kan.tensors import read, write
 
 # A kink of the spline's own degree this near to a knot (in spacings) is what the knot does already.
-_NEAR_KNOT = 0.05
+_NEAR_KNOT = 0.05  # numerical: nearer ones do what the knot does already
 
 
 class ShallowKAN:

@@ -14,7 +14,7 @@ from pikanid.approximators.kan.plan import Arity, Array, Base, KanPlan
 from pikanid.approximators.kan.tensors import read, write
 
 # Of the inputs last seen, which plots and pruning use, no more than these are kept.
-_BATCH = 2000
+_BATCH = 2000  # limit: more say no more about a range
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from pikanid.approximators.kan.edges import edges_of
 from pikanid.approximators.kan.plan import Array
 from pikanid.approximators.kan.state import to_state
 
-RIDGE = 1e-8
+RIDGE = 1e-8  # numerical: holds coefficients that no sample sees
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,8 +98,8 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
     if given is not None:
         return replace(level, rho=rho, spread=spread if rho else 0.0)
     # a fit leaves nothing of a rounded signal at rest: where it moves there is more
-    return replace(level, sigma=max(sigma, rounding_noise(channel.values)), rho=rho, spread=spread,
-                   source=source)
+    least = rounding_noise(channel.values, settings.rounding)
+    return replace(level, sigma=max(sigma, least), rho=rho, spread=spread, source=source)
 
 
 def bridged(grid: np.ndarray) -> np.ndarray:

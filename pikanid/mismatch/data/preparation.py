@@ -42,7 +42,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
             if count:
                 notes.append(f"Recording '{recording.name}': {count} outliers of "
                              f"'{output.name}' are left out.")
-            again = repeated(recording[output.name].values)
+            again = repeated(recording[output.name].values, settings.rounding)
             if together > 1:
                 recording = recording.with_channels(averaged(recording[output.name], together))
                 windows = np.lib.stride_tricks.sliding_window_view(again, together)[::together]

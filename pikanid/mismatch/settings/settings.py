@@ -15,7 +15,7 @@ from pikanid.mismatch.settings.budget import Budget
 from pikanid.mismatch.settings.fits import FitSettings, SearchSettings
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.verdict import BeyondSettings, VerdictSettings
-from pikanid.noise.settings import QuietSettings
+from pikanid.noise.settings import QuietSettings, RoundingSettings
 from pikanid.settings import Amount, Count, Rate, Share, changed, check, items, told
 from pikanid.storage.limits import MOST_MODEL, file_bytes
 
@@ -49,6 +49,7 @@ class Settings:
             the criterion is consistent for any number of choices that grows as a power of the
             number of rows (J. Chen and Z. Chen, Biometrika 95, 2008).
         quiet: When a stretch of a recording shows noise only.
+        rounding: When a signal counts as rounded to the steps of its sensor.
         noise: What counts as noise, as an outlier, as a repeat.
         fits: When a fit is a misfit.
         search: What one more effect must promise.
@@ -79,6 +80,7 @@ class Settings:
     signs: Count = 100
     choice_weight: Amount = 1.0
     quiet: QuietSettings = field(default_factory=QuietSettings)
+    rounding: RoundingSettings = field(default_factory=RoundingSettings)
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     fits: FitSettings = field(default_factory=FitSettings)
     search: SearchSettings = field(default_factory=SearchSettings)

@@ -18,7 +18,7 @@ _PARAMETERS = {
                 "description": "viscous damping, lumped in the angular coordinate"},
     "m": {"unit": "kg", "value": 0.30, "description": "oscillating mass"},
     "g": {"unit": "m/s^2", "value": 9.81, "description": "gravity"},
-}
+}  # definition: the laboratory's glass of water
 
 
 def sloshing() -> Model:

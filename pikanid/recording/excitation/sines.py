@@ -11,8 +11,8 @@ from pikanid import errors
 from pikanid.recording.excitation.sampling import grid, inputs
 from pikanid.recording.recording import Recording
 
-LOW, HIGH = 0.5, 5.0  # [Hz] unless told: about what a hand-sized vessel or pendulum follows
-LINES = tuple(0.5 * k for k in range(1, 11))  # [Hz] unless told: the same band
+LOW, HIGH = 0.5, 5.0  # definition: [Hz] unless told: what a hand-sized pendulum follows
+LINES = tuple(0.5 * k for k in range(1, 11))  # definition: [Hz] unless told: the same band
 
 
 def chirp(

@@ -13,7 +13,7 @@ from pikanid.recording.recording import Recording
 Pulse = tuple[float, float, float]
 
 # Table II: u_x = 1 m/s² for t in [0.2, 0.6) s, -1 m/s² for t in [1.2, 1.6) s, else 0.
-TABLE_II: tuple[Pulse, ...] = ((0.2, 0.6, 1.0), (1.2, 1.6, -1.0))
+TABLE_II: tuple[Pulse, ...] = ((0.2, 0.6, 1.0), (1.2, 1.6, -1.0))  # definition: of the paper
 
 
 def pulses(

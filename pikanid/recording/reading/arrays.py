@@ -9,7 +9,7 @@ import numpy as np
 from pikanid.recording.reading.table import Column
 
 _TIME_NAMES = ("t", "time", "times")
-_WIDEST = 64  # signals in one matrix; wider ones are images or tables of something else
+_WIDEST = 64  # limit: signals in one matrix; wider ones are images or tables of something else
 
 
 def columns(arrays: Mapping[str, np.ndarray]) -> tuple[Column, ...]:

@@ -27,9 +27,10 @@ from pikanid.recording.reading.table import Column, Options, Table, from_rows, h
 _DELIMITERS = ("\t", ";", ",", "|", " ")
 _COMMA_NUMBER = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*")
 _POINT_NUMBER = re.compile(r"\s*[+-]?\d*\.\d*(?:[eE][+-]?\d+)?\s*")
-_SAMPLE = 200  # lines looked at to find out the delimiter
-_LONG = 5000  # lines from which on an import of pandas (0.4 s) pays
-_CONTROLS = bytes((*range(9), 11, *range(14, 32), 127))
+_SAMPLE = 200  # limit: lines looked at to find out the delimiter
+_LONG = 5000  # limit: lines from which on an import of pandas (0.4 s) pays
+# Of ASCII, without tabs and ends of lines.
+_CONTROLS = bytes((*range(9), 11, *range(14, 32), 127))  # definition: control characters
 
 
 def read(content: bytes, where: str, options: Options) -> Table:

@@ -19,8 +19,8 @@ from pikanid.recording.reading.arrays import columns
 from pikanid.recording.reading.table import Options, Table
 from pikanid.storage.limits import DAMAGE, MOST_UNPACKED
 
-_DEEPEST = 8
-_MOST_CELLS = 1000
+_DEEPEST = 8  # limit: structures within structures
+_MOST_CELLS = 1000  # limit: cells or structures looked into
 
 
 def read(content: bytes, where: str, options: Options) -> Table:

@@ -17,16 +17,16 @@ import numpy as np
 
 from pikanid.storage.limits import MOST_UNPACKED
 
-_HEADER = 128
-_MATRIX, _COMPRESSED = 14, 15
+_HEADER = 128  # definition: bytes, of the MAT 5 format
+_MATRIX, _COMPRESSED = 14, 15  # definition: types of the MAT 5 format
 _NUMBERS = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
-}  # fmt: skip
-_CELL, _STRUCT, _OBJECT = 1, 2, 3
-_NUMERIC = range(6, 16)  # classes double to uint64; not char, sparse, function, opaque
-_COMPLEX = 0x0800
-_DEEPEST = 8
-_MOST = 1000  # cells or structures looked into
+}  # definition: of the MAT 5 format  # fmt: skip
+_CELL, _STRUCT, _OBJECT = 1, 2, 3  # definition: classes of the MAT 5 format
+_NUMERIC = range(6, 16)  # definition: classes double to uint64; not char, sparse, function, opaque
+_COMPLEX = 0x0800  # definition: flag of the MAT 5 format
+_DEEPEST = 8  # limit: structures within structures
+_MOST = 1000  # limit: cells or structures looked into
 
 Leaf = tuple[str, np.ndarray]
 

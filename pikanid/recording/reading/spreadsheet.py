@@ -12,7 +12,7 @@ from pikanid.recording.formats import by_content, called
 from pikanid.recording.reading.table import Options, Table, from_rows
 from pikanid.storage.limits import DAMAGE
 
-MOST_CELLS = 20_000_000  # of a sheet, up to the last one of each row that holds something
+MOST_CELLS = 20_000_000  # limit: of a sheet, up to the last one of each row that holds something
 
 
 def read(content: bytes, where: str, options: Options) -> Table:

@@ -1,4 +1,4 @@
-STAGES = 1  # each is used up before the next
+STAGES = 1  # definition: each is used up before the next
 
 
 @hot

@@ -10,8 +10,8 @@ from pikanid import errors
 from pikanid.storage.entries import Entry
 
 VERDICTS = ("none", "named", "set", "unconfirmed", "unnamed")
-LONGEST_ID = 1000  # of an effect: the formula of a symbolic law stands in it
-MOST = 100  # hypotheses, effects of one, ids of one effect
+LONGEST_ID = 1000  # limit: of an effect: the formula of a symbolic law stands in it
+MOST = 100  # limit: hypotheses, effects of one, ids of one effect
 
 
 @dataclass(frozen=True)

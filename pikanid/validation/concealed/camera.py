@@ -16,8 +16,8 @@ import numpy as np
 from pikanid.validation.concealed.arrays import Array
 from pikanid.validation.concealed.tank import MODES, Tank, shape
 
-VISIBLE = 0.9  # of the radius: the rim of the glass hides the rest
-COLUMNS, DEPTHS = 37, 9
+VISIBLE = 0.9  # definition: of the radius: the rim of the glass hides the rest
+COLUMNS, DEPTHS = 37, 9  # definition: sampling points of the picture
 
 
 def silhouette(tank: Tank, states: Array) -> tuple[Array, Array]:

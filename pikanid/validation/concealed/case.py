@@ -29,7 +29,7 @@ from pikanid.validation.concealed.visibility import (
     visibility,
 )
 
-PAPER_RADIUS, PAPER_DEPTH, PAPER_LENGTH = 0.033, 0.090, 0.045
+PAPER_RADIUS, PAPER_DEPTH, PAPER_LENGTH = 0.033, 0.090, 0.045  # definition: [m], of the paper
 
 
 @dataclass(frozen=True)

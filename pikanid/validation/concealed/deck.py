@@ -13,7 +13,8 @@ from pikanid.validation.concealed.effects import IDS, NEAR, OUTSIDE, POTENTIAL_F
 
 CLASSES = ("nothing", "single", "pair", "near", "outside")
 DEFAULT_MIX: Mapping[str, float] = {
-    "nothing": 0.10, "single": 0.45, "pair": 0.20, "near": 0.12, "outside": 0.13}
+    "nothing": 0.10, "single": 0.45, "pair": 0.20, "near": 0.12,
+    "outside": 0.13}  # definition: shares of the classes
 FLOW = Effect(POTENTIAL_FLOW, "outside", "dynamics")
 # Laws that stand for each other or contain each other do not make a pair.
 _OVERLAP = (

@@ -34,7 +34,7 @@ NEAR = (
     Effect("quintic_stiffness", "near", "dynamics", (
         Quantity("k5", "1/(s^2*rad^4)", (("quintic", 1),), ((10.0, 1e4),), (500.0,),
                  (-2e4, 1e5), signed=True),), near="cubic_stiffness"),
-)
+)  # definition: sizes are drawn from these
 
 OUTSIDE = (
     Effect("wobbling_length", "outside", "dynamics", (
@@ -63,4 +63,4 @@ OUTSIDE = (
     Effect("clock_error", "outside", "sensor", (
         Quantity("epsilon", "", (("clock", 1),), ((1e-5, 0.02),), (1e-3,), (-0.1, 0.1),
                  signed=True),)),
-)
+)  # definition: sizes are drawn from these

@@ -51,4 +51,4 @@ EFFECTS = (
         Quantity("k", "1/rad^2", (("sensor_cubic", 1),), ((0.01, 8.0),), (1.0,), (-30.0, 60.0),
                  signed=True),)),
     Effect("input_hold", "catalogue", "input", fixed=(("first_order_hold", 1.0),)),
-)
+)  # definition: sizes are drawn from these

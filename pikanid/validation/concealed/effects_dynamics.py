@@ -5,7 +5,7 @@ from __future__ import annotations
 from pikanid.validation.concealed.effect import Effect, Quantity
 
 EXPONENT = Quantity("n", "", (("exponent", 1),), ((0.3, 0.7), (1.3, 1.7), (2.4, 3.0)),
-                    (0.5, 1.5, 2.6), (0.15, 4.0), log=False)
+                    (0.5, 1.5, 2.6), (0.15, 4.0), log=False)  # definition: drawn from these
 
 EFFECTS = (
     Effect("coulomb_friction", "catalogue", "dynamics", (
@@ -69,4 +69,4 @@ EFFECTS = (
                  signed=True),
         Quantity("theta_dot_0", "rad/s", (("start_rate", 1),), ((1.0, 20.0),), (0.3,),
                  (-10.0, 10.0), signed=True, tied=True)), held_out="other"),
-)
+)  # definition: sizes are drawn from these

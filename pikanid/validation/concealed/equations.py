@@ -22,20 +22,23 @@ from numba import njit
  EXPONENT, AMPLITUDE_DAMPING, CUBIC, QUINTIC, EVEN, BIAS, LENGTH_DRIFT, DAMPING_DRIFT, WOBBLE,
  WOBBLE_RATE, MODE_GAIN, MODE_RATE, MODE_DAMPING, INTERNAL, WALL, WALL_STIFFNESS, WALL_DAMPING,
  STOP, RESTITUTION, LEAK_Y, LEAK_PITCH, BUMP, BUMP_TIME, BUMP_WIDTH, LAYER, MEMORY, YIELD_ANGLE,
- VIBRATION, VIBRATION_RATE, BILINEAR, ACTUATOR_LAG, SENSOR_LAG) = range(42)
+ VIBRATION, VIBRATION_RATE, BILINEAR, ACTUATOR_LAG,
+ SENSOR_LAG) = range(42)  # definition: positions in the settings
 
 # D^½ as relaxations: s^½ = (1/π) ∫ λ^(-½) s/(s + λ) dλ with λ = e^y, the trapezoidal rule in y.
 # Its error is below e^(-π²/h) of the value; beyond both ends s/(s + λ) is 1 and s/λ.
-_H = 0.9
-_Y = np.arange(-5, 8) * _H
+_H = 0.9  # numerical: step of y: an error of e^-11
+_Y = np.arange(-5, 8) * _H  # numerical: relaxation rates of e^-4.5 to e^6.3
 RATES = np.exp(_Y)
-WEIGHTS = _H / math.pi * np.exp(_Y / 2)
-SLOW = float(WEIGHTS[0] * math.exp(-_H / 2) / (1 - math.exp(-_H / 2)))
-FAST = float(WEIGHTS[-1] / RATES[-1] * math.exp(-_H / 2) / (1 - math.exp(-_H / 2)))
+WEIGHTS = _H / math.pi * np.exp(_Y / 2)  # definition: of the formula above
+SLOW = float(WEIGHTS[0] * math.exp(-_H / 2)
+             / (1 - math.exp(-_H / 2)))  # definition: of the formula above
+FAST = float(WEIGHTS[-1] / RATES[-1] * math.exp(-_H / 2)
+             / (1 - math.exp(-_H / 2)))  # definition: of the formula above
 LAYERS = len(RATES)
 # Positions in the state.
-ACTUATOR, SENSOR, HYSTERESIS, MODE, FIRST_LAYER = 2, 3, 4, 5, 7
-CREEP = 1e-3  # ε [rad/s]
+ACTUATOR, SENSOR, HYSTERESIS, MODE, FIRST_LAYER = 2, 3, 4, 5, 7  # definition: positions in it
+CREEP = 1e-3  # numerical: ε [rad/s]: a power below one has no slope at rest
 
 
 @njit

@@ -15,9 +15,9 @@ import numpy as np
 from pikanid.validation.concealed.arrays import Array
 from pikanid.validation.concealed.experiment import RATE, Experiment, grid
 
-QUIET = 2.0  # [s]
-RICH = 20.0  # [s]
-DT = 1.0 / RATE
+QUIET = 2.0  # definition: [s] of rest before a motion
+RICH = 20.0  # definition: [s] of a rich motion
+DT = 1.0 / RATE  # definition: [s] between samples
 
 
 @dataclass(frozen=True)

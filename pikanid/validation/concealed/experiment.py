@@ -8,7 +8,7 @@ import numpy as np
 
 from pikanid.validation.concealed.arrays import Array
 
-RATE = 100.0  # [Hz]
+RATE = 100.0  # definition: [Hz] of every recording
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from pikanid import errors
 from pikanid.validation.concealed.arrays import Array
 
 Response = Callable[[Array], Array]
-MOST_STEPS = 12
+MOST_STEPS = 12  # limit: of Gauss-Newton, in one refit
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ from pikanid.validation.concealed.deck import deal
 from pikanid.validation.concealed.excitations import CHOICES
 from pikanid.validation.concealed.seal import Secret, Settings
 
-MOST_CASES = 100_000
+MOST_CASES = 100_000  # limit: of one deck
 
 
 @dataclass(frozen=True)

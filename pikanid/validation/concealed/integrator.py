@@ -26,18 +26,18 @@ E3, E5 = np.array(DOP853.E3[:STAGES]), np.array(DOP853.E5[:STAGES])
 USED = np.array([len(np.flatnonzero(row)) for row in A])
 PLACES = np.array([np.r_[np.flatnonzero(row), np.zeros(STAGES - k, int)]
                    for row, k in zip(A, USED, strict=True)])
-FINAL = np.flatnonzero((B != 0) | (E3 != 0) | (E5 != 0))
+FINAL = np.flatnonzero((B != 0) | (E3 != 0) | (E5 != 0))  # definition: of the method
 
-RIG, TANK = 0, 1
+RIG, TANK = 0, 1  # definition: numbers of the two systems
 # Tolerances of one step; a recording takes some 2000.
-ABSOLUTE, RELATIVE = 1e-12, 1e-11
-MOST_EVENTS = 100_000
-MOST_STEPS = 1_000_000
+ABSOLUTE, RELATIVE = 1e-12, 1e-11  # numerical: as close as sums of 2000 steps stay double precision
+MOST_EVENTS = 100_000  # limit: of one recording
+MOST_STEPS = 1_000_000  # limit: of one recording
 
 # Discrete state.
-SIGN, CONTACT, MEMORY_SIGN, STUCK, HELD = range(5)
+SIGN, CONTACT, MEMORY_SIGN, STUCK, HELD = range(5)  # definition: positions in the discrete state
 # Guards.
-NONE, REVERSAL, WALL, STOP, MEMORY, RELEASE = range(6)
+NONE, REVERSAL, WALL, STOP, MEMORY, RELEASE = range(6)  # definition: numbers of the guards
 
 
 @njit

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-FAR = 1e9  # a wall, stop or limit that is never reached
+FAR = 1e9  # definition: a wall, stop or limit that is never reached
 
 
 class Rig(NamedTuple):

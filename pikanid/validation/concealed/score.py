@@ -25,7 +25,7 @@ from pikanid.validation.concealed.visibility import FROM_NOMINAL, FROM_RIVAL
 Entry = Mapping[str, Any]
 Outcome = Literal["right", "long", "visible", "wrong", "formula", "alarm", "silent"]
 ANSWERS = ("named", "set")
-MOST_HYPOTHESES = 2
+MOST_HYPOTHESES = 2  # definition: that an answer may name
 SYMBOLIC = "symbolic:"
 # Laws that an entry of the catalogue includes: dry friction with or without a rise at low speed.
 INCLUDED = {"stribeck_friction": "coulomb_friction"}

@@ -17,7 +17,7 @@ from pikanid import errors
 from pikanid.storage.limits import json_content
 from pikanid.validation.concealed import files
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 1  # definition: of the format that files name
 GENERATOR = "pikanid.validation.concealed 1"
 SEAL = "seal.json"
 

@@ -17,7 +17,7 @@ from pikanid.validation.concealed.rig import DYNAMIC, FAR, Rig
 from pikanid.validation.concealed.signals import Signal
 from pikanid.validation.concealed.tank import Tank
 
-TURBULENCE_STEP = 0.05  # [s] between the corners of the random force
+TURBULENCE_STEP = 0.05  # definition: [s] between the corners of the random force
 
 
 def measured(rig: Rig | Tank, experiment: Experiment) -> Array:

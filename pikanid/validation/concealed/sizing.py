@@ -14,8 +14,8 @@ from pikanid.validation.concealed.rig import Rig
 from pikanid.validation.concealed.simulate import measured
 
 # Distance of the nominal model that is aimed at: from hardly detectable to gross [σ].
-FAINTEST, GROSSEST = 2.0, 600.0
-HALVINGS = 13
+FAINTEST, GROSSEST = 2.0, 600.0  # definition: hardly detectable to gross
+HALVINGS = 13  # numerical: the size is then known to 1e-4 of its range
 
 
 def drawn_target(rng: np.random.Generator) -> float:

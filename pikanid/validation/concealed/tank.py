@@ -26,11 +26,11 @@ from scipy.special import jnp_zeros, jv
 
 from pikanid.validation.concealed.arrays import Array
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # definition: of the earth [m/s²]
 # Azimuthal order, and which zero of its Bessel function's derivative: three planar modes, then
 # the two that the first one drives.
-MODES = ((1, 1), (1, 2), (1, 3), (0, 1), (2, 1))
-PLANAR = 3
+MODES = ((1, 1), (1, 2), (1, 3), (0, 1), (2, 1))  # definition: of the sloshing liquid
+PLANAR = 3  # definition: number of the first of them
 
 
 @dataclass(frozen=True)

@@ -23,15 +23,17 @@ from pikanid.validation.concealed.noise import Noise
 from pikanid.validation.concealed.rig import Rig
 from pikanid.validation.concealed.simulate import measured
 
-FROM_NOMINAL, FROM_RIVAL = 5.0, 4.0
+# A set of concealed cases is a function of its seed alone: none of these can be set.
+FROM_NOMINAL, FROM_RIVAL = 5.0, 4.0  # definition: [σ] of a nameable truth
 # Rivals that get a rough refit after the screening to first order, and a full one after that.
-ROUGH, FULL = 12, 6
-ROUGH_STEPS = 2
-IN_PAIRS = 6, 4  # the same, where one of two effects is replaced
+ROUGH, FULL = 12, 6  # definition: numbers of refits
+ROUGH_STEPS = 2  # definition: of a rough refit
+IN_PAIRS = 6, 4  # definition: numbers of refits
 # A hidden effect without the others: times its size to first order, dampings, and full refits.
-SIZES, DAMPINGS, ALONE = np.geomspace(0.3, 3.0, 9), 4, 6
-BASE_LOW, BASE_HIGH = np.array([0.003, 0.0]), np.array([1.0, 20.0])
-BASE_SCALE = np.array([0.005, 0.1])
+SIZES, DAMPINGS, ALONE = np.geomspace(0.3, 3.0, 9), 4, 6  # definition: of starts
+# Of l [m] and d [N s/m].
+BASE_LOW, BASE_HIGH = np.array([0.003, 0.0]), np.array([1.0, 20.0])  # definition: their bounds
+BASE_SCALE = np.array([0.005, 0.1])  # definition: a typical change of these
 
 
 @dataclass(frozen=True)

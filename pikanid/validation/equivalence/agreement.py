@@ -6,10 +6,9 @@ import numpy as np
 
 from pikanid.validation.equivalence.setting import Array
 
-# Relative to the largest entry: rounding of sums over some hundred points, and of automatic
-# differentiation on top.
-MATRICES = 1e-12
-GRADIENTS = 1e-10
+# Relative to the largest entry.
+MATRICES = 1e-12  # numerical: rounding of sums over some hundred points
+GRADIENTS = 1e-10  # numerical: and of automatic differentiation on top
 
 
 def difference(a: Array, b: Array) -> float:

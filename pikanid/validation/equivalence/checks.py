@@ -13,8 +13,8 @@ from pikanid.validation.equivalence.optimisers import Path, adam, lbfgs, levenbe
 from pikanid.validation.equivalence.report import Check, EquivalenceReport
 from pikanid.validation.equivalence.setting import Array, Form, Setting
 
-MINIMISERS = 1e-8
-_STEPS = 20
+MINIMISERS = 1e-8  # numerical: rounding, enlarged by the condition of the problem
+_STEPS = 20  # definition: iterates that are compared
 
 _SHALLOW = "shallow KAN = Eq. (5)"
 

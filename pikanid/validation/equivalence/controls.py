@@ -16,7 +16,7 @@ from pikanid.validation.equivalence.report import Check
 from pikanid.validation.equivalence.setting import Array, Setting
 
 # What a negative control must exceed: a thousand million times what agreement allows.
-_CLEAR = 1e-3
+_CLEAR = 1e-3  # numerical: a thousand million times what agreement allows
 
 
 def controls(seed: int = 0) -> tuple[Check, ...]:

@@ -18,10 +18,11 @@ from pikanid.validation.equivalence.agreement import GRADIENTS, difference
 from pikanid.validation.equivalence.report import Check
 from pikanid.validation.equivalence.setting import Array, Setting
 
-_WIDTHS: tuple[list[Any], ...] = ([1, 3, 1], [1, 4, 2, 1], [1, [2, 1], 1])
+_WIDTHS: tuple[list[Any], ...] = (
+    [1, 3, 1], [1, 4, 2, 1], [1, [2, 1], 1])  # definition: networks that are compared
 # Both systems are solved with the same small damping: the tangent functions of a deep KAN are
 # dependent, and without it the step itself would not be unique.
-_DAMPING = 1e-6
+_DAMPING = 1e-6  # numerical: without it the step itself would not be unique
 
 
 def tangent_step(seed: int = 0, *, quick: bool = False) -> tuple[Check, ...]:

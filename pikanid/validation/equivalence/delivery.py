@@ -8,7 +8,7 @@ from pikanid.approximators.kan import ShallowKAN, build_kan
 from pikanid.validation.equivalence.report import Check
 from pikanid.validation.equivalence.setting import Setting
 
-_CURVE = 1e-12
+_CURVE = 1e-12  # numerical: rounding of a spline's few terms
 
 
 def delivered_curve(seed: int = 0) -> tuple[Check, ...]:

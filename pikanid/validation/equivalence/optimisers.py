@@ -13,11 +13,9 @@ Array = NDArray[np.float64]
 Residuals = Callable[[Array], tuple[Array, Array]]
 Loss = Callable[[Array], tuple[float, Array]]
 
-# Keeps a step as well defined as double precision allows: the paths of two versions of one
-# objective then part by rounding alone, whatever the condition of the basis.
-_LEAST_DAMPING = 1e-8
-# Least relative gain in the loss that is worth a step.
-_LEAST_GAIN = 1e-12
+# A step stays as well defined as double precision allows.
+_LEAST_DAMPING = 1e-8  # numerical: paths of two versions of one objective part by rounding alone
+_LEAST_GAIN = 1e-12  # numerical: relative, in the loss: less is rounding
 
 
 @dataclass(frozen=True, eq=False)

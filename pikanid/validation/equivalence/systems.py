@@ -38,7 +38,7 @@ class System:
     start: tuple[float, float]
 
 
-_G, _M = 9.81, 0.30
+_G, _M = 9.81, 0.30  # definition: [m/s²] and [kg], as in the paper
 
 
 def _slosh(x: Array, v: Array, u: Array, p: Array) -> Array:
@@ -102,4 +102,4 @@ SYSTEMS = {
         (0.3, 1.0, 0.7),
         (0.5, 0.0),
     ),
-}
+}  # definition: that both forms are compared on
