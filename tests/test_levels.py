@@ -15,6 +15,7 @@ from pikanid.discrepancy.fit import penalised_fit
 from pikanid.discrepancy.level import Level
 from pikanid.discrepancy.levels import Search
 from pikanid.discrepancy.offers import step_offers
+from pikanid.discrepancy.settings import USUAL
 from pikanid.objective.shooting import Accuracy, Shooting
 
 
@@ -27,7 +28,7 @@ def test_a_finer_grid_is_taken_where_its_fit_is_more_evident(
     monkeypatch.setattr(levels, "finer_gain", lambda *_: np.inf)
     monkeypatch.setattr(Search, "again", again)
     found = searching().finer(coarse(), 16)
-    assert (found is not None) == (rise > levels.FINER)
+    assert (found is not None) == (rise > USUAL.finer)
 
 
 def test_a_step_that_is_not_there_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:

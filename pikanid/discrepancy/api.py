@@ -18,6 +18,7 @@ from pikanid.discrepancy.level import Level
 from pikanid.discrepancy.levels import search
 from pikanid.discrepancy.mixture import View, mixed_edge, mixed_plans, views
 from pikanid.discrepancy.result import Discrepancy
+from pikanid.discrepancy.settings import USUAL, DiscrepancySettings
 from pikanid.estimate import Estimate
 from pikanid.estimate.estimate import total_cost
 from pikanid.model import Input, Model, Parameter, State
@@ -25,20 +26,21 @@ from pikanid.objective.adequacy import judge
 from pikanid.problem.arguments import a_model
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
+from pikanid.settings import changed
 from pikanid.storage.version import __version__
 from pikanid.strategies.finish import evaluate
 from pikanid.strategies.nls import NLS
 
-GRID = (10, 20, 40)
-POINTS = 401
+POINTS = 401  # layout: points at which an edge is drawn
 
 
 def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], equation: str,
                     arguments: Sequence[str], *,
                     nominal: Estimate | None = None,
                     method: Literal["shooting", "functional"] = "shooting",
-                    grid: Sequence[int] = GRID, steps: bool = True, adaptive: bool = True,
-                    alpha: float = 0.01) -> Discrepancy:
+                    grid: Sequence[int] = (10, 20, 40), steps: bool = True, adaptive: bool = True,
+                    alpha: float = 0.01,
+                    settings: DiscrepancySettings = USUAL) -> Discrepancy:
     """Fit an additive KAN δ(a_1) + δ(a_2) + ... inside one equation, together with the parameters.
 
     Every edge is a cubic B-spline with a smoothness prior whose weight maximises the evidence
@@ -62,6 +64,7 @@ def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], e
             strongly ask for that.
         adaptive: Whether smoothness may vary along an edge, if the data strongly ask for that.
         alpha: Probability that any edge is called significant where none is there.
+        settings: Priors, what counts as evidence, budgets.
 
     Raises:
         BadModel: Unknown equation, or an argument in other than the model's names.
@@ -92,29 +95,29 @@ def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], e
     nominal = nominal or NLS().fit(model, recordings)
     problem = Problem(nominal.fitted_model, recordings)
     if method == "functional":
-        level = relaxed_level(nominal, problem, equation, plans, grid[0])
+        level = relaxed_level(nominal, problem, equation, plans, grid[0], settings)
     else:
-        level = search(nominal, problem, equation, plans, grid, steps, adaptive)
+        level = search(nominal, problem, equation, plans, grid, steps, adaptive, settings)
     return _result(level, nominal, equation, alpha, steps and method == "shooting", method, begun)
 
 
 def _result(level: Level, nominal: Estimate, equation: str, alpha: float, steps: bool,
             method: str, begun: float) -> Discrepancy:
     seen = views(level, equation, steps)
-    known = seen[0].known
-    gauges = fix_gauges(level.plans, level.visited)
+    known, settings = seen[0].known, level.fit.smoothness.settings
+    gauges = fix_gauges(level.plans, level.visited, settings)
     freedom = [max(float(known.freedom[at].sum()) - g.removed.shape[1], 0.0)
                for g, at in zip(gauges, level.places, strict=True)]
     tests = [wald(level.fit, [k], gauges, freedom) for k in range(len(gauges))]
     verdicts = holm([p for p, _ in tests], alpha)
-    shown = fix_gauges(mixed_plans(seen), level.visited)
+    shown = fix_gauges(mixed_plans(seen), level.visited, settings)
     edges = tuple(
         _edge(seen, k, gauge, level.problem.model, tests[k], verdicts[k], freedom[k])
         for k, gauge in enumerate(shown))
     estimate = _estimate(level, known.covariance, method, begun)
     together = wald(level.fit, range(len(gauges)), gauges, freedom)[0]
     return Discrepancy(estimate.fitted_model, estimate, nominal, equation, edges,
-                       _offset(level, known), together, alpha, level.fit.evidence)
+                       _offset(level, known), together, alpha, level.fit.evidence, settings)
 
 
 def _edge(seen: Sequence[View], k: int, gauge: Gauge, model: Model, test: tuple[float, int],
@@ -131,7 +134,8 @@ def _edge(seen: Sequence[View], k: int, gauge: Gauge, model: Model, test: tuple[
     units = {q.name: q.unit for q in named}
     return Edge(plan.argument, units.get(plan.argument, ""), plan.name,
                 model.parameter(OFFSET).unit, a, basis @ c, std, c, V, *test,
-                significant, jumps, freedom, gauge, *likelihood(same.fit, k))
+                significant, jumps, freedom, gauge, *likelihood(same.fit, k),
+                same.fit.smoothness.settings.draws)
 
 
 def _offset(level: Level, known: Posterior) -> tuple[float, float]:
@@ -161,6 +165,8 @@ def _estimate(level: Level, covariance: np.ndarray, method: str, begun: float) -
                 "steps": [p.name for p in level.plans if p.step],
                 "log_lambda": [list(map(float, r)) for r in fit.smoothness.split(fit.rho)],
                 "effective_parameters": fit.effective, "noise": fit.noise}
+    if own := changed(fit.smoothness.settings):
+        settings["settings"] = own
     return Estimate(
         model=problem.model, strategy=f"kan_discrepancy ({method})", free=problem.free,
         theta=np.array(fit.theta), covariance=covariance, fits=fits, trajectories=trajectories,

@@ -18,10 +18,7 @@ from scipy.stats import chi2
 
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import Gauge
-from pikanid.discrepancy.smoothness import LARGEST
-
-FEWEST, MOST = 3, 8  # degrees of freedom of the test of an edge
-DRAWS = 2000
+from pikanid.discrepancy.settings import USUAL
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +84,8 @@ def wald(fit: PenalisedFit, edges: Sequence[int], gauges: Sequence[Gauge],
     for k in edges:
         prior, gauge = fit.smoothness.priors[k], gauges[k]
         at = np.ix_(prior.at, prior.at)
-        precision[at] = np.eye(len(prior.at)) / (len(prior.at) * (LARGEST * prior.size) ** 2)
-        count = int(np.clip(round(freedom[k]), FEWEST, MOST))
+        precision[at] = np.eye(len(prior.at)) / (len(prior.at) * (prior.largest * prior.size) ** 2)
+        count = int(np.clip(round(freedom[k]), *fit.smoothness.settings.freedom))
         for kept, functions in ((tested, _smoothest(gauge, count)), (removed, gauge.removed)):
             full = np.zeros((len(fit.theta), functions.shape[1]))
             full[prior.at] = functions
@@ -120,7 +117,8 @@ def _smoothest(gauge: Gauge, count: int) -> np.ndarray:
     return np.asarray(basis @ vectors)
 
 
-def simultaneous_factor(curves: np.ndarray, covariance: np.ndarray, level: float = 0.95) -> float:
+def simultaneous_factor(curves: np.ndarray, covariance: np.ndarray, level: float = 0.95,
+                        draws: int = USUAL.draws) -> float:
     """How many standard deviations hold the whole curve with probability `level`.
 
     `curves` (M, K) takes coefficients to values; the largest deviation over the M points is drawn
@@ -130,7 +128,7 @@ def simultaneous_factor(curves: np.ndarray, covariance: np.ndarray, level: float
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     spread = curves @ root
     std = np.linalg.norm(spread, axis=1)
-    drawn = np.random.default_rng(0).normal(size=(spread.shape[1], DRAWS))
+    drawn = np.random.default_rng(0).normal(size=(spread.shape[1], draws))
     seen = std > 1e-9 * std.max()
     worst = np.abs(spread[seen] @ drawn / std[seen, None]).max(axis=0)
     return float(np.quantile(worst, level))

@@ -10,8 +10,9 @@ import numpy as np
 
 from pikanid.discrepancy.bands import simultaneous_factor
 from pikanid.discrepancy.gauge import Gauge
+from pikanid.discrepancy.settings import USUAL
 
-NORMAL_95 = 1.959963984540054
+NORMAL_95 = 1.959963984540054  # definition: quantile of the normal distribution
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,7 @@ class Edge:
         information, gain: (K, K), (K,) of what the data alone say, smooth or not: coefficients c,
             not gauge-fixed, leave χ² = cᵀ information c - 2 gainᵀ c + const, parameters at their
             best.
+        draws: Of a simultaneous band.
     """
 
     argument: str
@@ -55,6 +57,7 @@ class Edge:
     gauge: Gauge = field(repr=False)
     information: np.ndarray = field(repr=False)
     gain: np.ndarray = field(repr=False)
+    draws: int = field(default=USUAL.draws, repr=False)
 
     @property
     def range(self) -> tuple[float, float]:
@@ -69,7 +72,8 @@ class Edge:
     @property
     def simultaneous(self) -> tuple[np.ndarray, np.ndarray]:
         """The band (M,) that holds the whole curve with probability 95 %."""
-        factor = simultaneous_factor(self.gauge.plan.basis(self.grid), self.covariance)
+        factor = simultaneous_factor(self.gauge.plan.basis(self.grid), self.covariance,
+                                     draws=self.draws)
         return self.values - factor * self.std, self.values + factor * self.std
 
     def covariance_of_values(self, argument: np.ndarray) -> np.ndarray:

@@ -21,9 +21,10 @@ from pikanid import errors
 from pikanid.approximators.bspline import BSpline
 from pikanid.model import Model, Output, Parameter, Spline
 
-DEGREE = 3
+DEGREE = 3  # definition: cubic splines
 OFFSET = "delta_offset"
-MARGIN = 0.05  # of the visited range, on either side: trajectories move while they are fitted
+# Trajectories move while they are fitted.
+MARGIN = 0.05  # numerical: of the visited range, on either side
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,7 @@ from pikanid import errors
 from pikanid.discrepancy.smoothness import Smoothness
 from pikanid.objective.shooting import Shooting
 
-ITERATIONS = 40
-SETTLED = 0.03  # stop once a step moves nothing by more than this many posterior deviations
-NOTHING = 0.05  # of χ²: a fall of the cost that changes no conclusion
-TRIES = 8
+TRIES = 8  # limit: dampings of one step
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +59,8 @@ def penalised_fit(shooting: Shooting, start: np.ndarray, smoothness: Smoothness,
     theta, accuracy = np.clip(start, shooting.problem.lower, shooting.problem.upper), "coarse"
     noise, damping, idle, converged = 1.0, 1e-3, 0, False
     history: list[dict[str, float]] = []
-    for _ in range(ITERATIONS):
+    settings = smoothness.settings
+    for _ in range(settings.iterations):
         r, J = shooting.residual(theta), shooting.jacobian(theta)
         if r[0] >= 1e10:
             raise errors.SimulationFailed(errors.discrepancy_not_simulated())
@@ -83,8 +81,8 @@ def penalised_fit(shooting: Shooting, start: np.ndarray, smoothness: Smoothness,
         if trial is not None:
             theta = trial
         # along a gauge the valley is curved and flat: where it leads to does not matter
-        idle = idle + 1 if history[-1]["fallen"] < NOTHING else 0
-        small = (moved < SETTLED or idle >= 2) and abs(noise / before - 1.0) < 0.01
+        idle = idle + 1 if history[-1]["fallen"] < settings.idle else 0
+        small = (moved < settings.settled or idle >= 2) and abs(noise / before - 1.0) < 0.01
         if trial is None or small:
             if accuracy == "coarse":
                 accuracy, damping, idle = "fine", 1e-3, 0
@@ -148,7 +146,7 @@ def _noise(r: np.ndarray, A: np.ndarray, smoothness: Smoothness, rho: np.ndarray
     H = A / noise**2 + smoothness.precision(rho)
     used = float(np.trace(np.linalg.lstsq(H, A / noise**2, rcond=None)[0]))
     dof = max(len(r) - used, 1.0)
-    # a χ² beyond five standard deviations of its mean is no chance
-    if stated and float(r @ r) < dof + 5.0 * np.sqrt(2.0 * dof):
+    # a χ² far beyond its mean is no chance
+    if stated and float(r @ r) < dof + smoothness.settings.louder * np.sqrt(2.0 * dof):
         return 1.0
     return float(np.sqrt(float(r @ r) / dof))

@@ -17,6 +17,7 @@ from pikanid.discrepancy.edges import EdgePlan, extend
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import visit
 from pikanid.discrepancy.level import Level, smoothness_of
+from pikanid.discrepancy.settings import USUAL, DiscrepancySettings
 from pikanid.discrepancy.smoothness import STIFF
 from pikanid.estimate import Estimate
 from pikanid.formula.expressions import symbol
@@ -27,23 +28,20 @@ from pikanid.problem.problem import Problem
 from pikanid.recording import Channel, Recording
 from pikanid.strategies.ipda import IPDA, fit_relaxed
 
-TURNS = 6
-SETTLED = 0.3  # of log λ
-
 
 def relaxed_level(nominal: Estimate, problem: Problem, equation: str, plans: Sequence[EdgePlan],
-                  intervals: int) -> Level:
+                  intervals: int, settings: DiscrepancySettings = USUAL) -> Level:
     """Edges and parameters by iPDA, smoothness by evidence."""
     seen = visit(problem, equation, plans, nominal.theta, nominal.trajectories)
     placed = tuple(p.over(a, intervals) for p, a in zip(plans, seen.arguments.T, strict=True))
     model = extend(nominal.fitted_model, equation, placed)
     recordings = [_with_sigma(r, model) for r in problem.recordings]
     bound = Problem(model, recordings)
-    smoothness = smoothness_of(bound, placed, seen.size, [1] * len(placed))
+    smoothness = smoothness_of(bound, placed, seen.size, [1] * len(placed), settings)
     rho = np.full(len(placed), STIFF)
     theta = bound.guess
     history: list[dict[str, float]] = []
-    for _ in range(TURNS):
+    for _ in range(settings.turns):
         pseudo = _with_prior(model.with_values(_shared(bound, theta)), recordings[0],
                              smoothness.precision(rho), bound)
         relaxed = fit_relaxed(Problem(pseudo[0], [pseudo[1], *recordings[1:]]), IPDA())
@@ -53,7 +51,7 @@ def relaxed_level(nominal: Estimate, problem: Problem, equation: str, plans: Seq
         A = H - smoothness.precision(rho)
         before, (rho, cost) = rho, smoothness.choose(A, H @ theta, rho)
         history.append({"lam": relaxed.lam, "change": float(np.max(np.abs(rho - before)))})
-        if history[-1]["change"] < SETTLED:
+        if history[-1]["change"] < settings.settled_turns:
             break
     shooting = Shooting(bound)
     shooting.choose_steps(theta, "fine")

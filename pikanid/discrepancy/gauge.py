@@ -16,13 +16,12 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from pikanid.discrepancy.edges import EdgePlan, argument_model
+from pikanid.discrepancy.settings import USUAL, DiscrepancySettings
 from pikanid.estimate.data import Trajectory
 from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 
-FOLLOWED = 0.9  # share of a nominal term's mean square that makes it a gauge, if edges reach it
-BEND = 1e-3  # cost of ∫ (d²δ/dz²)² against the mean square, when an edge follows a nominal term
-CARRIED = 0.1  # an edge with less than this share of a gauge direction's size takes no part in it
+BEND = 1e-3  # numerical: cost of ∫ (d²δ/dz²)² against the mean square: of least norm
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +84,13 @@ class Gauge:
         return law(at) - self.plan.basis(at) @ (self.removed @ share)
 
 
-def fix_gauges(plans: Sequence[EdgePlan], visited: Visited) -> tuple[Gauge, ...]:
+def fix_gauges(plans: Sequence[EdgePlan], visited: Visited,
+               settings: DiscrepancySettings = USUAL) -> tuple[Gauge, ...]:
     """The gauge of every edge over the visited data."""
     root = np.sqrt(visited.weights)
     columns = [root[:, None] * p.basis(a) for p, a in zip(plans, visited.arguments.T, strict=True)]
     ends = np.cumsum([p.size for p in plans])[:-1]
-    shared = _shared(plans, columns, root[:, None] * visited.terms)
+    shared = _shared(plans, columns, root[:, None] * visited.terms, settings.followed)
     gauges = []
     for plan, a, B, parts in zip(plans, visited.arguments.T, columns, np.split(shared, ends),
                                  strict=True):
@@ -99,7 +99,7 @@ def fix_gauges(plans: Sequence[EdgePlan], visited: Visited) -> tuple[Gauge, ...]
         mean = root @ B
         for k in range(parts.shape[1]):
             own = parts[:, k] - (mean @ parts[:, k]) * plan.constant
-            if np.linalg.norm(B @ own) > CARRIED * total[k]:
+            if np.linalg.norm(B @ own) > settings.carried * total[k]:
                 kept.append(own)
         removed = _orthonormal(np.column_stack(kept), B)
         # over the data the removed functions are orthonormal: (B M)ᵀ(B M) = I
@@ -108,8 +108,8 @@ def fix_gauges(plans: Sequence[EdgePlan], visited: Visited) -> tuple[Gauge, ...]
     return tuple(gauges)
 
 
-def _shared(plans: Sequence[EdgePlan], columns: Sequence[np.ndarray], terms: np.ndarray
-            ) -> np.ndarray:
+def _shared(plans: Sequence[EdgePlan], columns: Sequence[np.ndarray], terms: np.ndarray,
+            followed: float) -> np.ndarray:
     """Coefficients (ΣK, m) of the nominal directions that all edges together can follow."""
     alive = np.linalg.norm(terms, axis=0) > 0
     if not alive.any():
@@ -126,7 +126,7 @@ def _shared(plans: Sequence[EdgePlan], columns: Sequence[np.ndarray], terms: np.
     turned = follow @ np.linalg.pinv(r, rcond=1e-8)
     # principal angles between the edges' span and the nominal one
     _, cosine, vt = np.linalg.svd(B @ turned, full_matrices=False)
-    return turned @ vt.T[:, cosine**2 > FOLLOWED]
+    return turned @ vt.T[:, cosine**2 > followed]
 
 
 def _orthonormal(coefficients: np.ndarray, B: np.ndarray) -> np.ndarray:

@@ -10,12 +10,13 @@ import numpy as np
 from pikanid.discrepancy.edges import OFFSET, EdgePlan
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.gauge import Visited, visit
-from pikanid.discrepancy.smoothness import LARGEST, EdgePrior, Smoothness
+from pikanid.discrepancy.settings import USUAL, DiscrepancySettings
+from pikanid.discrepancy.smoothness import EdgePrior, Smoothness
 from pikanid.estimate.data import Trajectory
 from pikanid.objective.shooting import Shooting
 from pikanid.problem.problem import Problem
 
-UNKNOWN = 1e-3  # prior precision of a parameter, in units of its guess: none to speak of
+UNKNOWN = 1e-3  # numerical: prior precision of a parameter, in units of its guess: none to speak of
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,18 +66,20 @@ class Level:
         return start
 
 
-NOWHERE = Visited(np.empty((0, 0)), np.empty(0), np.empty((0, 0)), 1.0)
+NOWHERE = Visited(
+    np.empty((0, 0)), np.empty(0), np.empty((0, 0)), 1.0)  # definition: nothing visited
 
 
-def smoothness_of(problem: Problem, plans: Sequence[EdgePlan], size: float, pieces: Sequence[int]
-                  ) -> Smoothness:
+def smoothness_of(problem: Problem, plans: Sequence[EdgePlan], size: float, pieces: Sequence[int],
+                  settings: DiscrepancySettings = USUAL) -> Smoothness:
     """The priors of edges in the extended model's θ."""
     labels = [f.label for f in problem.free]
     priors = tuple(
-        EdgePrior(p, np.array([labels.index(n) for n in p.coefficient_names]), size, k)
+        EdgePrior(p, np.array([labels.index(n) for n in p.coefficient_names]), size, k,
+                  settings.largest)
         for p, k in zip(plans, pieces, strict=True))
     weak = np.array([UNKNOWN / max(abs(f.guess), UNKNOWN) for f in problem.free]) ** 2
-    weak[labels.index(OFFSET)] = 1.0 / (LARGEST * size) ** 2
+    weak[labels.index(OFFSET)] = 1.0 / (settings.largest * size) ** 2
     for prior in priors:
         weak[prior.at] = 0.0
-    return Smoothness(priors, weak)
+    return Smoothness(priors, weak, settings)

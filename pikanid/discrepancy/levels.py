@@ -17,14 +17,11 @@ from pikanid.discrepancy.fit import penalised_fit
 from pikanid.discrepancy.gauge import visit
 from pikanid.discrepancy.level import NOWHERE, Level, smoothness_of
 from pikanid.discrepancy.offers import finer_gain, step_offers, strongest, variation_offers
+from pikanid.discrepancy.settings import USUAL, DiscrepancySettings
 from pikanid.discrepancy.smoothness import Smoothness
 from pikanid.estimate import Estimate
 from pikanid.objective.shooting import Shooting
 from pikanid.problem.problem import Problem
-
-STRONG = 5.0  # log Bayes factor (odds of 150 : 1) that a step or a varying smoothness must reach
-SURE = 4.0  # standard deviations that a step must differ from zero by, to stay
-FINER = 1.0  # rise of log evidence that a finer grid must bring
 
 
 @dataclass(frozen=True)
@@ -36,6 +33,7 @@ class Search:
     equation: str
     steps: bool
     adaptive: bool
+    settings: DiscrepancySettings = USUAL
 
     def first(self, plans: Sequence[EdgePlan], intervals: int) -> Level:
         """The coarsest grid, from the nominal fit."""
@@ -48,17 +46,18 @@ class Search:
         """The next grid, over the range visited now; None where it would not pay."""
         placed = tuple(p.over(a, intervals) for p, a in zip(
             level.plans, level.visited.arguments.T, strict=True))
-        if finer_gain(level, self.equation, placed) < FINER:
+        if finer_gain(level, self.equation, placed) < self.settings.finer:
             return None
         found = self.stepped(self.again(level, placed, level.pieces))
-        return found if found.fit.evidence > level.fit.evidence + FINER else None
+        return found if found.fit.evidence > level.fit.evidence + self.settings.finer else None
 
     def stepped(self, level: Level) -> Level:
         """The level, with a step at zero in every edge whose data strongly ask for one."""
+        strong = self.settings.strong
         for _ in level.plans:
-            offer = strongest(step_offers(level, self.equation), STRONG) if self.steps else None
+            offer = strongest(step_offers(level, self.equation), strong) if self.steps else None
             better = None if offer is None else self.anew(offer.plans, offer.pieces, level.size)
-            if better is None or better.fit.evidence < level.fit.evidence + STRONG:
+            if better is None or better.fit.evidence < level.fit.evidence + strong:
                 break
             level = better
         return self.pruned(level)
@@ -68,17 +67,19 @@ class Search:
         fit = level.fit
         V = np.linalg.pinv(fit.information + fit.smoothness.precision(fit.rho), hermitian=True)
         kept = tuple(
-            replace(p, step=abs(fit.theta[at[-1]]) > SURE * np.sqrt(V[at[-1], at[-1]]))
+            replace(p, step=abs(fit.theta[at[-1]]) > self.settings.sure * np.sqrt(
+                V[at[-1], at[-1]]))
             if p.step else p for p, at in zip(level.plans, level.places, strict=True))
         return level if kept == level.plans else self.again(level, kept, level.pieces)
 
     def varied(self, level: Level) -> Level:
         """The level, with a smoothness that varies along every edge whose data ask for that."""
+        strong = self.settings.strong
         for _ in level.plans:
-            offer = strongest(variation_offers(level), STRONG) if self.adaptive else None
+            offer = strongest(variation_offers(level), strong) if self.adaptive else None
             better = None if offer is None else self.again(
                 level, offer.plans, offer.pieces, offer.fit.rho)
-            if better is None or better.fit.evidence < level.fit.evidence + STRONG:
+            if better is None or better.fit.evidence < level.fit.evidence + strong:
                 break
             level = better
         return level
@@ -110,7 +111,7 @@ class Search:
         """The extended problem and the priors of its edges."""
         problem = Problem(extend(self.nominal.fitted_model, self.equation, plans),
                           self.problem.recordings)
-        return problem, smoothness_of(problem, plans, size, pieces)
+        return problem, smoothness_of(problem, plans, size, pieces, self.settings)
 
     def fitted(self, problem: Problem, shooting: Shooting, plans: Sequence[EdgePlan],
                theta: np.ndarray, smoothness: Smoothness, rho: np.ndarray) -> Level:
@@ -125,9 +126,10 @@ def _start(problem: Problem, values: dict[str, float]) -> np.ndarray:
 
 
 def search(nominal: Estimate, problem: Problem, equation: str, plans: Sequence[EdgePlan],
-           grid: Sequence[int], steps: bool, adaptive: bool) -> Level:
+           grid: Sequence[int], steps: bool, adaptive: bool,
+           settings: DiscrepancySettings = USUAL) -> Level:
     """Fit edges on one grid after the other, until a finer one brings nothing."""
-    setting = Search(nominal, problem, equation, steps, adaptive)
+    setting = Search(nominal, problem, equation, steps, adaptive, settings)
     level = setting.first(plans, grid[0])
     for intervals in grid[1:]:
         finer = setting.finer(level, intervals)

@@ -18,8 +18,6 @@ from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.level import Level
 from pikanid.discrepancy.offers import step_offers
 
-LEAST = 0.02  # probability below which a structure is left out
-
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -42,10 +40,10 @@ def views(level: Level, equation: str, steps: bool) -> tuple[View, ...]:
     """The fit, and beside it every step that it does without though the data may ask for it."""
     offers = step_offers(level, equation) if steps else []
     odds = np.exp(np.minimum([0.0, *(o.gain for o in offers)], 500.0))
-    share = odds / odds.sum()
-    likely = np.where(share >= LEAST, share, 0.0)
+    share, least = odds / odds.sum(), level.fit.smoothness.settings.left_out
+    likely = np.where(share >= least, share, 0.0)
     # the fit itself always stays: it is the only one that was fitted, not foretold
-    likely[0] = max(share[0], LEAST)
+    likely[0] = max(share[0], least)
     likely /= likely.sum()
     plans = [level.plans, *(o.plans for o in offers)]
     fits = [level.fit, *(o.fit for o in offers)]

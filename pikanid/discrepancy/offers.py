@@ -17,9 +17,8 @@ from pikanid.discrepancy.edges import EdgePlan
 from pikanid.discrepancy.fit import PenalisedFit
 from pikanid.discrepancy.level import Level
 from pikanid.discrepancy.screening import spline_responses, step_responses
-from pikanid.discrepancy.smoothness import EdgePrior, Smoothness
+from pikanid.discrepancy.smoothness import Smoothness
 
-PIECES = 9  # of log λ along an edge, where it varies
 T = TypeVar("T")
 
 
@@ -54,9 +53,9 @@ def step_offers(level: Level, equation: str) -> list[Offer]:
     for k in able:
         wider = np.column_stack([J, answers[:, k]]) / fit.noise
         plans = _with(level.plans, k, replace(level.plans[k], step=True))
-        prior = EdgePrior(plans[k], np.append(priors[k].at, len(fit.theta)), priors[k].size,
-                          priors[k].pieces)
-        smooth = Smoothness(_with(priors, k, prior), np.append(fit.smoothness.weak, 0.0))
+        prior = replace(priors[k], plan=plans[k], at=np.append(priors[k].at, len(fit.theta)))
+        smooth = replace(fit.smoothness, priors=_with(priors, k, prior),
+                         weak=np.append(fit.smoothness.weak, 0.0))
         found.append(_offer(level, base, plans, level.pieces, smooth, wider.T @ wider,
                             wider.T @ target / fit.noise, np.append(fit.inside, True)))
     return found
@@ -66,12 +65,12 @@ def variation_offers(level: Level) -> list[Offer]:
     """A smoothness that varies along the edge, for every edge where it does not yet."""
     fit, priors = level.fit, level.fit.smoothness.priors
     base = fit.smoothness.choose(fit.information, fit.gain, fit.rho)[1]
-    found = []
+    found, pieces = [], fit.smoothness.settings.pieces
     for k, prior in enumerate(priors):
         if prior.pieces == 1:
-            smooth = Smoothness(_with(priors, k, replace(prior, pieces=PIECES)),
-                                fit.smoothness.weak)
-            found.append(_offer(level, base, level.plans, _with(level.pieces, k, PIECES), smooth,
+            smooth = replace(fit.smoothness,
+                             priors=_with(priors, k, replace(prior, pieces=pieces)))
+            found.append(_offer(level, base, level.plans, _with(level.pieces, k, pieces), smooth,
                                 fit.information, fit.gain, fit.inside))
     return found
 
@@ -96,7 +95,7 @@ def finer_gain(level: Level, equation: str, finer: Sequence[EdgePlan]) -> float:
                 at = np.append(at, np.searchsorted(others, prior.at[-1]))
             priors.append(replace(prior, plan=plan, at=at))
         weak = np.append(fit.smoothness.weak[others], np.zeros(answers.shape[1]))
-        smooth = Smoothness(tuple(priors), weak)
+        smooth = replace(fit.smoothness, priors=tuple(priors), weak=weak)
         costs.append(smooth.choose(columns.T @ columns, columns.T @ target / fit.noise, fit.rho)[1])
     return costs[0] - costs[1]
 

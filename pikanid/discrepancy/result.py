@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from pikanid import errors
 from pikanid.discrepancy.edge import Edge
+from pikanid.discrepancy.settings import USUAL, DiscrepancySettings
 from pikanid.estimate import Estimate
 from pikanid.model import Model
+from pikanid.settings import changed, told
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +34,7 @@ class Discrepancy:
             argument.
         alpha: Level of significance of the edges, together.
         evidence: Log marginal likelihood, up to a constant.
+        settings: By which it was found.
     """
 
     model: Model
@@ -43,6 +46,7 @@ class Discrepancy:
     p_value: float
     alpha: float
     evidence: float
+    settings: DiscrepancySettings = USUAL
 
     @property
     def significant(self) -> tuple[Edge, ...]:
@@ -76,11 +80,13 @@ class Discrepancy:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON: verdict, edges over their ranges, parameters."""
+        own = changed(self.settings)
         return {"equation": self.equation, "unit": self.unit, "adequate": self.adequate,
                 "p_value": self.p_value, "alpha": self.alpha, "evidence": self.evidence,
                 "offset": {"value": self.offset[0], "std": self.offset[1]},
                 "edges": [e.to_dict() for e in self.edges],
-                "estimate": self.estimate.to_dict(), "nominal": self.nominal.to_dict()}
+                "estimate": self.estimate.to_dict(), "nominal": self.nominal.to_dict(),
+                **({"settings": own} if own else {})}
 
     def plot(self) -> Figure:
         """Every edge with its band over its visited range."""
@@ -125,6 +131,8 @@ class Discrepancy:
         lines += [f"  {e.sentence()}" for e in self.edges]
         lines.append(f"  offset {self.offset[0]:.3g} ± {self.offset[1]:.1g} {self.unit}")
         lines.append(f"  {self.estimate.sentence()}")
+        if changed(self.settings):
+            lines.append(f"  {told(self.settings)}")
         return "\n".join([*lines, *(f"  warning: {w}" for w in self.estimate.warnings)])
 
     __repr__ = __str__

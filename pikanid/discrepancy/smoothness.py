@@ -25,17 +25,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid.discrepancy.edges import EdgePlan
+from pikanid.discrepancy.settings import USUAL, DiscrepancySettings
 
-STIFF = 8.0  # log λ of an edge that is nearly straight
-SMOOTHEST, ROUGHEST = 18.0, -12.0  # limits of log λ: beyond them nothing changes any more
-LARGEST = 0.1  # prior size of a discrepancy, in units of the equation's size
-DRAWS = 32  # of ρ, a power of two
-WIDER = 1.3  # how much wider than the evidence they are drawn
-FLAT = 0.1  # curvature of the evidence where it says nothing: ρ is known to a few units, its limits
-# Weak prior of every ρ: where an edge is nearly straight the evidence alone says nothing.
-USUAL, SPREAD = 5.0, 5.0
-# Prior of the steps between neighbouring pieces of log λ: e^±3 from one to the next is usual.
-STEP = 3.0
+STIFF = 8.0  # numerical: log λ of an edge that is nearly straight
+SMOOTHEST, ROUGHEST = 18.0, -12.0  # numerical: of log λ: nothing changes beyond
+WIDER = 1.3  # numerical: how much wider than the evidence they are drawn
+# Curvature of the evidence where it says nothing.
+FLAT = 0.1  # numerical: ρ is then known to a few units, its limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +40,15 @@ class EdgePrior:
 
     `size` is the root mean square of the equation's right-hand side, `pieces` the number of pieces
     of log λ; `hats` (K', pieces) spreads them over the second differences `bends` (K', K).  The ρ
-    of an edge holds its pieces, and the step's where there is a step.
+    of an edge holds its pieces, and the step's where there is a step; `largest` is the prior's
+    standard deviation of a discrepancy, in units of `size`.
     """
 
     plan: EdgePlan
     at: np.ndarray
     size: float
     pieces: int = 1
+    largest: float = USUAL.largest
 
     @functools.cached_property
     def bends(self) -> np.ndarray:
@@ -74,7 +72,8 @@ class EdgePrior:
         """Λ (K, K) at ρ (count,)."""
         weight = np.exp(self.hats @ rho[: self.pieces])
         full = self.bends.T @ (weight[:, None] * self.bends)
-        full[np.diag_indices(len(full))] += 1.0 / (len(full) * (LARGEST * self.size) ** 2)
+        full[np.diag_indices(len(full))] += 1.0 / (
+            len(full) * (self.largest * self.size) ** 2)
         if self.plan.step:
             full[-1, -1] += np.exp(rho[-1]) / self.size**2
         return full
@@ -99,6 +98,7 @@ class Smoothness:
 
     priors: tuple[EdgePrior, ...]
     weak: np.ndarray
+    settings: DiscrepancySettings = USUAL
 
     @property
     def stiff(self) -> np.ndarray:
@@ -164,19 +164,21 @@ class Smoothness:
             gradient += [0.5 * float(np.sum(spread * slope) + c @ slope @ c)
                          for slope in prior.slopes(own)]
         steps, back = self._steps(rho)
-        off = (rho - USUAL) / SPREAD
+        off = (rho - self.settings.usual) / self.settings.spread
         cost += 0.5 * float(steps @ steps) + 0.5 * float(off @ off)
-        return cost, np.array(gradient) + back + off / SPREAD
+        return cost, np.array(gradient) + back + off / self.settings.spread
 
     def _steps(self, rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Differences of neighbouring pieces over STEP, and the gradient of half their square."""
-        steps, back = [], []
+        """Differences of neighbouring pieces over their prior deviation, and the gradient of half
+        their square.
+        """
+        steps, back, usual = [], [], self.settings.step
         for prior, own in zip(self.priors, self.split(rho), strict=True):
-            step = np.diff(own[: prior.pieces]) / STEP
+            step = np.diff(own[: prior.pieces]) / usual
             steps.append(step)
             edge = np.zeros(len(own))
-            edge[1: prior.pieces] += step / STEP
-            edge[: prior.pieces - 1] -= step / STEP
+            edge[1: prior.pieces] += step / usual
+            edge[: prior.pieces - 1] -= step / usual
             back.append(edge)
         return np.concatenate(steps), np.concatenate(back)
 
@@ -189,7 +191,7 @@ class Smoothness:
         from scipy.stats import norm, qmc
 
         values, vectors = np.linalg.eigh(np.linalg.inv(self.curvature(A, b, rho)))
-        unit = norm.ppf(qmc.Sobol(len(rho), seed=0).random(DRAWS))
+        unit = norm.ppf(qmc.Sobol(len(rho), seed=0).random(self.settings.plausible))
         drawn = rho + WIDER * unit @ (vectors * np.sqrt(values)).T
         drawn = np.clip(drawn, ROUGHEST, SMOOTHEST)
         log = np.array([-self.cost(A, b, r)[0] for r in drawn]) + 0.5 * np.sum(unit**2, axis=1)
