@@ -107,7 +107,7 @@ def test_a_patch_is_the_same_curve_as_what_was_fitted() -> None:
     model = systems.sloshing()
     (site,) = sites(model, (quick(np.linspace(0.0, 5.0, 101), 0.5),))
     edge: Any = SimpleNamespace(argument="theta", curve=SimpleNamespace(low=-0.3, high=0.5))
-    basis = _Basis(edge)
+    basis = _Basis(edge, model)
     # all cubic splines on these intervals, but for the straight line
     assert len(basis.names) == INTERVALS + DEGREE - 1
     rng = np.random.default_rng(2)
