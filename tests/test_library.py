@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from pikanid.symbolic.library import LIBRARY, Kind, Knob, user_form
-from pikanid.symbolic.naming import SIMPLER, priors
+from pikanid.symbolic.naming import priors
+from pikanid.symbolic.settings import USUAL
 
 POWERS = {"rate": -1, "signed rate": -1, "frequency": -1, "exponent": 0}
 RANGES = [(-1.0, 1.0), (0.5, 2.5), (-7.0, -1.0)]
@@ -63,7 +64,7 @@ def test_a_form_moved_or_mirrored_is_of_its_family() -> None:
     # two forms of a family with as many constants share what one alone would have
     assert share["shifted reciprocal"] == share["mirrored reciprocal"]
     assert share["linear"] == pytest.approx(share["quadratic"])
-    assert share["shifted cubic"] == pytest.approx(share["cubic"] / SIMPLER)
+    assert share["shifted cubic"] == pytest.approx(share["cubic"] / USUAL.simpler)
     assert sum(share.values()) == pytest.approx(1.0)
 
 

@@ -19,8 +19,7 @@ from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import FormFit
 from pikanid.symbolic.numeric import Array
 
-PIECES = (6, 12, 24, 48)
-ALPHA = 1e-3
+PIECES = (6, 12, 24, 48)  # numerical: cells of the splines that look at what is left
 
 
 @dataclass(frozen=True, eq=False)

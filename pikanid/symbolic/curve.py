@@ -16,10 +16,10 @@ import numpy as np
 from pikanid import errors
 from pikanid.symbolic.numeric import Array
 
-FEWEST = 8  # points that can name anything
-SHOWN = 0.05  # of a function's size: with less left beside the free columns it is theirs
-INFORMED = 1e-9  # of the largest: eigenvalues of an information matrix that are not rounding
-EXACT = 1e-6  # of the spread of y: closer than this nothing is told apart
+FEWEST = 8  # limit: points that can name anything
+SHOWN = 0.05  # numerical: of a function's size: with less left beside the free columns it is theirs
+INFORMED = 1e-9  # numerical: of the largest eigenvalue: those below are rounding
+EXACT = 1e-6  # numerical: of the spread of y: closer than this nothing is told apart
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,9 +51,9 @@ class Drawable(Protocol):
 
 
 LINE, FAINT, BAND, NODE = "#0072B2", "#999999", "#A6CBE3", "#222222"
-COLUMN, ROW, PLOT = 3.6, 1.75, (1.75, 1.05)  # inches
-THIN, THICK = 0.7, 5.0
-NORMAL_95 = 1.959963984540054
+COLUMN, ROW, PLOT = 3.6, 1.75, (1.75, 1.05)  # layout: in inches
+THIN, THICK = 0.7, 5.0  # layout: line widths
+NORMAL_95 = 1.959963984540054  # definition: quantile of the normal distribution
 
 
 def draw(reading: Drawable, *paths: str | Path) -> Figure:

@@ -9,6 +9,7 @@ from pikanid.symbolic.library import LIBRARY, Form
 from pikanid.symbolic.network import read_network
 from pikanid.symbolic.numeric import Array
 from pikanid.symbolic.reading import Reading
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 
 if TYPE_CHECKING:
     from pikanid.recording import Recording
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 def extract(source: Any, x: Array | None = None, y: Array | None = None, *,
             inputs: Sequence[str] | None = None, library: Sequence[Form] = LIBRARY,
             alpha: float = 0.01,
-            recordings: Recording | Sequence[Recording] | None = None) -> Reading:
+            recordings: Recording | Sequence[Recording] | None = None,
+            settings: SymbolicSettings = USUAL) -> Reading:
     """Read a network as a formula with standard errors.
 
     Args:
@@ -30,6 +32,7 @@ def extract(source: Any, x: Array | None = None, y: Array | None = None, *,
         library: The forms that compete, `LIBRARY` and any `user_form`.
         alpha: Level at which an edge of a pykan model is significant.
         recordings: Of a discrepancy, to refit what was read inside the ODE and choose by the data.
+        settings: Priors, levels of tests, budgets.
 
     Returns:
         Reading, whose `expression` and `parameters` go into `model.with_term`.
@@ -51,7 +54,8 @@ def extract(source: Any, x: Array | None = None, y: Array | None = None, *,
     from pikanid.symbolic.saved import read_estimate
 
     if isinstance(source, Estimate):
-        return read_estimate(source, library)
+        return read_estimate(source, library, settings)
     if isinstance(source, Discrepancy):
-        return read_discrepancy(source, library, recordings)
-    return read_network(source, x, y, inputs=inputs, library=library, alpha=alpha)
+        return read_discrepancy(source, library, recordings, settings)
+    return read_network(source, x, y, inputs=inputs, library=library, alpha=alpha,
+                        settings=settings)

@@ -17,12 +17,10 @@ from pikanid.optimise.levenberg_marquardt import descend
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.library import Form
 from pikanid.symbolic.numeric import Array
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 
-SEARCHED = 400  # points of the first search
-STARTS = 2
-ITERATIONS = 60
-ROUNDING = 1e-9  # of the range: samples that are closer are one
-GAIN = 1e-6  # relative decrease below which no ranking changes
+ROUNDING = 1e-9  # numerical: of the range: samples that are closer are one
+GAIN = 1e-6  # numerical: relative decrease below which no ranking changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,23 +47,24 @@ class FormFit:
         return bool(np.isfinite(self.rss))
 
 
-def fit_form(form: Form, curve: Curve) -> FormFit | None:
+def fit_form(form: Form, curve: Curve, settings: SymbolicSettings = USUAL
+             ) -> FormFit | None:
     """The least-squares fit; None where there is none on the curve's range."""
     if not form.fits_range(curve.low, curve.high) or curve.rows < form.count:
         return None  # or the curve knows fewer numbers than the form has
     if not form.knobs:
         return _finish(form, curve, np.empty(0))
-    starts = _search(form, curve)
+    starts = _search(form, curve, settings)
     if form.smooth:
-        starts = [_descend(form, curve, start) for start in starts]
+        starts = [_descend(form, curve, start, settings.iterations) for start in starts]
     fits = [f for f in (_finish(form, curve, p) for p in starts) if f is not None]
     return min(fits, key=lambda f: f.rss, default=None)
 
 
-def _search(form: Form, curve: Curve) -> list[Array]:
+def _search(form: Form, curve: Curve, settings: SymbolicSettings) -> list[Array]:
     """The best places of a grid, apart from each other."""
     count = len(curve.x)
-    thin = curve.thinned(SEARCHED)
+    thin = curve.thinned(settings.searched)
     x, free = thin(curve.x), thin(curve.free.T)
     grids = [k.grid(curve.low, curve.high, count) for k in form.knobs]
     if not form.smooth:  # a step: between any two samples
@@ -78,10 +77,10 @@ def _search(form: Form, curve: Curve) -> list[Array]:
         near = [np.all(np.abs(mesh[i] - q) <= 2.01 * _spacing(grids, q)) for q in found]
         if not any(near):
             found.append(mesh[i])
-        if len(found) == STARTS:
+        if len(found) == settings.starts:
             break
     if not form.smooth and found:
-        found = [_nearest_gap(form, curve, q) for q in found]
+        found = [_nearest_gap(form, curve, q, settings.searched) for q in found]
     return found
 
 
@@ -97,11 +96,11 @@ def _gaps(x: Array) -> Array:
     return (at[:-1] + 0.5 * gap)[gap > ROUNDING * (at[-1] - at[0])]
 
 
-def _nearest_gap(form: Form, curve: Curve, q: Array) -> Array:
+def _nearest_gap(form: Form, curve: Curve, q: Array, searched: int) -> Array:
     """The best place of a step among all samples around q."""
     middle = _gaps(curve.x)
     k = int(np.searchsorted(middle, q[0]))
-    width = 1 + len(middle) // SEARCHED
+    width = 1 + len(middle) // searched
     near = middle[max(0, k - 2 * width):k + 2 * width + 1]
     rss = _profile(form, curve, near[:, None], curve.x, curve.free.T, lambda f: f)
     return near[[int(np.argmin(rss))]]
@@ -188,10 +187,10 @@ def _linear(form: Form, curve: Curve, p: Array) -> _Projected | None:
     return _Projected(form, curve, p, raw, phi, q, a, curve.centred - q @ part)
 
 
-def _descend(form: Form, curve: Curve, start: Array) -> Array:
+def _descend(form: Form, curve: Curve, start: Array, iterations: int) -> Array:
     """Levenberg-Marquardt on the projected residual, within the parameters' limits."""
     lower, upper = np.array([k.limits(curve.low, curve.high, len(curve.x)) for k in form.knobs]).T
-    found = descend(lambda p: _linear(form, curve, p), start, lower, upper, ITERATIONS,
+    found = descend(lambda p: _linear(form, curve, p), start, lower, upper, iterations,
                     lambda at: max(GAIN * at.cost, 1e-26 * curve.total))
     return start if found is None else found.theta
 

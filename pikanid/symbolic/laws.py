@@ -19,10 +19,11 @@ from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import FormFit
 from pikanid.symbolic.library import NOTHING, X
 from pikanid.symbolic.named import NO_SIMPLE_FORM, NamedEdge
-from pikanid.symbolic.reading import ADEQUATE, Reading
+from pikanid.symbolic.reading import Reading
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 from pikanid.symbolic.significance import Contribution
 
-POINTS = 100  # that tell apart what is inside a law
+POINTS = 100  # numerical: that tell apart what is inside a law
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,8 @@ def reading_of_laws(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Seq
                     ranges: Sequence[tuple[float, float]],
                     contributions: Sequence[Contribution], share: np.ndarray,
                     labels: Sequence[str], covariance: np.ndarray,
-                    estimate: Estimate | None = None) -> Reading:
+                    estimate: Estimate | None = None,
+                    settings: SymbolicSettings = USUAL) -> Reading:
     """The answer; `estimate` is of the model with the laws in it, where they were refitted."""
     off, size, adequate = 0.0, 0.0, [1.0]
     for place, edge in named.items():
@@ -117,7 +119,7 @@ def reading_of_laws(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Seq
         adequate.append(next(c.adequacy for c in edge.candidates if c.form is fit.form))
     p_value = min(adequate) if estimate is None else estimate.adequacy.p_value
     if estimate is not None and estimate.adequacy.verdict == "fits":
-        p_value = max(p_value, ADEQUATE)  # the verdict counts where no noise was stated
+        p_value = max(p_value, settings.adequate)  # the verdict counts where no noise was stated
     return Reading(
         laws.expression, tuple(p.name for p in laws.parameters),
         np.array([p.value for p in laws.parameters]), covariance, tuple(arguments), tuple(ranges),
@@ -125,7 +127,7 @@ def reading_of_laws(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Seq
         tuple(zip(labels[1:], map(float, share[1:]), strict=False)), float(np.sqrt(off)),
         None if estimate is None else estimate.rmse, float(np.sqrt(size)), float(p_value),
         {place: laws.fits[place].form.name if place in laws.fits else edge.name
-         for place, edge in named.items()}, estimate=estimate)
+         for place, edge in named.items()}, estimate=estimate, settings=settings)
 
 
 def _apart(curve: Curve, values: np.ndarray) -> np.ndarray:

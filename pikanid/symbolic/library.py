@@ -23,8 +23,8 @@ from pikanid.symbolic.numeric import Array, Compiled, compiled, slopes
 Kind = Literal["location", "below", "above", "width", "rate", "signed rate", "frequency",
                "exponent"]
 X = symbol("x")
-MOST_TURNS = 40.0  # largest frequency, in radians over half the range
-DENSE = 1.5  # narrowest feature, in mean distances of samples
+MOST_TURNS = 40.0  # limit: radians of a frequency over half the range
+DENSE = 1.5  # limit: of the narrowest feature, in mean distances of samples
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ LIBRARY: tuple[Form, ...] = (
     _form("shifted dead zone", "dead zone", "dead_zone(x - c, w)", "w width,c location", (1,)),
     _form("piecewise linear", "piecewise linear", "x;abs(x - c)", "c location", (1, 1)),
     *_polynomials(),
-)
+)  # definition: the forms that compete
 
 
 def user_form(expression: sp.Expr | str, argument: str = "x", name: str | None = None) -> Form:

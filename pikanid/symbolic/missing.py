@@ -28,24 +28,22 @@ from pikanid.symbolic.library import NOTHING, Form
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.naming import name_curve, priors
 from pikanid.symbolic.reading import Reading, probabilities
-from pikanid.symbolic.saved import REST, RESTING
+from pikanid.symbolic.saved import REST
 from pikanid.symbolic.search import shortlist
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 from pikanid.symbolic.significance import Contribution
 
-DRAWN = 120  # points of an edge that are compared
-TRIED = 4  # laws an edge that are put into the equation
-MOST = 16  # combinations of them
-SIMPLER = 2  # laws that one contains, put into the equation beside it
-STEEP = 0.4  # least exponent of a law that steps can follow through zero
-NEAR = 1e-6  # of a parameter's range: at its end
-UNLIKELY = 30.0  # difference of scores: odds of three millions to one
+DRAWN = 120  # numerical: points of an edge that are compared
+STEEP = 0.4  # limit: least exponent of a law that steps can follow through zero
+NEAR = 1e-6  # numerical: of a parameter's range: at its end
 
 
 def read_discrepancy(found: Discrepancy, library: Sequence[Form],
-                     recordings: Recording | Sequence[Recording] | None = None) -> Reading:
+                     recordings: Recording | Sequence[Recording] | None = None,
+                     settings: SymbolicSettings = USUAL) -> Reading:
     """A formula for what is missing; without recordings, by the edges alone."""
     places = {(0, k, 0): edge for k, edge in enumerate(found.edges)}
-    named = {place: name_curve(edge_curve(edge, found.estimate.n), library)
+    named = {place: name_curve(edge_curve(edge, found.estimate.n), library, settings)
              for place, edge in places.items() if edge.significant}
     arguments = [e.argument for e in found.edges]
     ranges = [e.range for e in found.edges]
@@ -55,12 +53,13 @@ def read_discrepancy(found: Discrepancy, library: Sequence[Form],
     if not named or recordings is None:
         laws = sum_of_laws(found.nominal.model, arguments, chosen(named), ranges, found.unit)
         share = np.array([float(np.prod([e.probability for e in named.values()]))])
-        stuck = [found.edges[k].argument for _, k, _ in named if sticks(found.edges[k])]
+        stuck = [found.edges[k].argument for _, k, _ in named
+                 if sticks(found.edges[k], settings)]
         return replace(
             reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
-                            laws.covariance),
+                            laws.covariance, settings=settings),
             caution=errors.edge_sticks(stuck) if stuck else "")
-    tried = _tried(found, named, recordings, priors(library))
+    tried = _tried(found, named, recordings, priors(library, settings), settings)
     share = probabilities([score for score, _, _ in tried])
     _, laws, estimate = tried[0]
     at = [estimate.index(p.name) for p in laws.parameters]
@@ -69,10 +68,10 @@ def read_discrepancy(found: Discrepancy, library: Sequence[Form],
         for p, k in zip(laws.parameters, at, strict=True)))
     return reading_of_laws(refitted, named, arguments, ranges, weights, share,
                            [one.label for _, one, _ in tried],
-                           estimate.covariance[np.ix_(at, at)], estimate)
+                           estimate.covariance[np.ix_(at, at)], estimate, settings)
 
 
-def sticks(edge: Edge) -> bool:
+def sticks(edge: Edge, settings: SymbolicSettings = USUAL) -> bool:
     """Whether a jump holds its argument at zero for a while.
 
     How long depends on everything else, by no linear model: what such an edge says of its own law
@@ -80,7 +79,7 @@ def sticks(edge: Edge) -> bool:
     """
     reach = max(abs(edge.range[0]), abs(edge.range[1]))
     resting = float(edge.gauge.weights[np.abs(edge.gauge.a) < REST * reach].sum())
-    return edge.jump_probability > 0.5 and resting > RESTING
+    return edge.jump_probability > settings.jumps and resting > settings.resting
 
 
 def edge_curve(edge: Edge, samples: int) -> Curve:
@@ -94,8 +93,8 @@ def edge_curve(edge: Edge, samples: int) -> Curve:
 
 
 def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
-           recordings: Recording | Sequence[Recording], weights: Mapping[str, float]
-           ) -> list[tuple[float, Laws, Estimate]]:
+           recordings: Recording | Sequence[Recording], weights: Mapping[str, float],
+           settings: SymbolicSettings = USUAL) -> list[tuple[float, Laws, Estimate]]:
     """Laws inside the ODE, best first: BIC less twice the log of the prior, law, estimate.
 
     The likely laws of every edge in all combinations, then what is simpler than one of them: where
@@ -125,7 +124,7 @@ def _tried(found: Discrepancy, named: Mapping[Place, NamedEdge],
         return sorted((r for r in results.values() if r is not None), key=lambda r: r[0])
 
     lists = [[(place, fit) for fit in _likely(edge)] for place, edge in named.items()]
-    for choice in islice(product(*lists), MOST):
+    for choice in islice(product(*lists), settings.combinations):
         put_in(dict(choice))
     if not ranked():
         raise errors.SimulationFailed(errors.no_law_simulated())
@@ -146,8 +145,9 @@ def _likely(edge: NamedEdge) -> list[FormFit]:
     # an edge knows its law by a linear model: where none fits, that says less than it claims
     freedom = max(edge.curve.rows - first.form.count + 1, 1)
     doubt = max(1.0, first.rss / freedom)
-    near = [f for f in laws if scores[f.form.name] <= scores[first.form.name] + doubt * UNLIKELY]
-    return sorted(near, key=lambda f: scores[f.form.name])[:TRIED]
+    worst = scores[first.form.name] + doubt * edge.settings.unlikely
+    near = [f for f in laws if scores[f.form.name] <= worst]
+    return sorted(near, key=lambda f: scores[f.form.name])[:edge.settings.laws]
 
 
 def _at_limit(fit: FormFit, edge: NamedEdge) -> bool:
@@ -167,7 +167,7 @@ def _simpler(edge: NamedEdge, form: Form) -> list[FormFit]:
     found = [c for c in edge.candidates
              if c.form is not NOTHING and c.form.count < form.count
              and (c.form.family == form.family or set(c.form.columns) < set(form.columns))]
-    return [c.fit for c in sorted(found, key=lambda c: c.score)[:SIMPLER]]
+    return [c.fit for c in sorted(found, key=lambda c: c.score)[:edge.settings.contained]]
 
 
 def _extended(found: Discrepancy, law: Laws) -> Model:

@@ -14,9 +14,10 @@ from pikanid.formula.expressions import symbol
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import FormFit
 from pikanid.symbolic.library import NOTHING, Form, X
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 
 NO_SIMPLE_FORM = "no simple form"
-SHOWN = 5
+SHOWN = 5  # layout: candidates in a table
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +97,14 @@ class NamedEdge:
         unnamed: Probability of "no simple form".
         noise: Standard deviation of the noise that is left (1 where it was given), in whitened
             units.
+        settings: By which it was named.
     """
 
     curve: Curve
     candidates: tuple[Candidate, ...]
     unnamed: float
     noise: float
+    settings: SymbolicSettings = USUAL
 
     @property
     def best(self) -> Candidate:

@@ -27,20 +27,20 @@ from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.naming import name_curve, priors
 from pikanid.symbolic.numeric import Array
 from pikanid.symbolic.prune import prune
-from pikanid.symbolic.reading import CLOSE, Reading, probabilities
+from pikanid.symbolic.reading import Reading, probabilities
 from pikanid.symbolic.refit import Refit, covariance
 from pikanid.symbolic.search import Ranked, search
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 from pikanid.symbolic.significance import Contribution, contributions
 from pikanid.symbolic.tidy import tidied
 
-COMPETE = 3  # readings that are tidied before the best is chosen
-DRAWN = 120  # points of an edge that are compared
-TRUE_TO = 0.01  # of its spread: how far a network without data is believed
+DRAWN = 120  # numerical: points of an edge that are compared
 
 
 def read_network(kan: Any, x: Array | None = None, y: Array | None = None, *,
                  inputs: Sequence[str] | None = None, library: Sequence[Form] = LIBRARY,
-                 alpha: float = 0.01, units: tuple[Sequence[str], str] | None = None) -> Reading:
+                 alpha: float = 0.01, units: tuple[Sequence[str], str] | None = None,
+                 settings: SymbolicSettings = USUAL) -> Reading:
     """A pykan model with one output as a formula; the model stays as it is.
 
     Args:
@@ -51,6 +51,7 @@ def read_network(kan: Any, x: Array | None = None, y: Array | None = None, *,
         library: The forms that compete.
         alpha: Level at which edges are significant.
         units: Units of the inputs, and of the output.
+        settings: Priors, levels of tests, budgets.
     """
     seen = kan.cache_data if x is None else x
     if seen is None:
@@ -61,40 +62,42 @@ def read_network(kan: Any, x: Array | None = None, y: Array | None = None, *,
     if len(names) != x.shape[1]:
         raise errors.BadSetting(errors.reading_inputs(x.shape[1], names))
     if y is None:
-        fit, removed = _alone(plain(kan, x), x)
+        fit, removed = _alone(plain(kan, x), x, settings.close)
         y_own = arguments(kan, x)[-1][:, 0]
     else:
         pruned = prune(kan, x, np.asarray(y, float), alpha=alpha)
         fit, removed, y_own = pruned.fit, pruned.removed, np.asarray(y, float).ravel()
-    named = name_edges(fit, x, y is not None, library, names)
+    named = name_edges(fit, x, y is not None, library, names, settings)
     groups = groups_of(fit.network.plan)
     offsets = [read(b) for b in fit.kan.subnode_bias]
     formulas = tuple(_formula(n) for n in names)
-    exact = EXACT if y is not None else TRUE_TO
-    weights = priors(library) | {NOTHING.name: 1.0}
-    found = search(groups, formulas, named, offsets, x, y_own, weights, exact)
+    exact = EXACT if y is not None else settings.believed
+    weights = priors(library, settings) | {NOTHING.name: 1.0}
+    found = search(groups, formulas, named, offsets, x, y_own, weights, exact, settings)
     if not found:
         raise errors.BadSetting(errors.nothing_read())
-    found = _tidied_first(found, x, y_own, exact)
+    found = _tidied_first(found, x, y_own, exact, settings)
     share = probabilities([r.score for r in found])
     return _reading(found[0].fit, fit, x, y_own, y is not None, names, named,
                     (*contributions(fit, x), *removed), share,
-                    [_label(r.fit) for r in found], units)
+                    [_label(r.fit) for r in found], units, settings)
 
 
-def _tidied_first(found: Sequence[Ranked], x: Array, y: Array, exact: float) -> list[Ranked]:
+def _tidied_first(found: Sequence[Ranked], x: Array, y: Array, exact: float,
+                  settings: SymbolicSettings) -> list[Ranked]:
     """Those that compete, without the constants that they do not need, ranked again.
 
     An offset that one form needs and another has at zero would count against both alike.
     """
     reach = found[0].score + 2.0 * float(np.log(len(x)))
-    close = [r for r in found[:COMPETE] if r.score <= reach]
+    close = [r for r in found[:settings.compete] if r.score <= reach]
     done = [Ranked(fit, r.score + fit.score - r.fit.score)
-            for r in close for fit in [tidied(r.fit, x, y, exact)]]
+            for r in close for fit in [tidied(r.fit, x, y, exact, settings.evaluations)]]
     return sorted([*done, *found[len(close):]], key=lambda r: r.score)
 
 
-def _alone(kan: Any, x: Array) -> tuple[PointFit, tuple[Contribution, ...]]:
+def _alone(kan: Any, x: Array, close: float
+           ) -> tuple[PointFit, tuple[Contribution, ...]]:
     """A network without data: edges that hardly move its output go."""
     y = arguments(kan, x)[-1][:, 0]
     fit = fit_points(kan, x, y, iterations=0)
@@ -102,7 +105,7 @@ def _alone(kan: Any, x: Array) -> tuple[PointFit, tuple[Contribution, ...]]:
     while len(edges_of(fit.network)) > 1:
         weakest = min((c for c in contributions(fit, x) if c.target is not None),
                       key=lambda c: c.size)
-        if weakest.size > CLOSE * float(np.std(y)):
+        if weakest.size > close * float(np.std(y)):
             break
         removed.append(weakest)
         smaller = without_edge(fit.kan, weakest.layer, weakest.source, weakest.target or 0)
@@ -111,7 +114,8 @@ def _alone(kan: Any, x: Array) -> tuple[PointFit, tuple[Contribution, ...]]:
 
 
 def name_edges(fit: PointFit, x: Array, with_noise: bool, library: Sequence[Form],
-               inputs: Sequence[str]) -> dict[Place, NamedEdge]:
+               inputs: Sequence[str], settings: SymbolicSettings = USUAL
+               ) -> dict[Place, NamedEdge]:
     """Every active edge named on its own, with its own uncertainty where there is one."""
     c = fit.network.coefficients
     entering = arguments(fit.kan, x)
@@ -126,8 +130,9 @@ def name_edges(fit: PointFit, x: Array, with_noise: bool, library: Sequence[Form
             V = fit.covariance(edge.at, beside(edges, edge))
             curve = Curve.of_spline(at, basis, c[edge.at], V, samples=len(x), argument=label)
         else:
-            curve = Curve.of_points(at, basis @ c[edge.at], argument=label, exact=TRUE_TO)
-        named[edge.layer, edge.source, edge.target] = name_curve(curve, library)
+            curve = Curve.of_points(at, basis @ c[edge.at], argument=label,
+                                    exact=settings.believed)
+        named[edge.layer, edge.source, edge.target] = name_curve(curve, library, settings)
     return named
 
 
@@ -148,7 +153,8 @@ def _label(fit: Refit) -> str:
 
 def _reading(best: Refit, fit: PointFit, x: Array, y: Array, noisy: bool, names: tuple[str, ...],
              named: Mapping[Place, NamedEdge], weights: Sequence[Any], share: Array,
-             labels: Sequence[str], units: tuple[Sequence[str], str] | None) -> Reading:
+             labels: Sequence[str], units: tuple[Sequence[str], str] | None,
+             settings: SymbolicSettings) -> Reading:
     from scipy.stats import f as fisher
 
     made, V = best.composition, covariance(best, x, y)
@@ -175,4 +181,4 @@ def _reading(best: Refit, fit: PointFit, x: Array, y: Array, noisy: bool, names:
         float(np.sqrt(np.mean((value - network) ** 2))),
         float(np.sqrt(best.rss / len(y))) if noisy else None, float(np.std(y)), p_value,
         {p: form.name for p, form, _ in made.edges}, kan=fit.kan, composition=made,
-        theta=best.theta)
+        theta=best.theta, settings=settings)

@@ -16,16 +16,16 @@ from pikanid.estimate import Estimate
 from pikanid.estimate.estimate import rounded
 from pikanid.formula.expressions import symbol
 from pikanid.model import Parameter
+from pikanid.settings import changed, told
 from pikanid.symbolic.composed import Composition, Groups, Place
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.numeric import Array, compiled
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 from pikanid.symbolic.significance import Contribution
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ADEQUATE = 1e-3  # level of the test against the network
-CLOSE = 0.03  # share of the spread that may be left where no data can judge
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,7 @@ class Reading:
             with all its constants.
         estimate: Of the model with the formula in it, where it was refitted inside an ODE.
         caution: Why the formula cannot be trusted whatever its fit, or "".
+        settings: By which it was read.
     """
 
     expression: sp.Expr
@@ -75,6 +76,7 @@ class Reading:
     theta: Array = field(default_factory=lambda: np.empty(0), repr=False)
     estimate: Estimate | None = field(default=None, repr=False)
     caution: str = ""
+    settings: SymbolicSettings = USUAL
 
     @property
     def ok(self) -> bool:
@@ -82,8 +84,8 @@ class Reading:
         if self.caution:
             return False
         if self.p_value is not None:
-            return self.p_value >= ADEQUATE
-        return self.error_network <= CLOSE * self.spread
+            return self.p_value >= self.settings.adequate
+        return self.error_network <= self.settings.close * self.spread
 
     @property
     def std(self) -> Array:
@@ -159,6 +161,7 @@ class Reading:
         lines += [f"  {n} = {v} {u}".rstrip() for n, v, u in self.rows()]
         lines += [f"  {self.sentence()}"]
         lines += [f"  {p:7.3f}  {text}" for text, p in self.alternatives[:3]]
+        lines += [f"  {told(self.settings)}"] if changed(self.settings) else []
         return "\n".join(lines)
 
     __repr__ = __str__

@@ -10,11 +10,11 @@ import numpy as np
 from pikanid.symbolic.composed import Composition
 from pikanid.symbolic.curve import EXACT
 from pikanid.symbolic.numeric import Array
+from pikanid.symbolic.settings import USUAL
 
-REFUSED = 1e10
-EVALUATIONS = 200
-RANK = 1e-7  # of column-scaled Jacobians
-CROSSING = 0.3  # of its spread: a typical sum's mean
+REFUSED = 1e10  # numerical: times the spread: no step towards it survives
+RANK = 1e-7  # numerical: of column-scaled Jacobians
+CROSSING = 0.3  # numerical: of its spread: a typical sum's mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Refit:
 
 def refit(composition: Composition, theta: Array, x: Array, y: Array, generic: Array,
           held: Array | None = None, exact: float = EXACT,
-          evaluations: int = EVALUATIONS) -> Refit | None:
+          evaluations: int = USUAL.evaluations) -> Refit | None:
     """Least squares from θ with some parameters held; None where the formula is not finite."""
     from scipy.optimize import least_squares
 

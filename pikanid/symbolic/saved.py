@@ -17,13 +17,15 @@ from pikanid.symbolic.laws import chosen, reading_of_laws, sum_of_laws
 from pikanid.symbolic.library import Form
 from pikanid.symbolic.naming import name_curve
 from pikanid.symbolic.reading import Reading
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 from pikanid.symbolic.significance import Contribution
 
-DRAWN = 120
-REST, RESTING = 1e-9, 1e-3  # of the range: as good as zero; share of the samples spent there
+DRAWN = 120  # numerical: points of an edge that are compared
+REST = 1e-9  # numerical: of the range: as good as zero
 
 
-def read_estimate(estimate: Estimate, library: Sequence[Form]) -> Reading:
+def read_estimate(estimate: Estimate, library: Sequence[Form],
+                  settings: SymbolicSettings = USUAL) -> Reading:
     """Every edge that `kan_discrepancy` put into the model, with its covariance.
 
     What edges and parameters can do in each other's place has a large variance, and so does not
@@ -44,7 +46,7 @@ def read_estimate(estimate: Estimate, library: Sequence[Form]) -> Reading:
         basis = plan.basis(a)
         curve = Curve.of_spline(a, basis, c, np.nan_to_num(V), samples=estimate.n,
                                 argument=plan.argument)
-        edge = named[0, k, 0] = name_curve(curve, library)
+        edge = named[0, k, 0] = name_curve(curve, library, settings)
         nothing = next(x for x in edge.candidates if not x.form.columns)
         values = basis @ c
         std = np.zeros(len(a)) if curve.std is None else curve.std
@@ -54,20 +56,20 @@ def read_estimate(estimate: Estimate, library: Sequence[Form]) -> Reading:
     ranges = [e.range for e in named.values()]
     laws = sum_of_laws(estimate.model, arguments, chosen(named), ranges)
     share = np.array([float(np.prod([e.probability for e in named.values()]))])
-    stuck = [p.argument for p in plans if p.step and _rests(estimate, p.argument)]
+    stuck = [p.argument for p in plans if p.step and _rests(estimate, p.argument, settings)]
     return replace(
         reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
-                        laws.covariance),
+                        laws.covariance, settings=settings),
         caution=errors.edge_sticks(stuck) if stuck else "")
 
 
-def _rests(estimate: Estimate, argument: str) -> bool:
+def _rests(estimate: Estimate, argument: str, settings: SymbolicSettings) -> bool:
     """Whether the fitted motion stays where an argument is zero; taken for granted where unseen."""
     names = estimate.model.state_names
     if argument not in names:
         return True
     a = np.concatenate([np.abs(p.x[:, names.index(argument)]) for p in estimate.trajectories])
-    return bool(np.mean(a < REST * a.max()) > RESTING)
+    return bool(np.mean(a < REST * a.max()) > settings.resting)
 
 
 def _plans(estimate: Estimate) -> list[EdgePlan]:

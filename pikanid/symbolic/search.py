@@ -20,14 +20,10 @@ from pikanid.symbolic.library import NOTHING, Form
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.numeric import Array
 from pikanid.symbolic.refit import Refit, generic_jacobian, refit
+from pikanid.symbolic.settings import USUAL, SymbolicSettings
 
-TRIED = 7  # forms an edge
 SIMPLE = ("linear", "quadratic")
-OUTER = 3  # starts
-SEARCHED = 400  # data that a first choice is made on
-POLISHED = 8  # compositions that all data then rank
-FAINT = 1e-2  # of the loudest: least weight of a value that the output hardly depends on
-QUICK = 40  # evaluations of a first try
+FAINT = 1e-2  # numerical: of the loudest: least weight of a value that the output hardly depends on
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +47,12 @@ def shortlist(edge: NamedEdge) -> list[FormFit]:
     simple = [best.pop(name) for name in SIMPLE if name in best]
     ranked = list(best.values())
     first = sorted([*ranked[:1], *simple], key=lambda f: f.rss)
-    return [*first, *ranked[1:TRIED], *empty]
+    return [*first, *ranked[1:edge.settings.forms], *empty]
 
 
 def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, NamedEdge],
            offsets: Sequence[Array], x: Array, y: Array, priors: Mapping[str, float],
-           exact: float) -> list[Ranked]:
+           exact: float, settings: SymbolicSettings = USUAL) -> list[Ranked]:
     """Compositions that were tried to the end, best first.
 
     Args:
@@ -64,9 +60,10 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
         offsets: Constants of every layer's subnodes beside the edges' own.
         priors: Prior probability of every form, by name.
         exact: Share of the spread of y below which nothing is told apart.
+        settings: Budgets.
     """
     lists = {place: shortlist(edge) for place, edge in named.items()}
-    step = max(1, len(x) // SEARCHED)
+    step = max(1, len(x) // settings.glance)
     few, target = x[::step], y[::step]
     made: dict[tuple[str, ...], Ranked | None] = {}
     generic: dict[tuple[str, ...], Array] = {}
@@ -75,8 +72,9 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
         if _key(it) not in generic:
             generic[_key(it)] = generic_jacobian(it, few)
         shape = generic[_key(it)]
-        fit = (refit(it, theta, x, y, shape, exact=exact) if all_data else
-               refit(it, theta, few, target, shape, exact=exact, evaluations=QUICK))
+        fit = (refit(it, theta, x, y, shape, exact=exact, evaluations=settings.evaluations)
+               if all_data else
+               refit(it, theta, few, target, shape, exact=exact, evaluations=settings.quick))
         if fit is None or not np.isfinite(fit.score):
             return None
         prior = sum(np.log(priors[form.name]) for _, form, _ in it.edges)
@@ -97,10 +95,10 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
 
     def followed(best: Ranked, other: Composition, place: Place) -> Ranked | None:
         """From where the new form follows the old one best."""
-        theta = follow(best.fit, other, place, few)
+        theta = follow(best.fit, other, place, few, settings)
         return None if theta is None else ranked(other, theta)
 
-    for first in _starts(lists, len(groups)):
+    for first in _starts(lists, len(groups), settings.outer):
         now = Composition(groups, {p: f.form for p, f in first.items()}, inputs)
         best = made[_key(now)] = made.get(_key(now)) or ranked(now, _start(now, first, offsets))
         improved = True
@@ -115,7 +113,7 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
                     if trial and (best is None or trial.score < best.score - 1e-6):
                         best, now, improved = trial, trial.fit.composition, True
     for best in sorted((r for r in made.values() if r is not None),
-                       key=lambda r: r.score)[:POLISHED]:
+                       key=lambda r: r.score)[:settings.polished]:
         simpler: Ranked | None = best
         while simpler is not None:  # forms that have become others' limits give way to them
             best = made[_key(simpler.fit.composition)] = simpler
@@ -130,11 +128,12 @@ def search(groups: Groups, inputs: tuple[sp.Expr, ...], named: Mapping[Place, Na
             if simpler is not None and simpler.score > best.score - 1e-6:
                 simpler = None
     found = sorted((r for r in made.values() if r is not None), key=lambda r: r.score)
-    full = [ranked(r.fit.composition, r.fit.theta, True) for r in found[:POLISHED]]
+    full = [ranked(r.fit.composition, r.fit.theta, True) for r in found[:settings.polished]]
     return sorted((r for r in full if r is not None), key=lambda r: r.score)
 
 
-def follow(old: Refit, other: Composition, place: Place, x: Array) -> Array | None:
+def follow(old: Refit, other: Composition, place: Place, x: Array,
+           settings: SymbolicSettings = USUAL) -> Array | None:
     """Constants of `other`, which has another form in one place, that keep the old values there.
 
     The new form follows the old one over the arguments that it gets, weighted by what the output
@@ -153,7 +152,7 @@ def follow(old: Refit, other: Composition, place: Place, x: Array) -> Array | No
     heard = np.maximum(heard, FAINT * heard.max())
     if np.ptp(u) == 0.0 or not np.isfinite([u, values, heard]).all() or heard.max() == 0.0:
         return None
-    fit = fit_form(form, Curve.of_points(u, values, 1.0 / heard))
+    fit = fit_form(form, Curve.of_points(u, values, 1.0 / heard), settings)
     if fit is None:
         return None
     result = made.carried(theta, other, place, np.concatenate([fit.amplitudes, fit.inside]))
@@ -173,14 +172,15 @@ def _of(fits: list[FormFit], form: Form) -> FormFit:
     return next(f for f in fits if f.form is form)
 
 
-def _starts(lists: Mapping[Place, list[FormFit]], layers: int) -> list[dict[Place, FormFit]]:
+def _starts(lists: Mapping[Place, list[FormFit]], layers: int, outer: int
+            ) -> list[dict[Place, FormFit]]:
     """The best of every edge; where there are layers, with other forms in the last one too."""
     first = {place: fits[0] for place, fits in lists.items()}
     starts = [first]
     if layers > 1:
         for place in lists:
             if place[0] == layers - 1:
-                starts += [{**first, place: f} for f in lists[place][1:OUTER]]
+                starts += [{**first, place: f} for f in lists[place][1:outer]]
     return starts
 
 

@@ -14,22 +14,25 @@ from pikanid.symbolic.curve import EXACT
 from pikanid.symbolic.library import Form
 from pikanid.symbolic.numeric import Array
 from pikanid.symbolic.refit import Refit, generic_jacobian, refit
+from pikanid.symbolic.settings import USUAL
 
-ROWS = 200  # that tell which constants trade
-SLACK = 1e-2  # of BIC: a constant that another can replace costs nothing
+ROWS = 200  # numerical: that tell which constants trade
+SLACK = 1e-2  # numerical: of BIC: a constant that another can replace costs nothing
 
 
-def tidied(fit: Refit, x: Array, y: Array, exact: float = EXACT) -> Refit:
+def tidied(fit: Refit, x: Array, y: Array, exact: float = EXACT,
+           evaluations: int = USUAL.evaluations) -> Refit:
     """The same formula with fewer constants, refitted."""
     best, made = fit, fit.composition
     for k in _zeroes(made):
         theta = best.theta.copy()
         theta[k] = 0.0
-        best = _tried(best, theta, k, x, y, best.score + SLACK, exact)
+        best = _tried(best, theta, k, x, y, best.score + SLACK, exact,
+                      evaluations)
     for layer in range(len(made.groups)):
         for j, group in enumerate(made.groups[layer]):
             for s in group if len(group) > 1 or layer < len(made.groups) - 1 else ():
-                best = _unit_scale(best, layer, j, s, x, y, exact)
+                best = _unit_scale(best, layer, j, s, x, y, exact, evaluations)
     return best
 
 
@@ -43,19 +46,20 @@ def _zeroes(made: Composition) -> list[int]:
 
 
 def _tried(best: Refit, theta: Array, k: int, x: Array, y: Array, bar: float,
-           exact: float) -> Refit:
+           exact: float, evaluations: int) -> Refit:
     """With constant k held at θ_k, if the score stays below the bar."""
     if best.held[k]:
         return best
     held = best.held.copy()
     held[k] = True
     generic = generic_jacobian(best.composition, x[:: max(1, len(x) // ROWS)], theta, held)
-    other = refit(best.composition, theta, x, y, generic, held, exact)
+    other = refit(best.composition, theta, x, y, generic, held, exact,
+                  evaluations)
     return other if other is not None and other.score <= bar else best
 
 
 def _unit_scale(best: Refit, layer: int, j: int, s: int, x: Array, y: Array,
-                exact: float) -> Refit:
+                exact: float, evaluations: int) -> Refit:
     """A subnode scaled such that a rate behind it, or its first amplitude, is one."""
     if best.rank >= int(np.sum(~best.held)):
         return best
@@ -69,12 +73,14 @@ def _unit_scale(best: Refit, layer: int, j: int, s: int, x: Array, y: Array,
             place = at.start + len(form.columns) + k
             if knob.power == -1 and best.theta[place] != 0.0:
                 theta = _stretched(best, layer, j, s, float(best.theta[place]))
-                return _tried(best, theta, place, x, y, best.score + SLACK, exact)
+                return _tried(best, theta, place, x, y, best.score + SLACK, exact,
+                              evaluations)
     place = into[0][1].start
     if best.theta[place] == 0.0:
         return best
     theta = _stretched(best, layer, j, s, 1.0 / float(best.theta[place]))
-    return _tried(best, theta, place, x, y, best.score + SLACK, exact)
+    return _tried(best, theta, place, x, y, best.score + SLACK, exact,
+                  evaluations)
 
 
 def _stretched(best: Refit, layer: int, j: int, s: int, by: float) -> Array:
