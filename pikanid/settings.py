@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from math import inf
 from sys import float_info
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from pikanid import errors
 
@@ -41,6 +41,7 @@ class Range:
         return f"{number}, {self.low:g} or more" if self.low > -inf else number
 
 
+Kind = TypeVar("Kind")
 ASCENDING = "ascending"  # of a tuple
 Rate = Annotated[float, Range(0, 1, inside=True)]  # a probability; none is sure
 Share = Annotated[float, Range(0, 1)]
@@ -70,6 +71,18 @@ def check(settings: Any, group: str = "") -> None:
             check(value, f"{name}.")
         elif (ranges := ranges_of(hint)) is not None:
             _check_numbers(name, value, ranges, ASCENDING in getattr(hint, "__metadata__", ()))
+
+
+def of_kind(settings: Any, kind: type[Kind]) -> Kind:
+    """The settings, if they are of that kind.
+
+    Raises:
+        BadSetting: If they are anything else.
+    """
+    if not isinstance(settings, kind):
+        raise errors.BadSetting(errors.not_of_kind(
+            "'settings'", type(settings).__name__, kind.__name__))
+    return settings
 
 
 def ranges_of(hint: Any) -> Range | tuple[Range, ...] | None:

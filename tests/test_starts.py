@@ -10,7 +10,8 @@ from pikanid.model import Model
 from pikanid.objective.shooting import Shooting
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
-from pikanid.strategies.starts import EXTRA, starting_points
+from pikanid.strategies.nls import NLS
+from pikanid.strategies.starts import starting_points
 
 BOUNDS = {"narrow": (0.9, 1.2), "wide": (1e-3, 1e3), "tiny": (0.05, 1e9), "signed": (-40.0, 2.0),
           "open": (-np.inf, np.inf)}
@@ -33,7 +34,7 @@ def points(starts: int | str, seed: int = 0, protocol: str = "default") -> np.nd
     return np.array(list(starting_points(problem(), starts, protocol, seed)))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("starts", "count"), [("auto", EXTRA + 1), (1, 1), (2, 2), (40, 40)])
+@pytest.mark.parametrize(("starts", "count"), [("auto", NLS().extra + 1), (1, 1), (2, 2), (40, 40)])
 def test_the_guess_is_first_and_their_number_is_as_asked(starts: int | str, count: int) -> None:
     found = points(starts)
     assert found.shape == (count, len(GUESS))

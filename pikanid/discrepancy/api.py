@@ -26,7 +26,7 @@ from pikanid.objective.adequacy import judge
 from pikanid.problem.arguments import a_model
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
-from pikanid.settings import changed
+from pikanid.settings import changed, of_kind
 from pikanid.storage.version import __version__
 from pikanid.strategies.finish import evaluate
 from pikanid.strategies.nls import NLS
@@ -89,6 +89,7 @@ def kan_discrepancy(model: Model, recordings: Recording | Sequence[Recording], e
         raise errors.BadSetting(errors.bad_value("grid", grid, "rising numbers from 4 on"))
     if not 0 < alpha < 1:
         raise errors.BadSetting(errors.bad_value("alpha", alpha, "between 0 and 1"))
+    of_kind(settings, DiscrepancySettings)
     if method not in ("shooting", "functional"):
         raise errors.BadSetting(errors.bad_value("method", method, "'shooting' or 'functional'"))
     plans = plan_edges(model, arguments, grid[0])

@@ -22,6 +22,7 @@ from pikanid.mismatch.steps.searching import searched, with_noise_of_the_rest
 from pikanid.model import Model
 from pikanid.problem.arguments import a_model, several
 from pikanid.recording import Recording
+from pikanid.settings import of_kind
 
 Recordings = Recording | Sequence[Recording]
 
@@ -71,9 +72,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     ('named', ('cubic_stiffness',))
     """
     begun = time.perf_counter()
-    if not isinstance(settings, Settings):
-        raise errors.BadSetting(errors.not_of_kind(
-            "'settings'", type(settings).__name__, "pikanid.Settings"))
+    of_kind(settings, Settings)
     if alpha is not None:
         settings = settings.with_values({"alpha": alpha})
     if workers is not None and workers < 1:

@@ -15,7 +15,7 @@ from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import Point
 
 # Beyond this many intervals a simulation by a general solver takes too long to be worth it.
-MOST_INTERVALS = 20_000
+MOST_INTERVALS = 20_000  # limit: beyond it a general solver takes too long to be worth it
 
 
 def from_simulation(functional: Functional) -> Point | None:

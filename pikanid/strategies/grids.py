@@ -37,8 +37,8 @@ Knots = Literal["collocation", "aligned", "uniform", "adaptive", "curvature"]
 Quadrature = Literal["gauss", "integral", "sum"]
 
 # First spacing: this many radians of the fastest linearised motion an interval.
-RADIANS = 1.5
-PAPER_INTERVALS = 80
+RADIANS = 1.5  # numerical: of the fastest linearised motion, in an interval: the first spacing
+PAPER_INTERVALS = 80  # definition: of Table II
 
 
 class Discretisation(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from pikanid import errors
@@ -14,6 +14,7 @@ from pikanid.optimise.schedules import Continuation, Fixed, Schedule
 from pikanid.problem.chains import Form, find_chains
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
+from pikanid.settings import of_kind
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.grids import (
     PAPER_INTERVALS,
@@ -27,13 +28,14 @@ from pikanid.strategies.grids import (
 )
 from pikanid.strategies.relaxation import RelaxedFit, Setup, relax, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
+from pikanid.strategies.settings import RELAXATION, RelaxationSettings, recorded
 
 # Table II: cubic splines, about 80 knots, λ = 1e-4 (doubled for the sparse scenario), 15 warm-up
 # iterations.  "Sparse" is read as fewer samples than twice the knots.
-PAPER_DEGREE = 3
-PAPER_LAMBDA = 1e-4
-PAPER_WARMUP = 15
-STEADY_STARTS = (1e4, 1e8)
+PAPER_DEGREE = 3  # definition: of Table II
+PAPER_LAMBDA = 1e-4  # definition: of Table II
+PAPER_WARMUP = 15  # definition: of Table II
+STEADY_STARTS = (1e4, 1e8)  # numerical: λ at which physics keeps to the guess, as shooting does
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class IPDA:
         lam: A fixed λ, as in Eq. (2) under "paper", else dimensionless: at 1 a physics residual as
             large as the physics itself costs as much as every sample being off by its σ.
         warmup: Iterations at the first λ in which only the splines move.
+        settings: When grid and λ count as settled.
 
     >>> import numpy as np, pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -73,6 +76,7 @@ class IPDA:
     physics: Quadrature | None = None
     lam: float | None = None
     warmup: int | None = None
+    settings: RelaxationSettings = RELAXATION
 
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
@@ -83,7 +87,7 @@ class IPDA:
         """
         begun = time.perf_counter()
         fit = fit_relaxed(Problem(model, recordings), self)
-        return relaxed_estimate(self.name, fit, asdict(self), begun)
+        return relaxed_estimate(self.name, fit, recorded(self), begun)
 
 
 def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
@@ -101,7 +105,8 @@ def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
     # The paper leaves the start free; an estimated initial state needs its parameters tied.
     given = not paper or start_is_estimated(problem)
     setup = Setup(problem, field, chains, given_start=given, weighted=not paper,
-                  nondimensional=not paper)
+                  nondimensional=not paper,
+                  settings=of_kind(settings.settings, RelaxationSettings))
     chosen = settings.knots or ("adaptive" if paper else "collocation")
     settle = not paper and chosen == "collocation" and settings.intervals is None
     grid: Grid

@@ -34,14 +34,12 @@ from pikanid.optimise.schedules import Continuation, Stage, moved
 from pikanid.problem.problem import Problem
 from pikanid.strategies.data_noise import row_noise
 from pikanid.strategies.kan_grids import KanGrid
-from pikanid.strategies.relaxation import GRID_SETTLED, RELATIVE, RelaxedFit, Setup
+from pikanid.strategies.relaxation import RELATIVE, RelaxedFit, Setup
 
-NEAR_END = 0.9  # of a hidden grid's half width
-ROOM = 1.6  # of a hidden grid's half width to the start's amplitude in it
-ITERATIONS = 30  # at one λ
-CALM = 10  # iterations without a move of θ that count as convergence
-LARGEST_LAMBDA = 1e9
-MOST_KINKS = 500  # a border of the normal equations, dense
+NEAR_END = 0.9  # numerical: of a hidden grid's half width
+ROOM = 1.6  # numerical: of a hidden grid's half width to the start's amplitude in it
+LARGEST_LAMBDA = 1e9  # limit: beyond it rounding has the physics' digits
+MOST_KINKS = 500  # limit: a border of the normal equations, dense
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ def deep_fit(setup: Setup, start: RelaxedFit, shape: Shape, lam: float | None,
         try:
             stop = levenberg_marquardt(
                 system, point, weight, setup.problem.lower, setup.problem.upper, damping=damping,
-                iterations=ITERATIONS, admitted=partial(_inside, functional))
+                iterations=setup.settings.iterations, admitted=partial(_inside, functional))
             fit = _concluded(setup, system, stop, grid, weight)
         except LinAlgError:
             best = fits[-1] if fits else start
@@ -108,7 +106,7 @@ def deep_fit(setup: Setup, start: RelaxedFit, shape: Shape, lam: float | None,
         fits.append(fit)
         stages += fit.stages
         settled = len(stages) > 1 and moved(
-            stages[-2].theta, fit.theta, stages[-2].std, RELATIVE) <= GRID_SETTLED
+            stages[-2].theta, fit.theta, stages[-2].std, RELATIVE) <= setup.settings.settled
         # A physics cost below one datum's share cannot have locked anything.
         quiet = fit.converged and fit.physics_cost <= fit.data_cost / plan.noise_cost
         kept = len(stages) - 1 if settled or quiet else plan.keep(stages)
@@ -134,8 +132,9 @@ def _concluded(setup: Setup, system: BorderedSystem, stop: Stop, grid: KanGrid,
         system, at, lambda count: row_noise(system.functional, at, count))  # type: ignore[arg-type]
     std = np.sqrt(np.diag(sandwich))
     # A redundant network creeps on long after θ has come to rest.
-    calm = stop.converged or (len(stop.path) > CALM and moved(
-        stop.path[-1 - CALM], at.point.theta, std, RELATIVE) <= GRID_SETTLED)
+    last = setup.settings.calm
+    calm = stop.converged or (len(stop.path) > last and moved(
+        stop.path[-1 - last], at.point.theta, std, RELATIVE) <= setup.settings.settled)
     stage = Stage(lam, at.point.theta, std, at.data_cost, at.physics_cost,
                   len(stop.path) - 1, calm)
     return RelaxedFit(setup.problem, at.point.theta, sandwich, naive, at.point.coefficients,

@@ -19,9 +19,10 @@ from pikanid.approximators.tables import gauss_nodes
 from pikanid.problem.chains import Chains
 from pikanid.problem.problem import Experiment, Problem
 
-MOST_CELLS = 20_000  # of a grid whose cells follow the switches
-MOST_TO_RESOLVE = 5_000  # cells of a first grid that tells every two switches apart
-APART = 1.0  # cells between two switches that both get kinks: nearer ones are hard to tell apart
+MOST_CELLS = 20_000  # limit: of a grid whose cells follow the switches
+MOST_TO_RESOLVE = 5_000  # limit: cells of a first grid that tells every two switches apart
+# Switches that are nearer are hard to tell apart.
+APART = 1.0  # numerical: cells between two switches that both get kinks
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,10 @@ from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.kan_shallow import unfitted
 from pikanid.strategies.relaxation import RelaxedFit, Setup, conclude
 
-STAGES = ((10, 0.0, 200), (20, 0.05, 200), (40, 0.1, 200), (40, 1.0, 500))  # grid, λ, steps
-COLLOCATION = 501
+# Grid, λ, steps.
+STAGES = (
+    (10, 0.0, 200), (20, 0.05, 200), (40, 0.1, 200), (40, 1.0, 500))  # definition: of Table II
+COLLOCATION = 501  # definition: of Table II
 Progress = Callable[[dict[str, float]], None]
 
 

@@ -18,7 +18,6 @@ from pikanid.strategies.data_noise import noise_level, standard_errors
 from pikanid.strategies.grids import fastest_rate
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.relaxation import (
-    GRID_SETTLED,
     RELATIVE,
     RelaxedFit,
     Setup,
@@ -28,8 +27,9 @@ from pikanid.strategies.relaxation import (
     physics_scale,
 )
 
-RADIANS = 1.0  # of the fastest linearised motion, at most, in a cell of the first grid that counts
-FACTOR, LARGEST = 10.0, 1e8  # of the λ-continuation
+# Of the fastest linearised motion.
+RADIANS = 1.0  # numerical: at most, in a cell of the first grid that counts
+FACTOR, LARGEST = 10.0, 1e8  # numerical: of the λ-continuation
 Tell = Callable[[int, Sequence[Stage]], None]
 
 
@@ -41,7 +41,7 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, cells: float | None, max_grid: i
     On every grid λ rises tenfold until no parameter moves by more than 0.05 of its standard error;
     the next, finer grid starts from the last one's curve at a tenth of its λ.
     """
-    refine = cells is not None
+    refine, settled = cells is not None, setup.settings.settled
     if cells is not None:
         while grid.intervals < cells and 2 * grid.intervals <= max_grid:
             grid = grid.refined()
@@ -71,14 +71,14 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, cells: float | None, max_grid: i
         stages += found
         best = grid, system, outcome
         # where a lock ended the path, a finer grid may take λ further, however little it moved
-        if (gap <= GRID_SETTLED and not remarks) or not refine or 2 * grid.intervals > max_grid:
+        if (gap <= settled and not remarks) or not refine or 2 * grid.intervals > max_grid:
             break
         grid = grid.refined()
         finer = setup.functional(grid)
         point = _carried(functional, finer, outcome.at.point)
         start, functional = max(1.0, found[-1].lam / FACTOR), finer
-    notes = list(remarks) if gap <= GRID_SETTLED or not refine else []
-    if refine and gap > GRID_SETTLED:
+    notes = list(remarks) if gap <= settled or not refine else []
+    if refine and gap > settled:
         notes.append(errors.grid_not_settled(gap, grid.intervals))
     if not outcome.converged:
         notes.append(errors.not_converged(found[-1].lam))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pikanid.optimise.gauss_newton import MAX_ITERATIONS, BandedSystem, Linearisation, gauss_newton
 
-STIFF, STIFFEST = 1e10, 1e16  # λ at which a trajectory may be the solution of its equations
+STIFF, STIFFEST = 1e10, 1e16  # numerical: λ that makes a trajectory solve its equations
 
 
 def follows_physics(system: BandedSystem, at: Linearisation, lam: float) -> bool:

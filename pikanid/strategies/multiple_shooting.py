@@ -21,7 +21,7 @@ from pikanid.optimise.minpack import minimise
 from pikanid.problem.problem import Experiment, Problem, Samples
 from pikanid.simulation.simulator import Simulator, Steps
 
-CLOSING = (1.0, 10.0, 100.0)  # weights of the gaps, relative to a typical sample's
+CLOSING = (1.0, 10.0, 100.0)  # numerical: weights of the gaps, relative to a typical sample's
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class NLS:
 
     Args:
         starts: Number of starting points; "auto" begins at the guess and adds a space-filling
-            design of eight only if that fit does not explain the recording.
+            design of `extra` more only if that fit does not explain the recording.
         protocol: "default", or "paper": best of five starts drawn within ±20 % of the guess (Table
             II).
         tolerance: Relative change of parameters and cost at which the optimiser stops.
@@ -40,6 +40,7 @@ class NLS:
         seed: Of the starting points.
         method: Integration method, see `pikanid.simulate`.
         segments: With more than one, every start is first led to a basin by multiple shooting.
+        extra: Starting points that "auto" adds.
 
     >>> import pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -58,6 +59,7 @@ class NLS:
     seed: int = 0
     method: Literal["auto", "explicit", "implicit"] = "auto"
     segments: int = 1
+    extra: int = 8
 
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
@@ -72,7 +74,8 @@ class NLS:
         history: list[dict[str, float]] = []
         best: Optimum | None = None
         found: Optimum | None = None
-        for k, start in enumerate(starting_points(problem, self.starts, self.protocol, self.seed)):
+        starts = starting_points(problem, self.starts, self.protocol, self.seed, self.extra)
+        for k, start in enumerate(starts):
             if k == 1 and self.starts == "auto" and self.protocol == "default" and (
                     best is not None and shooting.explains(best.theta)):
                 break

@@ -35,12 +35,12 @@ from pikanid.strategies.grids import Knots, Quadrature, check_options, chosen_gr
 from pikanid.strategies.relaxation import RelaxedFit, Setup, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
 
-PAPER_DEGREE = 3
+PAPER_DEGREE = 3  # definition: of Table II
 # The smoothed derivative of order m + SMOOTHER is penalised by default; the regression needs m.
-SMOOTHER = 1
-MOST_INTERVALS_A_SAMPLE = 0.5
-SWITCHES_A_SAMPLE = 0.05
-REGRESSION_STEPS = 50
+SMOOTHER = 1  # numerical: derivatives beyond the highest that the regression needs
+MOST_INTERVALS_A_SAMPLE = 0.5  # limit: more would follow the noise between samples
+SWITCHES_A_SAMPLE = 0.05  # numerical: with more, free to bend at each, splines smooth nothing
+REGRESSION_STEPS = 50  # limit: of a problem of a few unknowns
 
 
 @dataclass(frozen=True)

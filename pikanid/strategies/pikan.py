@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
@@ -23,6 +23,7 @@ from pikanid.optimise.schedules import Stage
 from pikanid.problem.chains import Form, find_chains
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
+from pikanid.settings import of_kind
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.kan_deep import Shape, deep_fit
 from pikanid.strategies.kan_grids import MOST_CELLS, MOST_TO_RESOLVE, KanGrid
@@ -31,10 +32,12 @@ from pikanid.strategies.kan_shallow import cells_of, shallow_fit
 from pikanid.strategies.kan_trajectories import KanTrajectories
 from pikanid.strategies.relaxation import RelaxedFit, Setup, start_is_estimated
 from pikanid.strategies.relaxed_estimate import relaxed_estimate
+from pikanid.strategies.settings import RELAXATION, RelaxationSettings, recorded
 
-FIRST_GRID = 10
-LEAST_FINEST, FINER = 640, 10
-SHALLOW = (1, 1)
+FIRST_GRID = 10  # numerical: cells, from which grids are refined
+# In cells, and in times the cells that the motion needs.
+LEAST_FINEST, FINER = 640, 10  # limit: of the finest grid
+SHALLOW = (1, 1)  # definition: a network without hidden nodes
 LAMBDA_RULE = "x10 from the weakest until no parameter moves by 0.05 standard errors"
 Progress = Callable[[dict[str, float]], None]
 
@@ -65,6 +68,7 @@ class PIKAN:
         device: "cpu", or "cuda" for a pykan model that lives on a GPU.  The fit itself is NumPy and
             runs on the CPU either way: at these sizes a GPU has nothing to gain.
         progress: Called with loss parts, λ and grid after every stage.
+        settings: When grid and λ count as settled.
 
     >>> import numpy as np, pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -89,6 +93,7 @@ class PIKAN:
     seed: int = 0
     device: str = "cpu"
     progress: Progress | None = None
+    settings: RelaxationSettings = RELAXATION
 
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
@@ -103,8 +108,7 @@ class PIKAN:
         begun = time.perf_counter()
         self._check()
         problem = Problem(model, recordings)
-        settings = {k: v for k, v in asdict(replace(self, progress=None)).items()
-                    if k != "progress"}
+        settings = recorded(self)
         settings["width"] = [entry if isinstance(entry, int) else list(entry)
                              for entry in self.width]
         # A right-hand side that overflows is a failed step, and said where it cannot be helped.
@@ -151,10 +155,12 @@ class PIKAN:
         paper = self.protocol == "paper"
         return Setup(problem, VectorField(problem.model), find_chains(problem.model, self.form),
                      given_start=not paper or start_is_estimated(problem), weighted=not paper,
-                     nondimensional=not paper)
+                     nondimensional=not paper,
+                     settings=self.settings)
 
     def _check(self) -> None:
         """Refuse options that cannot work."""
+        of_kind(self.settings, RelaxationSettings)
         choices = {"protocol": ("default", "paper"), "form": get_args(Form),
                    "base": get_args(Base)}
         for name, known in choices.items():

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from pikanid.estimate import Estimate
@@ -21,6 +21,7 @@ from pikanid.recording import Recording
 from pikanid.strategies.pinn_fit import fit_network
 from pikanid.strategies.pinn_settings import PinnSettings, check
 from pikanid.strategies.relaxed_estimate import assemble
+from pikanid.strategies.settings import recorded
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class PINN(PinnSettings):
         seed: Of the starting weights.
         device: "cpu", or "cuda" where present.
         progress: Called with step, lam, data and physics (the two parts of the loss).
+        settings: When λ has climbed far enough, and when the curve misleads.
 
     Bounds of parameters hold exactly: Adam is put back onto them, L-BFGS-B and Gauss-Newton keep
     to them.
@@ -74,7 +76,5 @@ class PINN(PinnSettings):
         begun = time.perf_counter()
         check(self)
         fit, curves = fit_network(Problem(model, recordings), self)
-        settings = asdict(replace(self, progress=None))
-        del settings["progress"]
-        return assemble(self.name, fit, {**settings, **fit.settings}, list(fit.history), begun,
-                        curves)
+        return assemble(self.name, fit, {**recorded(self), **fit.settings}, list(fit.history),
+                        begun, curves)

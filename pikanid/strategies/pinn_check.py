@@ -13,16 +13,18 @@ from pikanid.approximators import Array
 from pikanid.objective.shooting import Shooting
 from pikanid.optimise.minpack import minimise
 from pikanid.problem.problem import Problem
+from pikanid.strategies.settings import CLIMB
 from pikanid.uncertainty import covariance
 
-FAR = 5.0  # standard errors
-VISIBLE = 1e-3  # relative: on clean data every difference is many standard errors
+VISIBLE = 1e-3  # numerical: relative: on clean data every difference is many standard errors
 
 
-def against_simulation(problem: Problem, theta: Array, residual: float) -> list[str]:
+def against_simulation(problem: Problem, theta: Array, residual: float,
+                       far: float = CLIMB.far) -> list[str]:
     """A sentence on the parameter that is furthest outside what the data allow, or none.
 
-    `residual` is the root mean square distance of the curve from the data, for the sentence.
+    `residual` is the root mean square distance of the curve from the data, for the sentence; `far`
+    is how many standard errors are too many.
     """
     shooting = Shooting(problem)
     try:
@@ -38,10 +40,10 @@ def against_simulation(problem: Problem, theta: Array, residual: float) -> list[
     std = np.sqrt(np.diag(covariance(shooting.jacobian(found.theta),
                                      np.ones(theta.size, bool))) * scale)
     gap = np.abs(theta - found.theta)
-    far = (gap > FAR * std) & (gap > VISIBLE * np.abs(found.theta)) & np.isfinite(std)
-    if not np.any(far) or not before - after > FAR**2 * scale or not found.converged:
+    apart = (gap > far * std) & (gap > VISIBLE * np.abs(found.theta)) & np.isfinite(std)
+    if not np.any(apart) or not before - after > far**2 * scale or not found.converged:
         return []
-    k = int(np.argmax(np.where(far, gap / np.maximum(std, 1e-300), -1.0)))
+    k = int(np.argmax(np.where(apart, gap / np.maximum(std, 1e-300), -1.0)))
     f = problem.free[k]
     return [errors.curve_misleads(f.label, theta[k], found.theta[k], std[k], residual, f.unit)]
 

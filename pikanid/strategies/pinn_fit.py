@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 # Table II: Adam 5000 with λ 0 → 0.1, L-BFGS 500 at λ = 1, 501 collocation points; λ doubled for
 # the sparse scenario, read as fewer than half as many samples as collocation points.  What it does
 # not name is chosen here: units, learning rate, and the units of the physics residual.
-PAPER_RAMP, PAPER_LAMBDA = 0.1, 1.0
-PAPER_STEPS = (5000, 500)
-PAPER_COLLOCATION = 501
-PAPER_HIDDEN = (64, 16)
-PAPER_SPREAD = 1.25
+PAPER_RAMP, PAPER_LAMBDA = 0.1, 1.0  # definition: of Table II
+PAPER_STEPS = (5000, 500)  # definition: of Table II
+PAPER_COLLOCATION = 501  # definition: of Table II
+PAPER_HIDDEN = (64, 16)  # definition: chosen, as Table II names none
+PAPER_SPREAD = 1.25  # definition: chosen, as Table II names none
 
-GRADIENT_STEPS = (3000, 3000)
-GRADIENT_LAMBDA = 100.0
-NEWTON_STEPS = 400
-CLEAN = 1e-5  # noise of clean data, relative to the signal
-LARGEST_STD = 1e3  # relative: beyond, a standard error says that there is none
+GRADIENT_STEPS = (3000, 3000)  # limit: of Adam and L-BFGS, unless told
+GRADIENT_LAMBDA = 100.0  # numerical: of a descent whose λ is not told
+NEWTON_STEPS = 400  # limit: of Gauss-Newton, unless told
+CLEAN = 1e-5  # numerical: noise of clean data, relative to the signal
+LARGEST_STD = 1e3  # numerical: relative: beyond, a standard error says that there is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,8 @@ def fit_network(problem: Problem, settings: PinnSettings) -> tuple[PinnFit, Any]
         (rows.residual / sites.weight).ravel() for r, c in enumerate(point.coefficients)
         for rows, sites in zip(functional.data_rows(r, c, point.theta), functional.parts[r].data,
                                strict=True)])
-    notes += against_simulation(problem, point.theta, float(np.sqrt(np.mean(residual**2))))
+    notes += against_simulation(problem, point.theta, float(np.sqrt(np.mean(residual**2))),
+                                settings.settings.far)
     coefficients = tuple(
         tuple(c[table.part] for table in part.physics.tops)
         for part, c in zip(functional.parts, point.coefficients, strict=True))
@@ -126,7 +127,7 @@ def _newton(loss: TorchFunctional, start: Array, settings: PinnSettings, noise: 
     steps = NEWTON_STEPS if settings.steps is None else settings.steps
     assert isinstance(steps, int)
     found = climb(loss, start, noise=noise, known=_known(loss.functional), lam=settings.lam,
-                  iterations=steps, progress=settings.progress)
+                  iterations=steps, progress=settings.progress, settings=settings.settings)
     notes = () if found.converged else (errors.newton_stopped(found.iterations, found.move),)
     return _Stop(found.z, found.lam, found.converged, notes, found.history,
                  {"optimiser": "gauss_newton", "steps": found.iterations})

@@ -18,10 +18,10 @@ from pikanid.problem.problem import Experiment, Problem
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.grids import fastest_rate
 
-MOST_KINKS = 32
-NODES_A_RADIAN = 4.0  # of the fastest linearised motion
-FEWEST_NODES, MOST_NODES = 64, 2000
-STEEPEST = 1.5  # first-layer slope, at most, per unit: steeper steps leave gaps between them
+MOST_KINKS = 32  # limit: of a network: each is a unit more
+NODES_A_RADIAN = 4.0  # numerical: of the fastest linearised motion
+FEWEST_NODES, MOST_NODES = 64, 2000  # limit: Gauss nodes of a recording
+STEEPEST = 1.5  # numerical: first-layer slope per unit: steeper steps leave gaps
 
 
 @dataclass(frozen=True)

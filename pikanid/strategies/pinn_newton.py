@@ -22,19 +22,16 @@ from pikanid.optimise.covariance import invert
 from pikanid.optimise.dense import levenberg_marquardt
 from pikanid.optimise.gradient_functional import TorchFunctional
 from pikanid.optimise.schedules import moved
+from pikanid.strategies.settings import CLIMB, ClimbSettings
 
 Mask = NDArray[np.bool_]
 Progress = Callable[[dict[str, float]], None]
-CHUNK = 10  # iterations at one λ
-WARMUP = 20  # in which only the curve moves
-SHARE = 0.1  # physics cost, at most, of what the noise costs
-FASTEST = 10.0  # factor of λ between chunks
-OVERFIT = 0.8  # of the noise left in the data: below, the curve follows the noise
-MOST = 1e12
-SETTLED, RELATIVE = 0.05, 1e-5  # moves in standard errors, and relative, that count as none
-FALLING = 0.9  # ratio of standard errors from one chunk to the next
-NEARLY = 0.2  # standard errors: a last move that does not deserve a warning
-RIDGE = 1e-11  # of the largest eigenvalue: directions of the network that nothing determines
+CHUNK = 10  # numerical: iterations at one λ
+WARMUP = 20  # numerical: in which only the curve moves
+FASTEST = 10.0  # numerical: factor of λ between chunks
+MOST = 1e12  # limit: of λ: beyond it rounding has the physics' digits
+RELATIVE = 1e-5  # numerical: move that counts as none, where no noise says what is near
+RIDGE = 1e-11  # numerical: of the largest eigenvalue: what nothing determines
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +47,7 @@ class Climb:
 
 
 def climb(loss: TorchFunctional, start: Array, *, noise: float, known: bool, lam: float | None,
-          iterations: int, progress: Progress | None) -> Climb:
+          iterations: int, progress: Progress | None, settings: ClimbSettings = CLIMB) -> Climb:
     """Minimise Eq. (2) at rising λ, or at the given one, from `start` (n,).
 
     `noise` is the standard deviation of the data rows; where it is not `known`, it is what samples
@@ -86,18 +83,19 @@ def climb(loss: TorchFunctional, start: Array, *, noise: float, known: bool, lam
         move = moved(here, there, std, RELATIVE)
         if not known and not first:
             expected = min(expected, data)
+        allowed = settings.share * np.sqrt(max(data, expected) * expected)
         growth = 1.0 if lam is not None else float(np.clip(
-            SHARE * np.sqrt(max(data, expected) * expected) / max(physics, 1e-300), 1.0, FASTEST))
-        if lam is None and known and data < OVERFIT * expected:
+            allowed / max(physics, 1e-300), 1.0, FASTEST))
+        if lam is None and known and data < settings.overfit * expected:
             growth = max(growth, 3.0)
         # While standard errors still fall, a larger λ has more to tell.
-        steady = move <= SETTLED and bool(np.all(std > FALLING * old))
+        steady = move <= settings.settled and bool(np.all(std > settings.falling * old))
         calm = calm + 1 if steady and not first else 0
         if calm == 2 or (found.converged and growth == 1.0 and not first):
             return Climb(z, weight, used, True, move, tuple(history))
         if used < iterations:
             weight = min(weight * growth, MOST)
-    return Climb(z, weight, used, move <= NEARLY, move, tuple(history))
+    return Climb(z, weight, used, move <= settings.nearly, move, tuple(history))
 
 
 def _flat_noise(data_rows: Mask, data: float, expected: float) -> Array:

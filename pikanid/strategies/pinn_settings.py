@@ -10,9 +10,11 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.problem.chains import Form
+from pikanid.settings import of_kind
+from pikanid.strategies.settings import CLIMB, ClimbSettings
 
 Progress = Callable[[dict[str, float]], None]
-PAPER_RATE = 3e-3  # Adam's; Table II names none
+PAPER_RATE = 3e-3  # definition: Adam's; Table II names none
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,12 @@ class PinnSettings:
     seed: int = 0
     device: str = "cpu"
     progress: Progress | None = None
+    settings: ClimbSettings = CLIMB
 
 
 def check(settings: PinnSettings) -> None:
     """Raise `BadSetting` unless the settings can work."""
+    of_kind(settings.settings, ClimbSettings)
     paper = settings.protocol == "paper"
     newton = settings.optimiser == "gauss_newton" or (settings.optimiser is None and not paper)
     wanted = "a whole number" if newton else "two whole numbers, (Adam, L-BFGS)"

@@ -33,16 +33,10 @@ from pikanid.strategies.data_noise import noise_level, row_noise, standard_error
 from pikanid.strategies.first_points import from_simulation, transfer
 from pikanid.strategies.grids import Discretisation, Grid
 from pikanid.strategies.locks import follows_physics
+from pikanid.strategies.settings import RELAXATION, RelaxationSettings
 
-# The grid is fine enough once halving it moves no parameter by more than this many standard errors.
-GRID_SETTLED = 0.05
-MAX_REFINEMENTS = 6
-# A move this large says that the coarser grid misled the fit: it starts anew on the finer one.
-GRID_MISLED = 10.0
-# A data cost up to this multiple of what noise explains ends the search for a better path.
-EXPLAINED = 1.5
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
-RELATIVE = 1e-6
+RELATIVE = 1e-6  # numerical: without noise no standard error says what is near
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +89,7 @@ class Setup:
     given_start: bool
     weighted: bool
     nondimensional: bool  # λ in units of N·σ²/(T·s²), s the size of the physics terms
+    settings: RelaxationSettings = RELAXATION
 
     def functional(self, grid: Discretisation, like: Functional | None = None) -> Functional:
         """Eq. (2) on a grid, with the data of one on another grid where that is given."""
@@ -154,8 +149,8 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
     if setup.field.switches:
         notes.append(errors.relaxation_smears())
         refine = False  # no grid settles while a kink wanders through it
-    gap = 0.0
-    for _ in range(MAX_REFINEMENTS if refine else 0):
+    gap, settings = 0.0, setup.settings
+    for _ in range(settings.refinements if refine else 0):
         grid, before, lam = grid.refined(), outcome.at.point, stages[-1].lam
         coarse = system.functional
         del system, outcome  # most of the memory, and not needed any more
@@ -165,11 +160,11 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
                                system.upper)
         stages.append(_stage(system, lam, outcome, standard_errors(system, outcome)))
         gap = moved(before.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
-        if gap > GRID_MISLED or not outcome.converged:
+        if gap > settings.misled or not outcome.converged:
             system, stages, outcome, notes = _from_data(setup, grid, plans)
-        if gap <= GRID_SETTLED:
+        if gap <= settings.settled:
             break
-    if gap > GRID_SETTLED:
+    if gap > settings.settled:
         notes.append(errors.grid_not_settled(gap, grid.n_intervals))
     if not outcome.converged:
         notes.append(errors.not_converged(stages[-1].lam))
@@ -185,12 +180,13 @@ def _from_data(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Sched
     noise = noise_level(functional, smoothed)
     if setup.nondimensional:
         system = system.over(functional.with_scale(physics_scale(functional, point, noise)))
-    return (system, *_best_path(system, point, plans(noise), noise))
+    return (system, *_best_path(system, point, plans(noise), noise,
+                                setup.settings.explained))
 
 
 def _best_path(system: BandedSystem, point: Point, plans: Sequence[Schedule],
-               noise: float) -> tuple[list[Stage], Outcome, list[str]]:
-    enough = EXPLAINED * noise**2 * system.functional.n_data
+               noise: float, explained: float) -> tuple[list[Stage], Outcome, list[str]]:
+    enough = explained * noise**2 * system.functional.n_data
     paths = []
     start: Point | None = point
     for k, plan in enumerate(plans):

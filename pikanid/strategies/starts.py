@@ -9,11 +9,10 @@ import numpy as np
 
 from pikanid.problem.problem import FreeParameter, Problem
 
-EXTRA = 8
-
 
 def starting_points(problem: Problem, starts: int | Literal["auto"],
-                    protocol: Literal["default", "paper"], seed: int) -> Iterator[np.ndarray]:
+                    protocol: Literal["default", "paper"], seed: int, extra: int = 8
+                    ) -> Iterator[np.ndarray]:
     """Yield starting points (n_free,); the first is the guess.
 
     "paper": five points within ±20 % of the guess (Table II, best of five).  Otherwise a
@@ -28,7 +27,7 @@ def starting_points(problem: Problem, starts: int | Literal["auto"],
         draws = rng.uniform(0.8, 1.2, (4, len(guess))) * guess
         yield from np.clip(draws, problem.lower, problem.upper)
         return
-    count = (EXTRA + 1 if starts == "auto" else starts) - 1
+    count = (extra + 1 if starts == "auto" else starts) - 1
     if count < 1 or len(guess) == 0:
         return
     from scipy.stats import qmc

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from pikanid.settings import of_kind
 from pikanid.symbolic.library import LIBRARY, Form
 from pikanid.symbolic.network import read_network
 from pikanid.symbolic.numeric import Array
@@ -53,6 +54,7 @@ def extract(source: Any, x: Array | None = None, y: Array | None = None, *,
     from pikanid.symbolic.missing import read_discrepancy
     from pikanid.symbolic.saved import read_estimate
 
+    of_kind(settings, SymbolicSettings)
     if isinstance(source, Estimate):
         return read_estimate(source, library, settings)
     if isinstance(source, Discrepancy):

@@ -18,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pikanid.settings import of_kind
 from pikanid.symbolic.adequacy import Smoother
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import fit_form
@@ -52,6 +53,7 @@ def name_edge(x: np.ndarray, y: np.ndarray, *, sigma: float | np.ndarray | None 
     >>> name_edge(x, noise).name
     'nothing'
     """
+    of_kind(settings, SymbolicSettings)
     if covariance is None:
         curve = Curve.of_points(x, y, sigma, argument=argument, unit=unit, x_unit=x_unit)
     else:
