@@ -1,4 +1,10 @@
-"""Levenberg-Marquardt for Eq. (2) of deep networks; see `bordered` for its linear algebra."""
+"""Levenberg-Marquardt for Eq. (2) of deep networks; see `bordered` for its linear algebra.
+
+`optimise.levenberg_marquardt` knows no structure: with 690 unknowns (320 cells, two hidden nodes) a
+step by bordered bands takes 22 ms on one core with its normal equations, and one by a dense matrix
+113 ms once that is there.  Nor does it charge coefficients and θ differently, or refuse a trial
+that leaves the hidden grids before it is evaluated.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,12 @@
 
 For approximators without a local basis, such as networks of up to a few thousand coefficients: a
 step solves (JᵀJ + μ D) δ = -Jᵀr, on the smaller side of J.
+
+`optimise.levenberg_marquardt` is for a few parameters: it takes steps to the minimum of the model
+in the box, and stops where statistics do.  In a PINN's chunk of ten iterations (J of 769 rows and
+623 columns, one core) its step takes 111 ms against 29 ms here, and the ten iterations, as long as
+these, end at a cost of 15260 against 9570: it begins with μ = 1e-3 again, where this goes on from
+the last chunk's.
 """
 
 from __future__ import annotations
