@@ -6,8 +6,8 @@ so that a step costs O(N).  Bounds on θ hold in every step: Δθ minimises the 
 inside the box.
 
 `optimise.levenberg_marquardt` is dense: with 552 unknowns (1049 rows) it would take 25 ms for the
-normal equations and 51 ms for a step on one core, with 4004 unknowns 3 s and 28 s; the linearisation
-and a step take 0.23 ms and 1.0 ms here.
+normal equations and 51 ms for a step on one core, with 4004 unknowns 3 s and 28 s; here both
+together take 0.23 ms and 1.0 ms.
 """
 
 from __future__ import annotations
