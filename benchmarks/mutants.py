@@ -67,6 +67,13 @@ def idle(node: Any, mutated: Any) -> bool:
         _value(a) for a in mutated.args if not _strict(a)]
 
 
+def strict_flags(module: Any) -> set[int]:
+    """The values of the `strict` flags in a module, by identity."""
+    import libcst.matchers as m
+
+    return {_value(a) for a in m.findall(module, m.Arg(keyword=m.Name("strict")))}
+
+
 def _strict(argument: Any) -> bool:
     return argument.keyword is not None and argument.keyword.value == "strict"
 
@@ -84,14 +91,15 @@ def only_the_sample() -> None:
     def sampled(filename: str, *arguments: Any) -> Any:
         module, mutations, *rest = make(filename, *arguments)
         seen: Counter[str] = Counter()
-        kept = []
+        kept, flags = [], strict_flags(module)
         for mutation in mutations:
             function = mutation.contained_by_top_level_function
             name = getattr(getattr(function, "name", None), "value", None)
             if name is None or idle(mutation.original_node, mutation.mutated_node):
                 continue
             seen[name] += 1
-            if in_sample(filename, name, seen[name]):
+            # counted even so, as the sample depends on numbers
+            if in_sample(filename, name, seen[name]) and id(mutation.original_node) not in flags:
                 kept.append(mutation)
         return module, kept, *rest
 

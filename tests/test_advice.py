@@ -48,6 +48,22 @@ def test_what_no_profile_tells_apart_is_said_to_be_so(records: Records) -> None:
     assert text.startswith("No usual profile tells dry friction from the same again")
 
 
+@pytest.mark.parametrize("value", [0.4, 7.0])
+def test_the_best_profile_is_proposed_only_where_it_separates(
+        records: Records, value: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    best = SimpleNamespace(value=value, separated=3.0, before=0.2, repeated=0.3,
+                           profile=SimpleNamespace(name="a slow sweep"))
+    monkeypatch.setattr("pikanid.mismatch.report.advice.next_experiment", lambda *_, **__: best)
+    text = advice("set", (FRICTION, DRAG), records, RATE, True)
+    if value < best.separated:
+        assert text == ("No usual profile tells dry friction from drag (at best 0.4 standard "
+                        "deviations apart): only a larger stroke, less noise or a second sensor "
+                        "would.")
+    else:
+        assert text.startswith("To tell dry friction from drag: run a slow sweep, expected to set "
+                               "them 7 standard deviations apart (now 0.2;")
+
+
 def test_other_verdicts_have_sentences_of_their_own(records: Records) -> None:
     assert advice("named", (FRICTION,), records, RATE, True) == ""
     assert advice("unnamed", (), records, RATE, True) == EXPLORE

@@ -18,9 +18,11 @@ import pikanid as pk
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.friction import _half_derivative
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Model, systems
 from pikanid.recording import excitation
+from pikanid.simulation.vectorfield import VectorField
 from pikanid.symbolic.library import LIBRARY
 
 
@@ -47,6 +49,30 @@ def test_candidates_are_well_formed(make: Callable[[], Model]) -> None:
     groups = Counter(c.twin for c in found if c.twin)
     assert groups and min(groups.values()) > 1  # nothing is a twin of nothing
     assert {c.channel for c in found} == set(get_args(Channel))
+
+
+def test_the_boundary_layer_damps_by_the_half_derivative_of_the_rate() -> None:
+    """s² + d s + b s^1.5 + ω² = 0, up to what a band that ends at three times ω leaves out."""
+    model, size = systems.sloshing(), 0.3
+    (layer,) = (c for c in made(model) if c.key == "boundary_layer")
+    wider = layer.applied(model).with_values({"b_layer": size})
+    field = VectorField(wider)
+    values = np.array(list(wider.values.values()))
+    by_x, _ = field.rhs_jacobians(np.zeros(1), np.zeros((1, len(wider.states))),
+                                  np.zeros((1, len(wider.inputs))), values)
+    found = np.linalg.eigvals(by_x[0])
+    s = found[np.argmax(found.imag)]
+    rate2, damping = 9.81 / wider.values["l_theta"], wider.values["d_theta"]
+    left = s**2 + damping * s + size * s**1.5 + rate2
+    assert abs(left) < 0.35 * size * abs(s) ** 1.5
+
+
+@pytest.mark.parametrize("shift", [0.0, 5.0])
+def test_the_half_derivative_of_a_line_grows_with_the_root_of_time(shift: float) -> None:
+    t = np.linspace(0.0, 2.0, 41)
+    found = _half_derivative(shift + t, 3.0 * t + 1.0)
+    np.testing.assert_allclose(found[10:], 6.0 * np.sqrt(t[10:] / np.pi), rtol=0.015)
+    assert found[-1] == pytest.approx(6.0 * np.sqrt(2.0 / np.pi), rel=0.005)
 
 
 def test_no_entry_is_known_by_name_outside_the_catalogue() -> None:

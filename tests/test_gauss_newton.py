@@ -193,6 +193,9 @@ def test_parameter_without_influence_stays() -> None:
     matrix = np.array([[2.0, 0.0], [0.0, 0.0]])
     found = box_minimum(matrix, np.array([-1.0, 0.0]), -np.ones(2), np.ones(2))
     assert np.allclose(found, [0.5, 0.0])
+    # nor do all of them move, where none has any
+    found = box_minimum(0.0 * matrix, np.zeros(2), -np.ones(2), np.ones(2))
+    np.testing.assert_array_equal(found, [0.0, 0.0])
 
 
 def test_multiply_and_invert() -> None:

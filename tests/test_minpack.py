@@ -20,3 +20,19 @@ def test_a_minimum_at_bounds_is_met_by_small_residuals_too(size: float) -> None:
     wanted = float(A[:, 1] @ rest / (A[:, 1] @ A[:, 1]))
     assert found.converged
     np.testing.assert_allclose(found.theta, [2.0, wanted], rtol=1e-5)
+
+
+def test_fewer_residuals_than_parameters_are_still_brought_to_zero() -> None:
+    """MINPACK refuses them: no bound is near, and a minimum is found all the same."""
+    A = np.array([[1.0, 2.0, -1.0]])
+    wide = np.full(3, 100.0)
+    found = minimise(lambda q: A @ q - 5.0, lambda q: A, np.ones(3), -wide, wide)
+    assert found.converged and found.cost < 1e-12
+    assert float(A[0] @ found.theta) == pytest.approx(5.0)
+
+
+def test_without_parameters_the_cost_is_that_of_the_residual() -> None:
+    none = np.empty(0)
+    found = minimise(lambda q: np.array([3.0, 4.0]), lambda q: np.empty((2, 0)), none, none, none)
+    assert (found.cost, found.converged, found.evaluations) == (12.5, True, 1)
+    assert found.theta.shape == (0,)

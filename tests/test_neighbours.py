@@ -201,6 +201,48 @@ def test_laws_are_added_to_the_best_hypothesis_whatever_they_promise(
     assert [set(h.key) for h in search.grow(lambda h: True)] == wanted
 
 
+def test_effects_are_added_until_one_is_not_worth_it_elsewhere(
+        case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked about the best hypothesis so far and about the better one that has grown out of it."""
+    search, listed = stand_ins(case, 5.0), {c.key: c for c in case.candidates}
+    made = [tuple(listed[n] for n in MANY[:count]) for count in range(5)]
+    asked, rows = list[tuple[int, int]](), case.base.whitened.rows
+
+    def grown(self: Search, h: Hypothesis, *_: object, **__: object) -> None:
+        effects = made[min(len(h.effects) + 1, 4)]
+        key = frozenset(e.key for e in effects)
+        r = np.full(rows, np.sqrt(2.0 * 0.8 ** len(effects)))
+        self.fits[key] = replace(case.base, effects=effects,
+                                 minimum=replace(case.base.minimum, r=r))
+
+    def worth(fewer: Hypothesis, more: Hypothesis) -> bool:
+        asked.append((len(fewer.effects), len(more.effects)))
+        return len(more.effects) < 3
+
+    monkeypatch.setattr(Search, "_extend", grown)
+    for name in ("_fit_all", "_simplify"):
+        monkeypatch.setattr(Search, name, lambda *_, **__: None)
+    search.predicts = worth
+    grown(search, search.ranked()[0])
+    assert len(search.grow(lambda h: False)[0].effects) == 3
+    assert asked == [(2, 3)]
+
+
+@pytest.mark.parametrize("limit", [1.0, 3.0])
+def test_settings_say_what_explains_nothing_beyond_hills(
+        case: Case, limit: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """χ² of two a row: what levels of the motion decide was looked for in vain, or not."""
+    sharp = next(c for c in case.candidates if c.levels)
+    records = replace(case.records, settings=DEFAULTS.with_values({"fits.lost": limit}))
+    rows = case.base.whitened.rows
+    found = replace(case.base, effects=(sharp,), minimum=replace(
+        case.base.minimum, r=np.full(rows, np.sqrt(2.0))))
+    search = replace(stand_ins(case, 1.0), records=records, failed_searches=set())
+    monkeypatch.setattr("pikanid.mismatch.search.search.fitted", lambda *_: found)
+    search._fit_all([((sharp,), [{}])], always=True)
+    assert search.failed_searches == ({frozenset({sharp.key})} if limit < 2.0 else set())
+
+
 def test_a_search_goes_on_with_other_records(case: Case) -> None:
     other, given = SimpleNamespace(base=lambda: hypothesis(case)), list[object]()
 

@@ -13,7 +13,7 @@ from scipy.stats import binom
 from pikanid.errors import BadRecording
 from pikanid.noise import autoregressive as noise_ar
 from pikanid.noise import level as noise
-from pikanid.noise.quiet import _is_quiet, even_parts, find_quiet
+from pikanid.noise.quiet import _is_quiet, even_parts, find_quiet, without_moves
 from pikanid.noise.settings import USUAL, QuietSettings
 from pikanid.recording.channel import Channel
 
@@ -166,6 +166,15 @@ def test_a_quiet_stretch_by_hand() -> None:
     assert (model.sigma, model.rho, model.spread) == pytest.approx((
         fitted.sigma, noise_ar.autocorrelation(fitted.coefficients, 2)[1],
         2 * fitted.sigma_std / fitted.sigma))
+    # a process of second order has another correlation than the first-order one next to it
+    e = np.random.default_rng(4).standard_normal(500)
+    values = lfilter([1.0], [1.0, -1.2, 0.6], e)
+    for order in (1, 4):
+        fitted = noise_ar.fit(values - values.mean(), order)
+        model = noise.estimate(Channel("y", np.arange(500) * DT, values), (0.0, 5.0),
+                               settings=QuietSettings(order=order))
+        assert model.rho == noise_ar.autocorrelation(fitted.coefficients, 2)[1]
+        assert len(fitted.coefficients) == min(order, 2)
     again = noise.estimate(Channel("y", channel.time, 5.0 + channel.values), (1.0, 3.0))
     assert again.sigma == pytest.approx(noise.estimate(channel, (1.0, 3.0)).sigma)
 
@@ -184,6 +193,29 @@ def test_a_coarse_sensor_at_rest_has_the_noise_of_its_steps() -> None:
         (step / np.sqrt(12), 2 * fitted.sigma_std / fitted.sigma))
     steps = Channel("y", t, step * np.round(np.arange(400) / 50))
     assert noise.high_band_sigma(steps)[0] == pytest.approx(step / np.sqrt(12))
+
+
+@pytest.mark.parametrize("longest", ["first", "last"])
+def test_of_the_quiet_stretches_on_both_sides_of_a_gap_the_longest_counts(longest: str) -> None:
+    rest, rng = (0.0, 3.0), np.random.default_rng(6)
+    t = np.concatenate([np.arange(300), np.arange(400, 500)]) * DT
+    y = Channel("y", t, SIGMA * rng.standard_normal(400))
+    if longest == "last":
+        y, rest = Channel("y", t[-1] - t[::-1], y.values[::-1]), (2.0, 5.0)
+    assert find_quiet(y) == pytest.approx((rest[0], rest[1] - DT), abs=0.011)
+
+
+def test_a_quiet_stretch_ends_where_an_input_moves_beyond_its_own_noise() -> None:
+    """Noise of an input is no move of it, however far it lies from a hundredth of its range."""
+    t = np.arange(1000) * DT
+    y, noise = Channel("y", t, t), np.random.default_rng(0).standard_normal(1000)
+    moving = np.where(t < 2.0, 0.0, np.sin(9 * (t - 2.0)))
+    for u, limits in ((moving, (0.5, 2.0)), (moving + 0.03 * noise, (0.5, 2.0)),
+                      (np.sin(9 * t), (0.5, 2.6))):
+        found = without_moves(y, [Channel("u", t, u)], 0.5, 2.6)
+        assert found == pytest.approx(limits, abs=0.03)
+    calm = without_moves(y, [Channel("u", t, moving + 0.03 * noise)], 0.0, 1.98)
+    assert calm == pytest.approx((0.0, 1.98), abs=0.03)
 
 
 def test_stretches_end_at_gaps() -> None:

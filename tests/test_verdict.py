@@ -98,8 +98,9 @@ def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
 
     ranked = sorted(fits, key=lambda h: h.score())
+    # what is asked for ahead of time is done ahead of time, as by several threads
     answer = settle([h for h in ranked if not h.symbolic], 1.0, adequate, predicted, True, True,
-                    DEFAULTS)
+                    DEFAULTS, lambda jobs: [job() for job in jobs] and None)
     return with_formulas(answer, ranked, 1.0, adequate, predicted, True, True, DEFAULTS) if (
         answer.verdict == "unnamed") else answer
 
@@ -309,7 +310,7 @@ def test_twins_beside_a_law_outside_the_catalogue_are_one_hypothesis() -> None:
 def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1000.5, GUARD), hypothesis(1000.0, LAW)]
     refuted = answered(fits, refused=("a",))
-    assert refuted.verdict == "named" and refuted.given[0].symbolic
+    assert refuted.verdict == "named" and [h.key for h in refuted.given] == [{LAW.key}]
     # a formula that explains far less than the law outside the catalogue is none
     poor = [*fits[:3], hypothesis(1012.0, LAW)]
     assert answered(poor, refused=("a",)).verdict == "unnamed"
