@@ -58,13 +58,15 @@ LEFT_OUT: Mapping[str, tuple[str, ...]] = {
         "band", "beyond.own", "beyond.line", "beyond.inside", "beyond.knots_a_period",
         "beyond.resolved", "beyond.rows_a_knot", "beyond.louder", "beyond.unexplained",
         "verdict.sensitive", "budget.force_passes", "budget.force_knots", "budget.slow_knots",
-        "budget.windows"),
+        "budget.windows", "beyond.least_window"),
     "plans experiments, diagnoses none": (
         "confusion", "signs", "budget.planned_refits", "budget.planned_sizes", "budget.finalists",
-        "budget.compared", "budget.profile"),
+        "budget.compared", "budget.profile", "budget.profile_rate", "reached"),
     "acts on longer recordings only": (
         "budget.samples", "budget.put_together", "budget.samples_a_period",
         "budget.rows_searched", "budget.rows_tested", "budget.carried_far"),
+    "acts on much shorter recordings only": ("noise.least_spectrum", "noise.least_alone"),
+    "acts on rounded recordings only": ("rounding.changes", "rounding.dwell"),
     "acts on repeated experiments only": (
         "noise_refusal", "noise.driven_alike", "noise.moved_alike", "noise.covered", "noise.flat",
         "noise.caution", "budget.modes"),
@@ -72,7 +74,8 @@ LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "iterations or steps of a numerical method": (
         "budget.relevelled", "budget.rechecked", "budget.iterations", "budget.hurried",
         "budget.hop_iterations", "budget.several_starts", "budget.patience", "budget.noise_refit",
-        "budget.hops", "budget.finer", "budget.relinearised", "budget.levels"),
+        "budget.hops", "budget.finer", "budget.relinearised", "budget.levels", "budget.held_out",
+        "budget.beginnings"),
     "number of threads": ("budget.threads",),
     "number of draws": ("budget.draws",),
 }

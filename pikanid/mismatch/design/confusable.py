@@ -186,7 +186,7 @@ def _visible(candidate: Candidate, first: Sized | None, strong: Sized | None,
              rivals: Sequence[Rival], settings: Settings) -> Visible:
     name = strong.parameter if strong else ""
     unit = next((p.unit for p in candidate.parameters if p.name == name), "")
-    found = first is not None and first.distance >= settings.verdict.reached * settings.visible
+    found = first is not None and first.distance >= settings.reached * settings.visible
     smallest = first.departure if first and found else inf
     return Visible(candidate.key, candidate.ids, candidate.name, name, unit, smallest,
                    first.falling if first else False,

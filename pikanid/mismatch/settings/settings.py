@@ -45,6 +45,8 @@ class Settings:
         kinds: Shares of alpha for the signs of the catalogue, bands of frequency, and the inputs'
             past (Bonferroni); one or less in all.
         signs: Number of independent signs of which the largest counts, by its order.
+        reached: Share of the distance that counts as detectable, which the strongest form of an
+            effect must reach to be one that an experiment can show.
         choice_weight: γ of the extended Bayesian information criterion, the price of a choice; at 1
             the criterion is consistent for any number of choices that grows as a power of the
             number of rows (J. Chen and Z. Chen, Biometrika 95, 2008).
@@ -78,6 +80,7 @@ class Settings:
     confusion: Rate = 0.023
     kinds: tuple[Share, Share, Share] = (0.6, 0.2, 0.2)
     signs: Count = 100
+    reached: Share = 0.8
     choice_weight: Amount = 1.0
     quiet: QuietSettings = field(default_factory=QuietSettings)
     rounding: RoundingSettings = field(default_factory=RoundingSettings)

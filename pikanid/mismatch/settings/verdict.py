@@ -41,8 +41,6 @@ class VerdictSettings:
         open: Standard errors from a whole number within which an exponent may be that.
         narrow: Share of the half range: a hysteresis loop no wider is dry friction that gives
             before it slips.
-        reached: Share of the distance that counts as detectable, which the strongest form of an
-            effect must reach to be one that an experiment can show.
         sensitive: Times the held-out RMSE with parameters moved within their errors: more is
             theirs, not a law's.
     """
@@ -66,7 +64,6 @@ class VerdictSettings:
     whole: Amount = 1.0
     open: Amount = 3.0
     narrow: Share = 0.03
-    reached: Share = 0.8
     sensitive: Factor = 1.2
 
 
