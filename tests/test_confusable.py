@@ -15,7 +15,8 @@ from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.design.confusable import Confusable, _visible, confusable
 from pikanid.mismatch.design.response import Watched, response
-from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.design.sizing import Sized
+from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Parameter, systems
 from pikanid.recording import excitation
 
@@ -144,3 +145,11 @@ def test_an_effect_that_nothing_shows_has_no_size() -> None:
     assert (shown.parameter, shown.smallest, shown.falling) == ("", np.inf, False)
     assert (shown.value, shown.strength, shown.rivals) == (0.0, 0.0, ())
     assert "not at all" in str(Confusable((shown,), 4.0))
+
+
+def test_a_setting_decides_how_near_to_detectable_is_near_enough() -> None:
+    one = SimpleNamespace(key="shy", ids=("shy",), name="a shy effect", parameters=())
+    form = cast(Sized, SimpleNamespace(distance=4.0, departure=0.7, falling=False))
+    sizes = [_visible(cast(Candidate, one), form, None, (), Settings(reached=share)).smallest
+             for share in (0.79, 0.8, 0.81)]  # of a detectable distance of 5
+    assert sizes == [0.7, 0.7, np.inf]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -147,3 +149,10 @@ def test_a_clipped_peak_is_no_run_of_outliers() -> None:
     gone = np.flatnonzero(np.isnan(kept.recordings[0]["y"].values))
     assert set(alone) <= set(gone) and not set(hump) & set(gone)
     assert count == len(gone) <= 6
+
+
+def test_a_setting_says_from_how_many_samples_on_one_can_be_alone() -> None:
+    few = np.cos(1.9 * np.arange(19.0))
+    few[9] += 50.0
+    assert not lone(few, DEFAULTS.noise).any()
+    assert lone(few, replace(DEFAULTS.noise, least_alone=19))[9]

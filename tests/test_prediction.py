@@ -11,11 +11,12 @@ import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.hypothesis import extended, fitted
+from pikanid.mismatch.judge import prediction
 from pikanid.mismatch.judge.prediction import _from_levels, held_out
 from pikanid.mismatch.judge.prior import Prior, room
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
-from pikanid.optimise.levenberg_marquardt import minimise
+from pikanid.optimise.levenberg_marquardt import Evaluate, Minimum, minimise
 
 
 def prior(root: np.ndarray) -> Prior:
@@ -135,3 +136,23 @@ def test_a_wall_that_was_hardly_touched_predicts_a_hard_hit(depth: float, seed: 
     # noise, and what the move costs the first recording
     assert predicted.chi2 < 501 + 4 * np.sqrt(2 * 501)
     assert predicted.rmse_moved["theta"] == pytest.approx(0.0017, rel=0.1)
+
+
+def test_settings_bound_the_fits_to_held_out_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits: list[int] = []
+
+    def watched(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np.ndarray,
+                limit: int) -> Minimum | None:
+        limits.append(limit)
+        return minimise(evaluate, start, lower, upper, limit)
+
+    monkeypatch.setattr(prediction, "minimise", watched)
+    own = DEFAULTS.with_values({"budget.held_out": 4, "budget.beginnings": 5})
+    model = pk.systems.sloshing().with_initial(theta="free")
+    train, later = (pk.simulate(model, pk.excitation.planar_moves(3, 5.0, seed=seed),
+                                sigma=0.002, seed=seed) for seed in (1, 2))
+    case = open_case(model, (train,), (later,), None, lambda text: None, own)
+    predicted = case.predicted(case.base)
+    assert predicted is not None and set(limits) == {4, 5}
+    limits.clear()
+    assert predicted.together is not None and limits == [4]
