@@ -9,5 +9,6 @@ from __future__ import annotations
 from pikanid.discrepancy.api import kan_discrepancy
 from pikanid.discrepancy.edge import Edge
 from pikanid.discrepancy.result import Discrepancy
+from pikanid.discrepancy.settings import DiscrepancySettings
 
-__all__ = ["Discrepancy", "Edge", "kan_discrepancy"]
+__all__ = ["Discrepancy", "DiscrepancySettings", "Edge", "kan_discrepancy"]

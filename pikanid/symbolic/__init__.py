@@ -19,7 +19,8 @@ from pikanid.symbolic.naming import name_edge
 from pikanid.symbolic.prune import prune
 from pikanid.symbolic.pushing import push
 from pikanid.symbolic.reading import Reading
+from pikanid.symbolic.settings import SymbolicSettings
 from pikanid.symbolic.significance import contributions
 
-__all__ = ["LIBRARY", "Form", "NamedEdge", "Reading", "contributions", "extract", "name_edge",
-           "prune", "push", "user_form"]
+__all__ = ["LIBRARY", "Form", "NamedEdge", "Reading", "SymbolicSettings", "contributions",
+           "extract", "name_edge", "prune", "push", "user_form"]
