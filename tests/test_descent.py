@@ -10,6 +10,8 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.fitting.closest import Closest
+from pikanid.mismatch.fitting.descent import descended
 from pikanid.mismatch.fitting.hypothesis import extended, fitted, read_otherwise, turned
 from pikanid.mismatch.search.screen import Screen, law
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -33,6 +35,18 @@ def test_a_fit_simulates_finely_enough_where_it_ends(stiff: float) -> None:
     exact = Whitened(found.model, case.records)
     assert exact.choose_steps(found.minimum.theta, share=0.002)
     assert found.minimum.chi2 == pytest.approx(exact.chi2(found.minimum.theta), rel=0.02)
+
+
+def test_a_fit_that_comes_far_closer_than_all_before_is_simulated_finely() -> None:
+    """Its steps were chosen while thousands of times the noise were left, by the closest so far."""
+    truth = pk.systems.sloshing().with_term("theta_dot", "-3000.0*max(theta - 0.15, 0)")
+    case = opened(truth, pk.excitation.two_pulse(), 0.002)
+    wall = next(c for c in case.candidates if c.key == "wall_impact")
+    whitened = Whitened(extended(case.model, [wall]), case.records)
+    begin = {"wall": 0.14, "k_wall": 1e4, "l_theta": 0.045, "d_theta": 0.15}
+    found = descended(whitened, [begin], Closest(1e4 * whitened.rows), 30, lambda chi2: False)
+    assert found is not None and found.chi2 < 1.1 * whitened.rows
+    assert max(whitened.step_errors(found.theta)) <= 1
 
 
 def test_steps_that_are_too_long_elsewhere_are_seen() -> None:

@@ -6,12 +6,15 @@ from typing import cast
 
 import pytest
 
+import pikanid as pk
 from pikanid.estimate import Estimate
-from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.mismatch.judge.verdict import Answer, Verdict
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import _behind
 from pikanid.mismatch.report.findings import Explanation, NamedEffect, Where
 from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps.opening import open_case
+from pikanid.mismatch.steps.reporting import reported
 from pikanid.model.systems import sloshing
 
 
@@ -42,3 +45,16 @@ def test_no_headline_says_the_same_twice(verdict: Verdict) -> None:
 @pytest.mark.parametrize("gap", [-10.0, -0.4, 0.0, 0.4])
 def test_what_fits_no_worse_is_not_said_to_fit_worse(gap: float) -> None:
     assert "higher" not in _behind(gap) and "0" not in _behind(gap)
+
+
+@pytest.mark.parametrize("stiffer", [0.0, 400.0])
+def test_what_only_the_held_out_recording_shows_is_to_be_looked_for_there(stiffer: float) -> None:
+    nominal = sloshing()
+    other = nominal.with_term("theta_dot", "-k3*theta**3", [pk.Parameter("k3", stiffer)])
+    train, later = (pk.simulate(model, pk.excitation.planar_moves(3, 4.0, seed=seed), sigma=0.002,
+                                seed=seed) for seed, model in ((1, nominal), (2, other)))
+    case = open_case(nominal, (train,), (later,), None, lambda text: None, DEFAULTS)
+    result = reported(case, case.detected(), Answer("none", (), ()), case.sites[0], None)
+    assert result.verdict == "none" and result.held_out is not None
+    assert (result.held_out.p_value < 0.01) == (stiffer > 0)
+    assert any("does not predict the held-out one" in n for n in result.notes) == (stiffer > 0)

@@ -10,6 +10,7 @@ from scipy.stats import binom
 import pikanid as pk
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside, same_experiment
 from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps.opening import open_case
 from pikanid.noise.level import NoiseModel
 
 T = np.arange(60) / 15
@@ -96,6 +97,19 @@ def drop(drag: float, seed: int, level: float = 0.03) -> pk.Recording:
         T[:45] ** 2)
     h = 47.0 - fallen + level * slow(seed, 1, "wander", 45)[0]
     return pk.Recording.from_arrays(T[:45], {"h": h}, {"h": "m"}, name=f"drop {seed}")
+
+
+@pytest.mark.parametrize("proves", [True, False])
+def test_a_case_takes_its_noise_from_what_differs_between_repeats(proves: bool) -> None:
+    """In the recordings to explain, and in the held-out one where that is another drop."""
+    drops = tuple(drop(0.0, seed) for seed in (1, 2))
+    train, later = (drops[:1], drops[1:]) if proves else (drops, None)
+    case = open_case(pk.Model.from_dict(FALL), train, later, None, lambda text: None, DEFAULTS)
+    assert case.repeats is not None and "repeats" in case.repeats.levels["h"].source
+    assert all(level == case.repeats.levels for level in case.records.levels)
+    held = () if case.later is None else case.later.levels
+    assert held == ((case.repeats.levels,) if proves else ())
+    assert any("differ from one to the next" in note for note in case.notes)
 
 
 def test_slow_errors_of_two_drops_are_noise() -> None:
