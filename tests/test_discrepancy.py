@@ -19,6 +19,7 @@ from pikanid import errors
 from pikanid.discrepancy import Discrepancy, Edge, api, functional
 from pikanid.discrepancy.edges import EdgePlan
 from pikanid.discrepancy.level import Level
+from pikanid.discrepancy.settings import DiscrepancySettings
 from pikanid.formula.expressions import symbol
 from pikanid.problem.problem import Problem
 from pikanid.uncertainty import cramer_rao
@@ -118,7 +119,8 @@ def test_the_functional_is_asked_for_the_coarsest_grid(found: Discrepancy,
                                                        monkeypatch: pytest.MonkeyPatch) -> None:
     """What the relaxation itself says of the edge is asked below, at length."""
     def relaxed(nominal: pk.Estimate, problem: Problem, equation: str, plans: Sequence[EdgePlan],
-                intervals: int) -> Level:
+                intervals: int, settings: DiscrepancySettings) -> Level:
+        assert settings == DiscrepancySettings()
         assert nominal is found.nominal and problem.model.name == "tank"
         assert (equation, [p.argument for p in plans], intervals) == ("x", ["x"], 8)
         return coarse()
