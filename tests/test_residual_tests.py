@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.stats import binom, chi2, norm
 
 from pikanid.mismatch.detect.residual_tests import (
     BATCH,
     CLEAR,
     Detection,
+    _chance,
+    _standard,
     detect,
     frequency_bands,
     past_inputs,
@@ -26,9 +29,9 @@ NOTHING = np.empty((N, 0))
 
 
 def judged(r: np.ndarray, one_sided: tuple[bool, ...] = (True, True), signs: np.ndarray = SIGNS,
-           bands: list[np.ndarray] | None = None, spread: float = 0.0) -> Detection:
+           bands: list[np.ndarray] | None = None, spread: float = 0.0, seed: int = 0) -> Detection:
     lines = [NARROW, WIDE] if bands is None else bands
-    return detect(r, J, signs, np.array(one_sided, bool), lines, INPUTS, spread, DEFAULTS)
+    return detect(r, J, signs, np.array(one_sided, bool), lines, INPUTS, spread, DEFAULTS, seed)
 
 
 def near(p: float, share: float) -> object:
@@ -103,12 +106,27 @@ def test_doubt_of_the_noise_level_is_drawn_with_the_residual(spread: float) -> N
     assert found.inputs == near(float(np.mean(drawn > 18.0)), 0.2)
 
 
-def test_beyond_the_draws_p_values_go_on_falling_and_stay_cautious() -> None:
-    p = [judged(size * SIGNS[:, 0]).catalogue for size in (4.5, 5.5, 7.0, 40.0)]
-    assert p == sorted(p, reverse=True)
-    truth = [2 * norm.sf(size) for size in (4.5, 5.5, 7.0)]
-    assert all(ours > 0.3 * true for ours, true in zip(p, truth, strict=False))
-    assert p[2] < 1e-4 and p[3] < 1e-100
+@pytest.mark.parametrize("spread", [0.0, 0.4])
+@pytest.mark.parametrize("seed", range(3))
+def test_beyond_the_draws_p_values_are_those_of_the_tail(seed: int, spread: float) -> None:
+    """Of the signs one is as large as seen; the noise's power may be wrong.  By quadrature."""
+    sizes, width = (4.5, 5.5, 7.0, 40.0), max(spread, 1e-9)
+    p = [judged(size * SIGNS[:, 0], spread=spread, seed=seed).catalogue for size in sizes]
+    truth = [quad(lambda e, s=size: 2 * norm.sf(s * np.exp(-e / 2)) * norm.pdf(e, 0, width),
+                  -8 * width, 8 * width, points=[0.0])[0] for size in sizes[:3]]
+    # the draws' own error at the edge of the tail, and what two signs that overlap have in common
+    assert all(0.4 < ours / true < 4 for ours, true in zip(p, truth, strict=False))
+    assert p == sorted(p, reverse=True) and p[3] < 1e-20
+
+
+@pytest.mark.parametrize("freedom", [1, 5, 20])
+def test_the_tail_of_a_score_is_that_of_its_chi_square(freedom: int) -> None:
+    for power in (1.5 * freedom, 3.0 * freedom, 9.0 * freedom):
+        spread = 2 / (9 * freedom)
+        score = ((power / freedom) ** (1 / 3) - (1 - spread)) / np.sqrt(spread)
+        assert _standard(power, freedom) == pytest.approx(score)
+        assert _chance(score, freedom, 0.0) == pytest.approx(chi2.sf(power, freedom))
+    assert _chance(9.0, 0, 0.0) == pytest.approx(chi2.sf(9.0, 1))
 
 
 def test_white_noise_is_blamed_as_often_as_stated() -> None:

@@ -73,12 +73,14 @@ def _unit_scale(best: Refit, layer: int, j: int, s: int, x: Array, y: Array,
             place = at.start + len(form.columns) + k
             if knob.power == -1 and best.theta[place] != 0.0:
                 theta = _stretched(best, layer, j, s, float(best.theta[place]))
+                theta[place] = 1.0  # not the last digit of a product
                 return _tried(best, theta, place, x, y, best.score + SLACK, exact,
                               evaluations)
     place = into[0][1].start
     if best.theta[place] == 0.0:
         return best
     theta = _stretched(best, layer, j, s, 1.0 / float(best.theta[place]))
+    theta[place] = 1.0
     return _tried(best, theta, place, x, y, best.score + SLACK, exact,
                   evaluations)
 

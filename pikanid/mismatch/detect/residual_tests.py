@@ -9,15 +9,20 @@ drawn exactly from a Gaussian of that size; the noise level's own error is drawn
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import chdtrc, roots_hermitenorm
 
 from pikanid.mismatch.settings.settings import Settings
 
 BATCH = 500  # numerical: draws at once, between which it is asked whether more would matter
 CLEAR = (1e-6, 0.1)  # numerical: p-values beyond which more draws would decide nothing
+NODES, WEIGHTS = roots_hermitenorm(21)  # numerical: means over a normal error of ln power
+WEIGHTS = WEIGHTS / WEIGHTS.sum()
 
 
 @dataclass(frozen=True)
@@ -92,13 +97,17 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
     rng = np.random.default_rng(seed)
     z = L.T @ r
     observed = statistics(z[None])[0]
+    loudest = int(np.argmax([
+        _standard(float(z[a:b] @ z[a:b]), k) for (a, b), k in zip(
+            pairwise(ends[:-1]), freedom, strict=False)])) if len(bands) else 0
     drawn: list[np.ndarray] = []
     for _ in range(max(settings.budget.draws // BATCH, 1)):
         noise = rng.standard_normal((BATCH, len(root)), np.float32) @ root
         noise *= np.exp(0.5 * spread * rng.standard_normal((BATCH, 1), np.float32))
         drawn.append(statistics(noise))
-        p = [_tail(value, column) for value, column in
-             zip(observed, np.concatenate(drawn).T, strict=True)]
+        p = [_tail(value, column, functools.partial(_chance, freedom=k, spread=spread))
+             for value, column, k in zip(observed, np.concatenate(drawn).T,
+                                         (0, freedom[loudest], freedom[-1]), strict=True)]
         total = min(1.0, min(q / share for q, share in zip(p, settings.kinds, strict=True)))
         if not CLEAR[0] < total < CLEAR[1]:
             break
@@ -121,16 +130,36 @@ def _root(C: np.ndarray) -> np.ndarray:
     return np.asarray(rows[:, np.argsort(order - 1)])
 
 
-def _tail(observed: float, drawn: np.ndarray) -> float:
-    """p-value of a value against those drawn; beyond them by the exponential tail of a χ²."""
+def _tail(observed: float, drawn: np.ndarray, chance: Callable[[float], float]) -> float:
+    """p-value of a value against those drawn; beyond them it falls as the chance of one sign, or
+    of one band, to be so loud: of several all but one are quiet there.
+    """
     drawn = np.sort(drawn)
     above = len(drawn) - int(np.searchsorted(drawn, observed))
     if above >= 10:
         return (above + 1) / (len(drawn) + 1)
-    # a generalised Pareto tail would do more; an exponential through two quantiles is cautious
-    q1, q2 = drawn[int(0.9 * len(drawn))], drawn[int(0.99 * len(drawn))]
-    slope = np.log(10) / max(q2 - q1, 1e-12)
-    return float(max(0.01 * np.exp(-slope * max(observed - q2, 0.0)), 1e-300))
+    edge = drawn[int(0.99 * len(drawn))]
+    return float(max(0.01 * min(chance(observed) / max(chance(edge), 1e-300), 1.0), 1e-300))
+
+
+def _chance(value: float, freedom: int, spread: float) -> float:
+    """That χ², times a power with a log-normal error, exceeds a value.
+
+    Args:
+        value: χ² of one degree of freedom where `freedom` is 0, else a standard score.
+        freedom: Degrees of freedom; 0 for one that is not given as a score.
+        spread: Standard deviation of ln power.
+    """
+    k = max(freedom, 1)
+    power = value if not freedom else k * max(
+        1 - 2 / (9 * k) + value * np.sqrt(2 / (9 * k)), 0.0) ** 3
+    return float(WEIGHTS @ chdtrc(k, power * np.exp(-spread * NODES)))
+
+
+def _standard(power: float, freedom: int) -> float:
+    """The standard score of a χ² (E. B. Wilson and M. M. Hilferty, Proc. N. A. S. 17, 1931)."""
+    return ((power / freedom) ** (1 / 3) - (1 - 2 / (9 * freedom))) / float(
+        np.sqrt(2 / (9 * freedom)))
 
 
 def frequency_bands(t: np.ndarray, rate: float, count: int = 9) -> list[np.ndarray]:
