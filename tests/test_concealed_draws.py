@@ -9,7 +9,7 @@ import pytest
 
 from pikanid import errors
 from pikanid.validation.concealed import noise as noises
-from pikanid.validation.concealed.deck import CLASSES, DEFAULT_MIX, FLOW, deal, parse_mix
+from pikanid.validation.concealed.deck import DEFAULT_MIX, FLOW, deal, parse_mix
 from pikanid.validation.concealed.effect import Scales
 from pikanid.validation.concealed.effects import CATALOGUE, IDS, NEAR, OUTSIDE
 from pikanid.validation.concealed.excitations import RICH_KINDS, Bounds, pair, rich, two_pulse
@@ -120,10 +120,10 @@ def test_pairs_are_two_different_things() -> None:
 
 
 def test_order_does_not_depend_on_the_class() -> None:
-    position = np.zeros(len(CLASSES))
+    position = np.zeros(len(DEFAULT_MIX))
     for seed in range(100):
         cards = deal(50, DEFAULT_MIX, np.random.default_rng(seed))
-        for k, kind in enumerate(CLASSES):
+        for k, kind in enumerate(DEFAULT_MIX):
             position[k] += np.mean([i for i, card in enumerate(cards) if card.kind == kind])
     assert position / 100 == pytest.approx(24.5, abs=2.5)
 

@@ -123,7 +123,8 @@ def test_tally_counts_what_it_says() -> None:
     counts = {name: (share.count, share.n) for name, share in tally(scores).items()}
     assert counts == {
         "right": (1, 3), "wrong": (2, 8), "wrong_strictly": (3, 8), "wrong_of_answers": (2, 4),
-        "wrong_but_knowable": (1, 8), "formula": (0, 8), "false_alarm": (1, 2), "missed": (1, 5),
+        "wrong_but_knowable": (1, 8), "surely_in_part": (0, 8), "found": (0, 0),
+        "found_by_name": (0, 0), "formula": (0, 8), "false_alarm": (1, 2), "missed": (1, 5),
         "parameters_within_3_std": (0, 0), "held_out_within_1.1_noise": (0, 1)}
 
 
@@ -155,3 +156,106 @@ def test_reliability_of_calibrated_answers() -> None:
 def test_what_is_no_diagnosis(broken: dict) -> None:
     with pytest.raises(errors.BadSetting, match="case '001'"):
         judge(FRICTION, broken)
+
+
+# --- beside a remainder ------------------------------------------------------------------------
+
+
+def entry(identifier: str, near: str = "", **more: Any) -> dict:
+    return {"id": identifier, "twins": TWINS.get(identifier, []), "near": near, **more}
+
+
+def beside(*ids: str, laws: tuple[str, ...] = ("cogging", "turbulence"),
+           seen: tuple[float, ...] = ()) -> dict:
+    return {**case(*ids, kind="remainder", nameable=False, nominal=300.0, seen=seen),
+            "remainder": [entry(law) for law in laws], "remainder_share": 0.2}
+
+
+def surely(*present: tuple[str, str], **more: Any) -> dict:
+    """Families and, where the name is sure, ids."""
+    return answer(["quadratic_drag"], verdict="partial", present=[
+        {"family": family, "ids": ids.split("/") if ids else None} for family, ids in present],
+        **more)
+
+
+ONE, TWO = beside("coulomb_friction"), beside("coulomb_friction", "input_delay")
+DRY, LATE = ("dry friction", ""), ("timing", "")
+NAMED = ("dry friction", "coulomb_friction")
+
+
+@pytest.mark.parametrize(("truth", "given", "outcome", "reason", "found"), [
+    (ONE, answer(["coulomb_friction"]), "right", "", (1, 1)),
+    (ONE, answer(["coulomb_friction", "symbolic:-a*sin(m*theta + p)"]), "right", "", (1, 1)),
+    (ONE, answer(["quadratic_drag"], ["coulomb_friction"]), "right", "", (1, 1)),
+    (ONE, answer(["quadratic_drag"], ["power_drag"], ["coulomb_friction"]), "long", "", (0, 0)),
+    (ONE, answer(["coulomb_friction", "sensor_offset"]), "wrong", "extra", (0, 0)),
+    (ONE, answer(["quadratic_drag"]), "wrong", "other", (0, 0)),
+    (ONE, answer(["turbulence"]), "part", "", (0, 0)),
+    (ONE, answer(["coulomb_friction"], verdict="unconfirmed"), "silent", "", (0, 0)),
+    (ONE, answer(), "silent", "", (0, 0)),
+    (ONE, surely(DRY), "part", "", (1, 0)),
+    (ONE, surely(NAMED), "part", "", (1, 1)),
+    (ONE, surely(NAMED, ("restoring force", "")), "part", "", (1, 1)),  # of the cogging
+    (ONE, surely(("restoring force", "")), "part", "", (0, 0)),
+    (ONE, surely(("restoring force", "cubic_stiffness")), "wrong", "other", (0, 0)),
+    (ONE, surely(NAMED, ("drag", "")), "wrong", "family", (0, 0)),
+    (ONE, surely(("dry friction", "hysteresis")), "wrong", "other", (0, 0)),
+    (ONE, surely(), "silent", "", (0, 0)),
+    (TWO, answer(["coulomb_friction", "sensor_delay"]), "right", "", (2, 2)),
+    (TWO, answer(["coulomb_friction"]), "part", "", (1, 1)),
+    (TWO, surely(NAMED, LATE), "part", "", (2, 1)),
+    (TWO, surely(LATE), "part", "", (1, 0)),
+    (beside("coulomb_friction", "input_delay", seen=(200.0, 79.0)), surely(LATE), "part", "",
+     (0, 0)),
+    (beside("hysteresis"), surely(DRY), "part", "", (1, 0)),
+    (case("coulomb_friction"), surely(DRY), "part", "", (0, 0)),
+    (case(), surely(DRY), "wrong", "nothing", (0, 0))])
+def test_what_is_said_beside_a_remainder_has_to_be_there(
+        truth: dict, given: dict, outcome: str, reason: str, found: tuple[int, int]) -> None:
+    score = judge(truth, given)
+    assert (score.outcome, score.reason) == (outcome, reason)
+    assert (score.found, score.found_by_name) == found
+
+
+def test_families_of_what_hides_are_those_of_its_variant_and_exponent() -> None:
+    def outcome(family: str, **effect: Any) -> str:
+        truth = {**ONE, "effects": [entry(**effect)]}
+        return judge(truth, surely((family, ""))).outcome
+
+    play = {"identifier": "hysteresis", "variant": "backlash"}
+    assert outcome("input curve", **play) == "part"
+    assert outcome("dry friction", **play) == "wrong"
+    power = {"identifier": "power_drag", "parameters": {"n": {"value": 0.2}}}
+    assert outcome("dry friction", **power) == outcome("drag", **power) == "part"
+    power["parameters"] = {"n": {"value": 1.5}}
+    assert outcome("dry friction", **power) == "wrong"
+
+
+def test_rounded_coulomb_friction_is_coulomb_friction() -> None:
+    smooth = case("smooth_friction", kind="near", near="coulomb_friction")
+    assert judge(smooth, answer(["coulomb_friction"])).outcome == "right"
+    assert judge(smooth, answer(["symbolic:-c*tanh(theta_dot/w)"])).outcome == "formula"
+    memory = case("stick_slip_friction", kind="near", near="coulomb_friction")
+    assert judge(memory, answer(["coulomb_friction"])).reason == "near"
+
+
+def test_tally_counts_strong_effects_beside_a_remainder_only() -> None:
+    weak = beside("coulomb_friction", "input_delay", seen=(200.0, 79.0))
+    scores = [judge(TWO, surely(NAMED, LATE)), judge(weak, surely(NAMED)), judge(ONE, answer()),
+              judge(case("coulomb_friction", nominal=300.0), answer(["coulomb_friction"])),
+              judge(ONE, surely(DRY, ("drag", "")))]
+    counts = {name: (share.count, share.n) for name, share in tally(scores).items()}
+    assert counts["found"] == (3, 5)
+    assert counts["found_by_name"] == (2, 5)
+    assert counts["surely_in_part"] == (2, 5)
+    assert counts["wrong"] == (1, 5)
+
+
+@pytest.mark.parametrize("changed", [
+    {"remainder": "cogging"}, {"remainder": [{"id": "cogging"}]}, {"remainder_share": "much"},
+    {"remainder_share": -0.1}, {"remainder": [entry("cogging", parameters=[1])]},
+    {"remainder": [entry("cogging", variant=3)]},
+    {"remainder": [entry("power_drag", parameters={"n": {"value": "big"}})]}], ids=str)
+def test_a_remainder_that_is_none_is_one_sentence(changed: dict) -> None:
+    with pytest.raises(errors.BadSetting, match="truth file"):
+        judge({**ONE, **changed}, answer())

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from pikanid.validation.concealed import visibility as room
+from pikanid.validation.concealed.candidate import Candidate, nominal_fit, starts
 from pikanid.validation.concealed.case import in_tank
 from pikanid.validation.concealed.deck import FLOW
 from pikanid.validation.concealed.effect import Effect, Scales
@@ -21,11 +22,8 @@ from pikanid.validation.concealed.simulate import measured
 from pikanid.validation.concealed.sizing import sized
 from pikanid.validation.concealed.tank import Tank
 from pikanid.validation.concealed.visibility import (
-    Candidate,
     Visibility,
     is_rival,
-    nominal_fit,
-    starts,
     visibility,
 )
 

@@ -16,6 +16,8 @@ EXAMPLES = """Examples:
 
   pikanid conceal --out clean --truth clean.json --mix nothing=1 --sigma 1deg
 
+  pikanid conceal --out rest --truth rest.json --mix remainder=1 --excitation mixed
+
 Without --seed nobody knows what is hidden: the seed comes from the operating system and lies in
 the truth file only; the folder holds the truth's SHA-256. An interrupted run goes on where it
 stopped when it is repeated."""
@@ -36,7 +38,8 @@ def conceal(
         metavar="ANGLE", help="standard deviation of the noise, as 0.1deg or 0.002")] = "0.1deg",
     mix: Annotated[str | None, typer.Option(
         metavar="CLASS=SHARE,...", show_default=False,
-        help="shares of nothing, single, pair, near and outside")] = None,
+        help="shares of nothing, single, pair, near, outside, unforeseen (more laws of no "
+             "catalogue) and remainder (strong effects, with such laws beside them)")] = None,
     seed: Annotated[int | None, typer.Option(
         metavar="N", min=0, show_default=False,
         help="makes an open set, for development: anybody can make it again")] = None,

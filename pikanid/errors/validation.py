@@ -11,6 +11,14 @@ def conceal_diverged() -> str:
     return "The reference rig leaves the finite numbers: the effect is too strong for this drive."
 
 
+def conceal_remainder() -> str:
+    return "These laws cannot leave the share of the misfit that is wanted of them here."
+
+
+def conceal_faint() -> str:
+    return "A hidden effect is weaker than it is to be beside a remainder."
+
+
 def conceal_cases(given: int, limit: int) -> str:
     return f"--cases is {given}; give 1 to {limit}."
 

@@ -9,7 +9,7 @@ from typing import Any
 from pikanid import errors
 from pikanid.storage.entries import Entry
 
-VERDICTS = ("none", "named", "set", "unconfirmed", "unnamed")
+VERDICTS = ("none", "named", "set", "partial", "unconfirmed", "unnamed")
 LONGEST_ID = 1000  # limit: of an effect: the formula of a symbolic law stands in it
 MOST = 100  # limit: hypotheses, effects of one, ids of one effect
 
@@ -25,6 +25,7 @@ class Answer:
         probabilities: Of each.
         after: Value and standard error of each parameter that has one, after the diagnosis.
         held_out: RMSE after it over the noise; None where it is not given.
+        present: Family, and ids where the name is sure, of what is said to be surely there.
     """
 
     verdict: str
@@ -33,6 +34,7 @@ class Answer:
     probabilities: tuple[float, ...]
     after: Mapping[str, tuple[float, float]]
     held_out: float | None
+    present: tuple[tuple[str, frozenset[str]], ...] = ()
 
 
 def read_answer(diagnosis: Any, case: str) -> Answer:
@@ -51,7 +53,8 @@ def read_answer(diagnosis: Any, case: str) -> Answer:
     return Answer(
         get["verdict"].text(VERDICTS), get["mismatch"].flag(),
         tuple(effects for effects, _ in given), tuple(p for _, p in given),
-        _after(get.get("parameters")), _held_out(get.get("held_out")))
+        _after(get.get("parameters")), _held_out(get.get("held_out")),
+        tuple(_present(e) for e in get["present"].items(most=MOST)) if "present" in get else ())
 
 
 def check_case(case: Any) -> None:
@@ -70,11 +73,12 @@ def check_case(case: Any) -> None:
     get["nameable"].flag()
     effects = get["effects"].items(most=MOST)
     for entry in effects:
-        effect = entry.table(("id", "twins", "near"), None)
-        effect["id"].text(longest=LONGEST_ID)
-        effect["near"].text(longest=LONGEST_ID)
-        for twin in effect["twins"].items(most=MOST):
-            twin.text(longest=LONGEST_ID)
+        _check_effect(entry)
+    if "remainder" in get:
+        for entry in get["remainder"].items(most=MOST):
+            _check_effect(entry)
+    if "remainder_share" in get:
+        get["remainder_share"].number(low=0.0)
     for entry in get["base"].table(optional=None, most=MOST).values():
         entry.table(("value",), None)["value"].number()
     seen = get["visibility"].table(
@@ -86,12 +90,31 @@ def check_case(case: Any) -> None:
         rival.text(longest=LONGEST_ID)
 
 
+def _check_effect(entry: Entry) -> None:
+    effect = entry.table(("id", "twins", "near"), None)
+    for key in ("id", "near", "variant"):
+        if key in effect:
+            effect[key].text(longest=LONGEST_ID)
+    for twin in effect["twins"].items(most=MOST):
+        twin.text(longest=LONGEST_ID)
+    if "parameters" in effect:
+        for parameter in effect["parameters"].table(optional=None, most=MOST).values():
+            parameter.table(("value",), None)["value"].number()
+
+
 def _hypothesis(entry: Entry) -> tuple[list[set[str]], float]:
     get = entry.table(("effects", "probability"), None)
     effects = [effect.table(("ids",), None)["ids"].items(most=MOST)
                for effect in get["effects"].items(most=MOST)]
     return ([{identifier.text(longest=LONGEST_ID) for identifier in ids} for ids in effects],
             get["probability"].number(0.0, 1.0))
+
+
+def _present(entry: Entry) -> tuple[str, frozenset[str]]:
+    get = entry.table(("family", "ids"), None)
+    ids = [] if get["ids"].value is None else get["ids"].items(most=MOST)
+    return (get["family"].text(longest=LONGEST_ID),
+            frozenset(identifier.text(longest=LONGEST_ID) for identifier in ids))
 
 
 def _after(parameters: Entry | None) -> dict[str, tuple[float, float]]:

@@ -5,30 +5,33 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.validation.concealed import excitations, files
+from pikanid.validation.concealed import excitations, files, remainder
 from pikanid.validation.concealed import noise as noises
-from pikanid.validation.concealed.deck import FLOW, Card
+from pikanid.validation.concealed.candidate import nominal_fit
+from pikanid.validation.concealed.deck import FLOW, Card, redealt
 from pikanid.validation.concealed.effect import Effect, Scales
 from pikanid.validation.concealed.effects import CATALOGUE
 from pikanid.validation.concealed.experiment import Experiment
 from pikanid.validation.concealed.noise import Noise
 from pikanid.validation.concealed.rig import Rig
 from pikanid.validation.concealed.simulate import measured
-from pikanid.validation.concealed.sizing import drawn_target, sized
+from pikanid.validation.concealed.sizing import STRONG, drawn_target, sized, strong
 from pikanid.validation.concealed.tank import Tank, radius_for
 from pikanid.validation.concealed.visibility import (
     FROM_NOMINAL,
     FROM_RIVAL,
     Visibility,
-    nominal_fit,
     visibility,
+    without_each,
 )
 
+# Of one case; after so many, effects that are not strong enough beside a remainder are exchanged.
+ATTEMPTS, PATIENCE = 40, 4  # definition: numbers of draws
 PAPER_RADIUS, PAPER_DEPTH, PAPER_LENGTH = 0.033, 0.090, 0.045  # definition: [m], of the paper
 
 
@@ -75,6 +78,19 @@ class _Hidden:
     parts: tuple[Effect, ...]
     entries: list[dict[str, object]]
     sizes: Sequence[Mapping[str, float]] = ()
+    left: _Left | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """Beside the hidden effects: entries of its laws, shares of the misfit that the effects cause,
+    and the effects' own distances, each without the other.
+    """
+
+    entries: list[dict[str, object]]
+    share: float
+    after_refit: float
+    effects: tuple[float, ...]
 
 
 def make(order: Order) -> Case:
@@ -85,9 +101,11 @@ def make(order: Order) -> Case:
     >>> sorted(made.recordings), made.truth["nameable"]
     (['001_held_out.csv', '001_train.csv'], False)
     """
-    for attempt in range(20):
+    for attempt in range(ATTEMPTS):
         # A separate stream for each attempt, so that a retry is as reproducible as a success.
         rng = np.random.default_rng([order.seed, order.index, attempt])
+        if order.card.remainder and attempt >= PATIENCE:
+            order = replace(order, card=redealt(order.card, rng))
         try:
             return _attempt(order, rng)
         except errors.SimulationFailed:
@@ -106,13 +124,21 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     scales = _scales(base, train, held_out)
     hidden = (in_tank(tank) if tank
               else _in_rig(order.card, base, train, scales, noise, rng))
+    if order.card.remainder:
+        hidden = _with_remainder(order.card.remainder, hidden, base, train, scales, noise, rng)
     experiments = {"train": train, "held_out": held_out}
     clean = {"train": measured(hidden.train, train),
              "held_out": measured(hidden.held_out, held_out)}
     recordings = {
         f"{order.name}_{key}.csv": files.csv(experiments[key], noise.spoilt(clean[key], rng))
         for key in ("train", "held_out")}
-    seen = visibility(clean["train"], train, noise, base, hidden.parts, scales, hidden.sizes)
+    if hidden.left is None:
+        seen = visibility(clean["train"], train, noise, base, hidden.parts, scales, hidden.sizes)
+    else:
+        # No explanation is the truth, and no rival decides anything: none is looked for.
+        missed = nominal_fit(noise.whitened(clean["train"]), train, noise, base)
+        seen = Visibility(missed.distance, (), missed.distance, hidden.left.effects,
+                          float(missed.values[0]), float(missed.values[1]))
     later = nominal_fit(noise.whitened(clean["held_out"]), held_out, noise, base).distance
     return Case(recordings, {
         "id": order.name, "class": order.card.kind,
@@ -121,7 +147,8 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
         "excitation": {key: e.kind for key, e in experiments.items()},
         "base": _base_entry(base), "noise": noise.to_dict(), "effects": hidden.entries,
         "visibility": _visibility_entry(seen, later),
-        "nameable": _nameable(order.card.effects, seen)})
+        "nameable": not order.card.remainder and _nameable(order.card.effects, seen),
+        **_left_entry(hidden.left)})
 
 
 def _nameable(effects: tuple[Effect, ...], seen: Visibility) -> bool:
@@ -151,20 +178,47 @@ def _in_rig(card: Card, base: Rig, train: Experiment, scales: Scales, noise: Noi
     now, later, entries, sizes = base, base, [], []
     for effect in card.effects:
         shape = effect.drawn(rng, scales)
-        values = sized(shape, drawn_target(rng), base, train, noise)
+        values = (strong(shape, rng, base, train, noise) if card.remainder
+                  else sized(shape, drawn_target(rng), base, train, noise))
         now = effect.applied(now, values)
-        afterwards = values
-        if effect.held_out == "other":
-            other = effect.drawn(rng, scales)
-            share = float(rng.uniform(0.5, 1.5))
-            size = effect.quantities[0].name
-            # The same strength, roughly; another time, state or realisation.
-            afterwards = {**other.sized(0.5), size: float(f"{values[size] * share:.5g}")}
-        if effect.held_out != "absent":
-            later = effect.applied(later, afterwards)
-        entries.append(_effect_entry(effect, values, afterwards))
+        later, entry = _afterwards(effect, values, later, scales, rng)
+        entries.append(entry)
         sizes.append(values)
     return _Hidden(now, later, card.effects, entries, sizes)
+
+
+def _afterwards(effect: Effect, values: Mapping[str, float], later: Rig, scales: Scales,
+                rng: np.random.Generator) -> tuple[Rig, dict[str, object]]:
+    """The rig of the second recording with an effect, and the effect's entry."""
+    afterwards = values
+    if effect.held_out == "other":
+        other = effect.drawn(rng, scales)
+        share = float(rng.uniform(0.5, 1.5))
+        size = effect.quantities[0].name
+        # The same strength, roughly; another time, state or realisation.
+        afterwards = {**other.sized(0.5), size: float(f"{values[size] * share:.5g}")}
+    if effect.held_out != "absent":
+        later = effect.applied(later, afterwards)
+    return later, _effect_entry(effect, values, afterwards)
+
+
+def _with_remainder(laws: tuple[Effect, ...], hidden: _Hidden, base: Rig, train: Experiment,
+                    scales: Scales, noise: Noise, rng: np.random.Generator) -> _Hidden:
+    assert isinstance(hidden.train, Rig)
+    assert isinstance(hidden.held_out, Rig)
+    seen = without_each(measured(hidden.train, train), train, noise, base, hidden.parts, scales,
+                        hidden.sizes)
+    if min(seen) < STRONG:
+        # Two effects may cancel, or one be too weak in this experiment.
+        raise errors.SimulationFailed(errors.conceal_faint())
+    left = remainder.drawn(laws, hidden.train, base, hidden.parts, hidden.sizes, train, scales,
+                           noise, rng)
+    later, entries = hidden.held_out, []
+    for law, values in zip(laws, left.values, strict=True):
+        later, entry = _afterwards(law, values, later, scales, rng)
+        entries.append(entry)
+    return replace(hidden, train=left.rig, held_out=later,
+                   left=_Left(entries, left.share, left.left, seen))
 
 
 def _effect_entry(effect: Effect, values: Mapping[str, float],
@@ -215,6 +269,13 @@ def _base_entry(base: Rig) -> dict[str, object]:
     return {"l_theta": {"value": base.length, "unit": "m"},
             "d_theta": {"value": base.damping, "unit": "N*s/m"},
             "m": {"value": base.mass, "unit": "kg"}, "g": {"value": base.gravity, "unit": "m/s^2"}}
+
+
+def _left_entry(left: _Left | None) -> dict[str, object]:
+    if left is None:
+        return {}
+    return {"remainder": left.entries, "remainder_share": float(f"{left.share:.4g}"),
+            "remainder_share_after_refit": float(f"{left.after_refit:.4g}")}
 
 
 def _visibility_entry(seen: Visibility, later: float) -> dict[str, object]:

@@ -9,9 +9,18 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.validation.concealed.effect import Effect
-from pikanid.validation.concealed.effects import IDS, NEAR, OUTSIDE, POTENTIAL_FLOW, variants
+from pikanid.validation.concealed.effects import (
+    IDS,
+    NEAR,
+    OUTSIDE,
+    POTENTIAL_FLOW,
+    UNFORESEEN,
+    variants,
+)
+from pikanid.validation.concealed.families import families_of
 
-CLASSES = ("nothing", "single", "pair", "near", "outside")
+CLASSES = ("nothing", "single", "pair", "near", "outside", "unforeseen", "remainder")
+# What is not named here has no share: sets of before those classes stay byte for byte the same.
 DEFAULT_MIX: Mapping[str, float] = {
     "nothing": 0.10, "single": 0.45, "pair": 0.20, "near": 0.12,
     "outside": 0.13}  # definition: shares of the classes
@@ -22,6 +31,13 @@ _OVERLAP = (
     {"input_delay", "sensor_delay", "actuator_lag", "sensor_lag"},
     {"input_gain", "sensor_gain"}, {"static_bias", "sensor_offset"},
     {"sensor_saturation", "wall_impact"}, {"input_saturation", "input_dead_zone", "hysteresis"})
+# What may be left beside hidden effects, and how many laws at a time.
+LAWS = (*NEAR, *OUTSIDE, *UNFORESEEN)
+MOST_LAWS = 3  # definition: of a remainder
+# Hidden beside a remainder: what a second recording can confirm, and strong enough; the boundary
+# layer nowhere reaches a third of what is wanted.
+STEADY = tuple(identifier for identifier in IDS if identifier != "boundary_layer" and all(
+    effect.quantities and effect.held_out == "same" for effect in variants(identifier)))
 
 
 @dataclass(frozen=True)
@@ -31,10 +47,12 @@ class Card:
     Attributes:
         kind: One of CLASSES.
         effects: None, one or two.
+        remainder: What is left beside them: laws that no catalogue holds.
     """
 
     kind: str
     effects: tuple[Effect, ...]
+    remainder: tuple[Effect, ...] = ()
 
 
 def parse_mix(text: str) -> dict[str, float]:
@@ -46,14 +64,14 @@ def parse_mix(text: str) -> dict[str, float]:
     >>> parse_mix("single=3,nothing=1")
     {'nothing': 0.25, 'single': 0.75, 'pair': 0.0, 'near': 0.0, 'outside': 0.0}
     """
-    shares = dict.fromkeys(CLASSES, 0.0)
+    shares = dict.fromkeys(DEFAULT_MIX, 0.0)
     for part in text.split(","):
         name, _, number = part.partition("=")
         try:
             share = float(number)
         except ValueError:
             share = -1.0
-        if name.strip() not in shares or not 0.0 <= share < 1e6:
+        if name.strip() not in CLASSES or not 0.0 <= share < 1e6:
             raise errors.BadSetting(errors.conceal_mix(text, CLASSES))
         shares[name.strip()] = share
     total = sum(shares.values())
@@ -74,6 +92,7 @@ def deal(cases: int, mix: Mapping[str, float], rng: np.random.Generator) -> list
     near = _endless(tuple(range(len(NEAR))), rng)
     # The flow is the outsider that matters most: every second one.
     outside = _endless((*OUTSIDE, *[FLOW] * len(OUTSIDE)), rng)
+    unforeseen, steady, hand = _endless(UNFORESEEN, rng), _endless(STEADY, rng), _Hand(LAWS, rng)
     cards = []
     for kind, number in _counts(cases, mix).items():
         for _ in range(number):
@@ -85,6 +104,13 @@ def deal(cases: int, mix: Mapping[str, float], rng: np.random.Generator) -> list
                 cards.append(Card(kind, (NEAR[next(near)],)))
             elif kind == "outside":
                 cards.append(Card(kind, (next(outside),)))
+            elif kind == "unforeseen":
+                cards.append(Card(kind, (next(unforeseen),)))
+            elif kind == "remainder":
+                hidden = (_two(steady, rng) if rng.random() < 0.5
+                          else (_variant(next(steady), rng),))
+                cards.append(Card(kind, hidden, hand.dealt(
+                    int(rng.integers(1, MOST_LAWS + 1)), hidden)))
             else:
                 cards.append(Card(kind, ()))
     return [cards[k] for k in rng.permutation(len(cards))]
@@ -105,6 +131,56 @@ def _endless(things: tuple, rng: np.random.Generator) -> Iterator:
     while True:
         for k in rng.permutation(len(things)):
             yield things[k]
+
+
+def redealt(card: Card, rng: np.random.Generator) -> Card:
+    """As many other hidden effects beside the same laws."""
+    ids = _endless(STEADY, rng)
+    while True:
+        hidden = _two(ids, rng) if len(card.effects) == 2 else (_variant(next(ids), rng),)
+        if all(apart(law, effect) for law in card.remainder for effect in hidden):
+            return Card(card.kind, hidden, card.remainder)
+
+
+class _Hand:
+    """Laws to be dealt as often as each other, although not every one goes with every effect."""
+
+    def __init__(self, laws: tuple[Effect, ...], rng: np.random.Generator):
+        self.laws, self.rng = laws, rng
+        self.left: list[Effect] = []
+
+    def dealt(self, number: int, hidden: tuple[Effect, ...]) -> tuple[Effect, ...]:
+        """So many laws that stand apart from the hidden effects and from each other."""
+        chosen: list[Effect] = []
+        while len(chosen) < number:
+            fitting = [law for law in self.left
+                       if all(apart(law, other) for other in (*hidden, *chosen))]
+            if fitting:
+                chosen.append(fitting[0])
+                self.left.remove(fitting[0])
+            else:
+                self.left += [self.laws[k] for k in self.rng.permutation(len(self.laws))]
+        return tuple(chosen)
+
+
+def apart(law: Effect, other: Effect) -> bool:
+    """Whether a law beside another effect leaves no doubt what each of them is.
+
+    Not where they are of one family, one stands for the other, or both set the same.
+
+    >>> [apart(law, variants("coulomb_friction")[0]) for law in UNFORESEEN[:4]]
+    [False, False, False, True]
+    """
+    names, others = ({e.id, e.near, *e.twins} - {""} for e in (law, other))
+    groups = (group for group in _OVERLAP if names & group)
+    return not (names & others or any(others & group for group in groups)
+                or families_of(law.id, law.variant) & families_of(other.id, other.variant)
+                or _settings(law) & _settings(other))
+
+
+def _settings(effect: Effect) -> set[str]:
+    return {field for quantity in effect.quantities for field, _ in quantity.sets} | {
+        field for field, _ in effect.fixed}
 
 
 def _variant(identifier: str, rng: np.random.Generator) -> Effect:

@@ -35,9 +35,9 @@ MOST_EVENTS = 100_000  # limit: of one recording
 MOST_STEPS = 1_000_000  # limit: of one recording
 
 # Discrete state.
-SIGN, CONTACT, MEMORY_SIGN, STUCK, HELD = range(5)  # definition: positions in the discrete state
+SIGN, CONTACT, MEMORY_SIGN, STUCK, HELD, TAUT, SIDE = range(7)  # definition: positions in it
 # Guards.
-NONE, REVERSAL, WALL, STOP, MEMORY, RELEASE = range(6)  # definition: numbers of the guards
+NONE, REVERSAL, WALL, STOP, MEMORY, RELEASE, CABLE, CENTRE = range(8)  # definition: the guards
 
 
 @njit
@@ -48,7 +48,8 @@ def _rhs(kind, t, x, n, row, drive, p, mode, u, dx):
     stuck = mode[STUCK] + mode[HELD] > 0
     if kind == TANK:
         return tank_equations.rhs(x, u, p, mode[SIGN], stuck, dx)
-    return eq.rhs(t, x, n, u, p, mode[SIGN], mode[CONTACT], mode[MEMORY_SIGN], stuck, dx)
+    return eq.rhs(t, x, n, u, p, mode[SIGN], mode[CONTACT], mode[MEMORY_SIGN], stuck, mode[TAUT],
+                  mode[SIDE], dx)
 
 
 @njit
@@ -79,12 +80,11 @@ def _step(kind, t, h, x, n, row, drive, p, mode, u, stages, x_new):
 
 
 @njit
-def _limits(kind, p):
+def _limits(kind, p, x):
     """Friction that holds against being pushed up, and down."""
     if kind == TANK:
         return p[1], p[1]
-    at_rest = p[eq.COULOMB] * (1.0 + p[eq.STRIBECK])
-    return at_rest + p[eq.ONE_WAY], at_rest
+    return eq.friction(p, x[0], 1, 0.0), eq.friction(p, x[0], -1, 0.0)
 
 
 @njit
@@ -93,7 +93,7 @@ def _settle(kind, t, x, n, row, drive, p, mode, u, dx):
     x[1] = 0.0
     mode[STUCK], mode[HELD] = 0, 0
     free = _rhs(kind, t, x, n, row, drive, p, mode, u, dx)
-    up, down = _limits(kind, p)
+    up, down = _limits(kind, p, x)
     if kind == RIG and x[0] >= p[eq.STOP] and free >= 0.0:
         x[0] = p[eq.STOP]
         mode[HELD], mode[SIGN] = 1, 1
@@ -114,10 +114,14 @@ def _guard(which, kind, t, x, n, row, drive, p, mode, u, dx):
         return p[eq.STOP] - x[0]
     if which == MEMORY:
         return mode[MEMORY_SIGN] * x[eq.HYSTERESIS]
+    if which == CABLE:
+        return x[0] - p[eq.CABLE_ANGLE] if mode[TAUT] else p[eq.CABLE_ANGLE] - x[0]
+    if which == CENTRE:
+        return mode[SIDE] * x[0]
     free = _rhs(kind, t, x, n, row, drive, p, mode, u, dx)
     if mode[HELD]:
         return free
-    up, down = _limits(kind, p)
+    up, down = _limits(kind, p, x)
     return min(up - free, free + down)
 
 
@@ -134,13 +138,17 @@ def _watched(which, kind, p, mode, reverses):
         return p[eq.WALL_STIFFNESS] > 0.0
     if which == STOP:
         return p[eq.STOP] < 1e8
+    if which == CABLE:
+        return p[eq.CABLE] != 0.0
+    if which == CENTRE:
+        return p[eq.ASYMMETRY] != 0.0
     return p[eq.MEMORY] != 0.0
 
 
 @njit
 def _broken(kind, t, x, n, row, drive, p, mode, reverses, but, u, dx):
     """The first guard that (t, x) violates, other than `but`."""
-    for which in range(REVERSAL, RELEASE + 1):
+    for which in range(REVERSAL, CENTRE + 1):
         if which != but and _watched(which, kind, p, mode, reverses) and \
                 _guard(which, kind, t, x, n, row, drive, p, mode, u, dx) < 0.0:
             return which
@@ -199,6 +207,10 @@ def _switch(which, kind, t, x, n, row, drive, p, mode, u, dx):
         mode[CONTACT] = 1 - mode[CONTACT]
     elif which == MEMORY:
         mode[MEMORY_SIGN] = -mode[MEMORY_SIGN]
+    elif which == CABLE:
+        mode[TAUT] = 1 - mode[TAUT]
+    elif which == CENTRE:
+        mode[SIDE] = -mode[SIDE]
     elif which == STOP and x[1] > 1e-7:
         x[0], x[1] = p[eq.STOP], -p[eq.RESTITUTION] * x[1]
         mode[SIGN] = -1
@@ -225,8 +237,8 @@ def integrate(kind, p, drive, stops, segments, x0, reverses, states):
     n = len(x0)
     x, x_new, u, dx = x0.copy(), np.empty(n), np.empty(4), np.empty(n)
     stages = np.empty((STAGES, n))
-    mode = np.zeros(5, dtype=np.int64)
-    mode[SIGN], mode[MEMORY_SIGN] = 1, 1
+    mode = np.zeros(7, dtype=np.int64)
+    mode[SIGN], mode[MEMORY_SIGN], mode[SIDE] = 1, 1, 1
     t, h_next, events, steps = stops[0], np.inf, 0, 0
     states[0] = x
     for m in range(1, len(stops)):

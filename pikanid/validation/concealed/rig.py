@@ -66,6 +66,28 @@ class Rig(NamedTuple):
     bilinear: float = 0.0  # κ u_x θ' [s/m]
     actuator_lag: float = 0.0  # [s]
     sensor_lag: float = 0.0  # [s]
+    smooth_friction: float = 0.0  # c of c tanh(θ'/width) [rad/s²]
+    smooth_width: float = 0.01  # [rad/s]
+    position_friction: float = 0.0  # c of c θ² sgn θ' [1/(rad s²)]
+    bristle: float = 0.0  # c of c z, friction by bristles that bend [rad/s²]
+    bristle_give: float = 0.01  # angle over which they bend [rad]
+    bristle_rise: float = 0.0  # static friction over the kinetic one, minus 1
+    bristle_speed: float = 0.1  # [rad/s]
+    cogging: float = 0.0  # a of a (sin(mθ + φ) - sin φ) [rad/s²]
+    cogging_pitch: float = 50.0  # m [1/rad]
+    cogging_phase: float = 0.0  # φ [rad]
+    cable: float = 0.0  # k of k max(θ - θ_c, 0)² [1/(rad s²)]
+    cable_angle: float = FAR  # θ_c [rad]
+    magnet: float = 0.0  # a of a s/(1 + s²)², s = θ/width [rad/s²]
+    magnet_width: float = 0.05  # [rad]
+    asymmetry: float = 0.0  # κ of κ |θ| [1/s²]
+    pumping: float = 0.0  # g (1 + ε sin Ωt)
+    pumping_rate: float = 30.0  # Ω [rad/s]
+    wake: float = 0.0  # κ of κ (θ' - w), τ w' = θ' - w [1/s]
+    wake_time: float = 0.1  # τ [s]
+    warming: float = 0.0  # d (1 + a exp(-t/τ))
+    warming_time: float = 1.0  # τ [s]
+    tilt: float = 0.0  # inclination of the platform over its position [rad/m]
 
     first_order_hold: float = 0.0  # 0: zero-order, 1: first-order
     dead_zone: float = 0.0  # [m/s²]
@@ -77,6 +99,7 @@ class Rig(NamedTuple):
     input_delay: float = 0.0  # [s]
     turbulence: float = 0.0  # standard deviation of a random force [rad/s²]
     turbulence_key: float = 0.0  # which random force
+    input_square: float = 0.0  # κ of u + κ u² [s²/m]
     start_angle: float = 0.0  # beyond the angle at rest [rad]
     start_rate: float = 0.0  # [rad/s]
     sensor_delay: float = 0.0  # [s]
@@ -87,6 +110,14 @@ class Rig(NamedTuple):
     sensor_high: float = FAR  # clipped above [rad]
     offset: float = 0.0  # [rad]
     sensor_drift: float = 0.0  # [rad/s]
+    ripple: float = 0.0  # a of s + a (sin(ms + φ) - sin φ) [rad]
+    ripple_pitch: float = 20.0  # m [1/rad]
+    ripple_phase: float = 0.0  # φ [rad]
+    shake: float = 0.0  # a sin(Ωt + φ) on the angle that is seen [rad]
+    shake_rate: float = 400.0  # Ω [rad/s]
+    shake_phase: float = 0.0  # φ [rad]
+    jitter: float = 0.0  # standard deviation of the times at which samples are taken [s]
+    jitter_key: float = 0.0  # which random times
 
 
 DYNAMIC = Rig._fields[: Rig._fields.index("first_order_hold")]

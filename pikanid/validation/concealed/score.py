@@ -5,41 +5,34 @@ two hypotheses is the truth, *wrong* if none is.  Twins count as one effect.  A 
 truth only if it holds every hidden effect and no other.  Of two hidden effects one may be too weak
 to be told (the recording without it fits to less than 4σ): who then names the other one alone has
 named the *visible* part, and is neither right nor wrong.
+
+A `partial` answer says what is surely there; it is right as far as it goes if every name or family
+that it gives belongs to something that hides.  Where laws of no catalogue are left beside the
+hidden effects, the whole cannot be said: there an answer is right if it holds every hidden effect
+and nothing that does not hide, and right as far as it goes if some effects are not in it.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
-
-import numpy as np
-from scipy.optimize import linear_sum_assignment
+from typing import Any
 
 from pikanid.validation.concealed.answers import check_case, read_answer
-from pikanid.validation.concealed.visibility import FROM_NOMINAL, FROM_RIVAL
+from pikanid.validation.concealed.outcome import (
+    ANSWERS,
+    Outcome,
+    found,
+    outcome_of,
+    read,
+    same,
+    truth_of,
+)
+from pikanid.validation.concealed.visibility import FROM_NOMINAL
 
 Entry = Mapping[str, Any]
-Outcome = Literal["right", "long", "visible", "wrong", "formula", "alarm", "silent"]
-ANSWERS = ("named", "set")
-MOST_HYPOTHESES = 2  # definition: that an answer may name
-SYMBOLIC = "symbolic:"
-# Laws that an entry of the catalogue includes: dry friction with or without a rise at low speed.
-INCLUDED = {"stribeck_friction": "coulomb_friction"}
-# What the formula of a law that is in no catalogue must hold; who writes another one is wrong.
-FORMULAS = {
-    "stribeck_friction": r"exp\(.*sign\(\w+_dot\)",
-    "hard_stop": r"max\(.*\)\*\(1 [+-] ",
-    "one_way_friction": r"sign\([^)]*_dot\) [+-] (1|force_0)|force_0 [+-] .*sign\([^)]*_dot\)",
-    "rate_limited_input": r"changing by at most",
-    "soft_saturation": r"u_\w\*\*3|Abs\(u_\w\)|tanh\(",
-    "quintic_stiffness": r"theta\*\*5|signed_power\(theta,",
-    "even_stiffness": r"theta\*\*2|Abs\(theta\)",
-    "velocity_coupled_drive": r"u_\w\*theta_dot",
-}
 
 
 @dataclass(frozen=True)
@@ -54,18 +47,24 @@ class Score:
         verdict: Of the diagnosis.
         mismatch: Whether it says that something is missing.
         outcome: `right`; `long` (the truth among more than two hypotheses); `visible` (the part of
-            the truth that could be told among at most two hypotheses); `wrong`; `formula` (a
-            symbolic law of the kind that is hidden, where that is in no catalogue); `alarm`
-            (something is missing, nothing named, where nothing hides); `silent`.
+            the truth that could be told among at most two hypotheses); `part` (all that is said
+            to be surely there is); `wrong`; `formula` (a symbolic law of the kind that is hidden,
+            where that is in no catalogue); `alarm` (something is missing, nothing named, where
+            nothing hides); `silent`.
         reason: Of a wrong answer: `indistinguishable` (the truth's best rival, closer than 4σ: no
-            method could know), `part` of the truth, `extra` effects besides it, `near` (the entry
-            that the hidden law resembles), `nothing` is hidden, or `other`.
+            method could know), `part` of the truth, `extra` effects besides it, a `family` that
+            does not hide, `near` (the entry that the hidden law resembles), `nothing` is hidden,
+            or `other`.
         hypotheses: How many were given.
         relative_weight: Of the most probable one; None where nothing is answered.
         first_is_truth: Whether that one is the truth, its visible part, or a formula of its kind.
         within: Whether each base parameter lies within 3 standard errors of the truth; None where
             none is compared.
         held_out: RMSE after the diagnosis over the noise; None where it is not given.
+        beside: Whether laws of no catalogue are left beside the hidden effects.
+        strong: How many hidden effects are at least 80σ strong.
+        found: How many of them an answer that is not wrong gives, by name or family.
+        found_by_name: How many by name.
     """
 
     case: str
@@ -81,6 +80,10 @@ class Score:
     first_is_truth: bool
     within: bool | None
     held_out: float | None
+    beside: bool = False
+    strong: int = 0
+    found: int = 0
+    found_by_name: int = 0
 
 
 @dataclass(frozen=True)
@@ -143,18 +146,19 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
     """
     check_case(case)
     answer = read_answer(diagnosis, case["id"])
-    truth = [{effect["id"], *effect["twins"], INCLUDED.get(effect["id"], effect["id"])}
-             for effect in case["effects"]]
+    truth = truth_of(case)
     given = answer.hypotheses
-    outcome, reason = _outcome(case, truth, answer.verdict, answer.mismatch, given)
+    outcome, reason = outcome_of(case, truth, answer)
     answered = answer.verdict in ANSWERS and bool(given)
+    strong, by_any, by_name = found(truth, answer, outcome)
     return Score(
         case["id"], case["class"], case["nameable"], float(case["visibility"]["nominal"]),
         answer.verdict, answer.mismatch, outcome, reason, len(given),
         answer.probabilities[0] if answered else None,
-        answered and any(_same([_read(effect) for effect in given[0]], t)
-                         for t in (truth, _visible(case, truth)) if t),
-        _within(case["base"], answer.after), answer.held_out)
+        answered and any(same([read(effect) for effect in given[0]], t)
+                         for t in (truth.effects, truth.visible) if t),
+        _within(case["base"], answer.after), answer.held_out,
+        bool(truth.laws), strong, by_any, by_name)
 
 
 def tally(scores: Iterable[Score]) -> dict[str, Share]:
@@ -162,8 +166,8 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
 
     `right` counts nameable cases only; `wrong` counts all, `wrong_strictly` also answers that name
     the visible part; `wrong_but_knowable` leaves out the answers that no method could have known to
-    be wrong; `false_alarm` counts cases that hide
-    nothing, `missed` those whose effect is at least 5σ strong.
+    be wrong; `false_alarm` counts cases that hide nothing, `missed` those whose effect is at least
+    5σ strong.  `found` and `found_by_name` count hidden effects of at least 80σ beside a remainder.
     """
     every = list(scores)
     nameable = [s for s in every if s.nameable]
@@ -171,8 +175,9 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
     strong = [s for s in every if s.kind != "nothing" and s.nominal >= FROM_NOMINAL]
     right = [s for s in nameable if s.outcome == "right"]
     wrong = [s for s in every if s.outcome == "wrong"]
-    answers = [s for s in every if s.verdict in ANSWERS]
+    answers = [s for s in every if s.verdict in (*ANSWERS, "partial")]
     compared = [s for s in right if s.within is not None]
+    strong_beside = sum(s.strong for s in every if s.beside)
     ratios = [s.held_out for s in right if s.held_out is not None]
     return {
         "right": Share(len(right), len(nameable)),
@@ -182,6 +187,9 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
         "wrong_of_answers": Share(len(wrong), len(answers)),
         "wrong_but_knowable": Share(
             sum(s.reason != "indistinguishable" for s in wrong), len(every)),
+        "surely_in_part": Share(sum(s.outcome == "part" for s in every), len(every)),
+        "found": Share(sum(s.found for s in every if s.beside), strong_beside),
+        "found_by_name": Share(sum(s.found_by_name for s in every if s.beside), strong_beside),
         "formula": Share(sum(s.outcome == "formula" for s in every), len(every)),
         "false_alarm": Share(sum(s.mismatch for s in nothing), len(nothing)),
         "missed": Share(sum(not s.mismatch for s in strong), len(strong)),
@@ -206,66 +214,6 @@ def reliability(scores: Iterable[Score],
             mean = sum(p for p, _ in inside) / len(inside)
             rows.append((mean, Share(sum(hit for _, hit in inside), len(inside))))
     return rows
-
-
-def _outcome(case: Entry, truth: list[set[str]], verdict: str, mismatch: bool,
-             explanations: Sequence[list[set[str]]]) -> tuple[Outcome, str]:
-    if verdict not in ANSWERS:
-        if not truth:
-            return ("alarm" if mismatch else "right"), ""
-        return "silent", ""
-    if not truth:
-        return "wrong", "nothing"
-    if any(_same(explanation, truth) for explanation in explanations):
-        return ("right" if len(explanations) <= MOST_HYPOTHESES else "long"), ""
-    visible = _visible(case, truth)
-    if visible and len(explanations) <= MOST_HYPOTHESES and any(
-            _same(explanation, visible) for explanation in explanations):
-        return "visible", ""
-    read = [[_read(effect) for effect in explanation] for explanation in explanations]
-    if any(_same(explanation, truth) for explanation in read):
-        return "formula", ""
-    return "wrong", _reason(case, truth, read)
-
-
-def _read(effect: set[str]) -> set[str]:
-    """Ids of an effect, with those of the hidden laws that its formula is one of."""
-    return effect | {law for law, pattern in FORMULAS.items() for identifier in effect
-                     if identifier.startswith(SYMBOLIC) and re.search(pattern, identifier)}
-
-
-def _visible(case: Entry, truth: list[set[str]]) -> list[set[str]]:
-    return [effect for effect, distance in zip(truth, case["visibility"]["effects"], strict=True)
-            if distance >= FROM_RIVAL]
-
-
-def _reason(case: Entry, truth: list[set[str]], explanations: list[list[set[str]]]) -> str:
-    seen = case["visibility"]
-    rival = [{identifier} for identifier in seen["best_rival"]]
-    near = [{effect["near"]} if effect["near"] else {effect["id"], *effect["twins"]}
-            for effect in case["effects"]]
-    if float(seen["best_rival_distance"]) < FROM_RIVAL and any(
-            _same(explanation, rival) for explanation in explanations):
-        return "indistinguishable"
-    if any(_contains(truth, explanation) for explanation in explanations):
-        return "part"
-    if any(_contains(explanation, truth) for explanation in explanations):
-        return "extra"
-    if any(_same(explanation, near) for explanation in explanations):
-        return "near"
-    return "other"
-
-
-def _contains(larger: Sequence[set[str]], smaller: Sequence[set[str]]) -> bool:
-    """Whether every effect of the smaller has a partner of its own in the larger."""
-    if len(smaller) > len(larger):
-        return False
-    apart = np.array([[not a & b for b in larger] for a in smaller]).reshape(-1, len(larger))
-    return not apart[linear_sum_assignment(apart)].any()
-
-
-def _same(explanation: Sequence[set[str]], truth: Sequence[set[str]]) -> bool:
-    return len(explanation) == len(truth) and _contains(explanation, truth)
 
 
 def _within(base: Entry, after: Mapping[str, tuple[float, float]]) -> bool | None:

@@ -12,12 +12,14 @@ from pikanid import errors
 from pikanid.validation.concealed import equations, signals
 from pikanid.validation.concealed.arrays import Array
 from pikanid.validation.concealed.camera import surface_angle
-from pikanid.validation.concealed.experiment import Experiment
+from pikanid.validation.concealed.experiment import RATE, Experiment
 from pikanid.validation.concealed.rig import DYNAMIC, FAR, Rig
 from pikanid.validation.concealed.signals import Signal
 from pikanid.validation.concealed.tank import Tank
 
 TURBULENCE_STEP = 0.05  # definition: [s] between the corners of the random force
+LARGEST_JITTER = 0.45 / RATE  # definition: [s]: samples keep their order
+REST_STEP = 1e-3  # numerical: [rad] in the search for the angle at rest
 
 
 def measured(rig: Rig | Tank, experiment: Experiment) -> Array:
@@ -35,15 +37,23 @@ def measured(rig: Rig | Tank, experiment: Experiment) -> Array:
         states = motion(rig, experiment, experiment.t)
         return surface_angle(rig, states)
     # The camera samples at t, but sees what was there `sensor_delay` before.
-    seen_at = np.maximum(experiment.t * (1.0 + rig.clock) - rig.sensor_delay, 0.0)
+    seen_at = experiment.t * (1.0 + rig.clock) - rig.sensor_delay
+    if rig.jitter:
+        seen_at = seen_at + _jitter(len(seen_at), rig.jitter, int(rig.jitter_key))
+    seen_at = np.maximum(seen_at, 0.0)
     states = motion(rig, experiment, seen_at)
     s = states[:, 0]
     if rig.sensor_lag > 0.0:
         s = states[:, equations.SENSOR]
     elif states.shape[1] > equations.MODE:
         s = s + states[:, equations.MODE]
+    if rig.ripple:
+        phase = rig.ripple_phase
+        s = s + rig.ripple * (np.sin(rig.ripple_pitch * s + phase) - np.sin(phase))
     y = rig.sensor_gain * (s + rig.sensor_cubic * s**3)
     y = np.clip(y, rig.sensor_low, rig.sensor_high)
+    if rig.shake:
+        y = y + rig.shake * np.sin(rig.shake_rate * experiment.t + rig.shake_phase)
     return y + rig.offset + rig.sensor_drift * experiment.t
 
 
@@ -97,8 +107,10 @@ INPUT_OF_NOMINAL = _input_settings(Rig())
 @lru_cache(maxsize=32)
 def _drive(experiment: Experiment, settings: tuple[float, ...]) -> Array:
     """(K, 9) knot, values and slopes of u_x on its way into the rig, u_y, pitch, random force."""
-    hold, dead, limit, soft, slew, play, gain, delay, turbulence, key = settings
+    hold, dead, limit, soft, slew, play, gain, delay, turbulence, key, square = settings
     samples = experiment.u_x
+    if square != 0.0:
+        samples = samples + square * samples**2
     if soft < FAR:
         samples = soft * np.tanh(samples / soft)
     u = (signals.first_order if hold else signals.zero_order)(experiment.t, samples)
@@ -134,9 +146,16 @@ def _random_force(duration: float, size: float, key: int) -> Signal:
     return signals.first_order(t, values)
 
 
+def _jitter(n: int, size: float, key: int) -> Array:
+    """(N,) errors of the times of samples, too small to change their order [s]."""
+    drawn = size * np.random.default_rng(key).standard_normal(n)
+    return np.clip(drawn, -LARGEST_JITTER, LARGEST_JITTER)
+
+
 def _reverses(rig: Rig) -> bool:
-    return bool(rig.coulomb or rig.one_way or rig.quadratic or rig.power or rig.memory
-                or rig.wall_stiffness or rig.stop < FAR)
+    return bool(rig.coulomb or rig.one_way or rig.position_friction or rig.bristle
+                or rig.quadratic or rig.power or rig.memory or rig.wall_stiffness
+                or rig.stop < FAR)
 
 
 def _start(rig: Rig) -> Array:
@@ -145,7 +164,9 @@ def _start(rig: Rig) -> Array:
     for needed, last in ((rig.actuator_lag, equations.ACTUATOR), (rig.sensor_lag, equations.SENSOR),
                          (rig.memory, equations.HYSTERESIS),
                          (rig.mode_gain or rig.internal, equations.MODE + 1),
-                         (rig.layer, equations.FIRST_LAYER + equations.LAYERS - 1)):
+                         (rig.layer, equations.FIRST_LAYER + equations.LAYERS - 1),
+                         (rig.bristle, equations.BEND), (rig.wake, equations.TRAIL),
+                         (rig.tilt, equations.TRACK + 1)):
         n = last + 1 if needed else n
     x0 = np.zeros(n)
     x0[0] = _angle_at_rest(rig) + rig.start_angle
@@ -164,4 +185,19 @@ def _angle_at_rest(rig: Rig) -> float:
                 - rig.cubic * 6 * (theta - np.sin(theta)) - rig.even * theta**2
                 - rig.quintic * theta**5)
 
-    return float(brentq(force, -1.2, 1.2, xtol=1e-15))
+    if not (rig.cogging or rig.cable or rig.magnet or rig.asymmetry):
+        return float(brentq(force, -1.2, 1.2, xtol=1e-15))
+    p = np.array(rig[: len(DYNAMIC)], dtype=float)
+
+    def every_force(theta: float) -> float:
+        taut, side = theta > rig.cable_angle, 1.0 if theta > 0.0 else -1.0
+        return force(theta) + float(equations.static_force(p, theta, taut, side))
+
+    # Of several places to rest, the first that the bias pushes it to.
+    way = REST_STEP if rig.bias > 0.0 else -REST_STEP
+    last = 0.0
+    while every_force(last + way) * way > 0.0 and abs(last) < 1.2:
+        last += way
+    if abs(last) >= 1.2:
+        raise errors.SimulationFailed(errors.conceal_diverged())
+    return float(brentq(every_force, last, last + way, xtol=1e-15))

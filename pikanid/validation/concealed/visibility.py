@@ -7,7 +7,7 @@ model is at least 5σ away and the best rival that is no twin at least 4σ.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -15,13 +15,13 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.validation.concealed.arrays import Array
+from pikanid.validation.concealed.candidate import Candidate, nominal_fit, starts
 from pikanid.validation.concealed.effect import Effect, Quantity, Scales
 from pikanid.validation.concealed.effects import CATALOGUE
 from pikanid.validation.concealed.experiment import Experiment
-from pikanid.validation.concealed.fisher import MOST_STEPS, Refit, at, refit, unexplained
+from pikanid.validation.concealed.fisher import Refit, unexplained
 from pikanid.validation.concealed.noise import Noise
 from pikanid.validation.concealed.rig import Rig
-from pikanid.validation.concealed.simulate import measured
 
 # A set of concealed cases is a function of its seed alone: none of these can be set.
 FROM_NOMINAL, FROM_RIVAL = 5.0, 4.0  # definition: [σ] of a nameable truth
@@ -31,9 +31,6 @@ ROUGH_STEPS = 2  # definition: of a rough refit
 IN_PAIRS = 6, 4  # definition: numbers of refits
 # A hidden effect without the others: times its size to first order, dampings, and full refits.
 SIZES, DAMPINGS, ALONE = np.geomspace(0.3, 3.0, 9), 4, 6  # definition: of starts
-# Of l [m] and d [N s/m].
-BASE_LOW, BASE_HIGH = np.array([0.003, 0.0]), np.array([1.0, 20.0])  # definition: their bounds
-BASE_SCALE = np.array([0.005, 0.1])  # definition: a typical change of these
 
 
 @dataclass(frozen=True)
@@ -57,74 +54,10 @@ class Visibility:
     damping: float
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A rig with free l and d and one or more effects with free quantities."""
-
-    effects: tuple[Effect, ...]
-    scales: Scales
-    experiment: Experiment
-    noise: Noise
-    base: Rig
-
-    def response(self, v: Array) -> Array:
-        """(N,) whitened response at v = (l, d, quantities of each effect)."""
-        return self.noise.whitened(measured(self.rig(v), self.experiment))
-
-    def rig(self, v: Array) -> Rig:
-        """The rig at v."""
-        rig = self.base._replace(length=float(v[0]), damping=float(v[1]))
-        position = 2
-        for effect in self.effects:
-            values = {}
-            for quantity in effect.quantities:
-                values[quantity.name] = float(v[position])
-                position += 1
-            rig = effect.applied(rig, values)
-        return rig
-
-    def _columns(self) -> list[tuple[float, float, float]]:
-        found = []
-        for effect in self.effects:
-            for q in effect.quantities:
-                unit = self.scales.of(q.relative)
-                low, high = (bound * unit for bound in q.bounds)
-                typical = abs(q.starts[0] - q.neutral) * unit
-                found.append((low, high, typical))
-        return found
-
-    def at(self, target: Array, values: Array) -> Refit:
-        """As it is at values (p,), not adjusted to a whitened target (N,)."""
-        low, high, scale = self._box()
-        return at(self.response, target, np.clip(values, low, high), high, scale)
-
-    def refitted(self, target: Array, start: Array, steps: int = MOST_STEPS) -> Refit:
-        """Adjusted to a whitened target (N,) in at most so many steps."""
-        return refit(self.response, target, start, *self._box(), steps)
-
-    def _box(self) -> tuple[Array, Array, Array]:
-        """(p,) lower and upper bounds and scales."""
-        low, high, scale = np.array(self._columns()).reshape(-1, 3).T
-        return np.r_[BASE_LOW, low], np.r_[BASE_HIGH, high], np.r_[BASE_SCALE, scale]
-
-
-def starts(effect: Effect, scales: Scales) -> Iterator[Array]:
-    """Quantities (k,) from where a fit of an effect may start."""
-    choices = [[s * scales.of(q.relative) for s in q.starts] for q in effect.quantities]
-    for choice in product(*choices):
-        yield np.array(choice, dtype=float)
-
-
 def is_rival(rival: Effect, true_effect: Effect) -> bool:
     """Whether naming one instead of the other would be wrong."""
     return not (rival.id == true_effect.id or rival.id in true_effect.twins
                 or true_effect.id in rival.covers)
-
-
-def nominal_fit(truth: Array, experiment: Experiment, noise: Noise, base: Rig) -> Refit:
-    """The nominal pendulum adjusted to a whitened truth (N,), starting at the true l and d."""
-    candidate = Candidate((), Scales(1.0, 1.0, 1.0, 1.0), experiment, noise, Rig())
-    return candidate.refitted(truth, np.array([base.length, base.damping]))
 
 
 def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
@@ -155,12 +88,7 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
         drawn = {effect: own for own, effect in zip(sizes, true_effects, strict=False)}
         for k, other in enumerate(true_effects):
             kept = [e for e in true_effects if e is not other and e.kind == "catalogue"]
-            part, fit, anchor = clean, nominal, clean.at(target, bare)
-            for effect in kept:
-                part = replace(part, effects=(*part.effects, effect))
-                fit = contest.alone(part, (fit, anchor), effect,
-                                    _at_truth(part.effects, base, drawn))
-                anchor = part.at(target, np.r_[bare, fit.values[len(bare):]])
+            part, fit, anchor = contest.only(kept, (nominal, clean.at(target, bare)), base, drawn)
             without[k] = fit.distance
             same = {name for e in kept for name in (e.id, *e.twins)}
             others = [c for c in CATALOGUE if is_rival(c, other) and c.id not in same]
@@ -169,6 +97,24 @@ def visibility(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
     names, distance = contest.winner()
     return Visibility(nominal.distance, names, min(distance, nominal.distance), tuple(without),
                       float(nominal.values[0]), float(nominal.values[1]))
+
+
+def without_each(truth: Array, experiment: Experiment, noise: Noise, base: Rig,
+                 true_effects: Sequence[Effect], scales: Scales,
+                 sizes: Sequence[Mapping[str, float]]) -> tuple[float, ...]:
+    """Distance of the best fit without each hidden effect; no rival is looked for.
+
+    Arguments as those of `visibility`.
+    """
+    target = noise.whitened(truth)
+    nominal = nominal_fit(target, experiment, noise, base)
+    contest = _Contest(target, experiment, noise, scales)
+    anchor = Candidate((), scales, experiment, noise, Rig()).at(
+        target, np.array([base.length, base.damping]))
+    drawn = dict(zip(true_effects, sizes, strict=True))
+    return tuple(
+        contest.only([e for e in true_effects if e is not other], (nominal, anchor), base,
+                     drawn)[1].distance for other in true_effects)
 
 
 def _at_truth(effects: Sequence[Effect], base: Rig,
@@ -212,6 +158,25 @@ class _Contest:
         closest = sorted(best.values(), key=lambda entry: entry[1].distance)
         for candidate, found in closest[:full]:
             self._keep(candidate, candidate.refitted(self.target, found.values))
+
+    def only(self, effects: Sequence[Effect], begun: tuple[Refit, Refit], base: Rig,
+             drawn: Mapping[Effect, Mapping[str, float]]) -> tuple[Candidate, Refit, Refit]:
+        """Some effects and no other: candidate, its fit, and it at the true l and d.
+
+        Args:
+            effects: Added one after another.
+            begun: Fit of the nominal model, and that at the true l and d.
+            base: The rig without effects.
+            drawn: Quantities of each effect where they are known.
+        """
+        part = Candidate((), self.scales, self.experiment, self.noise, Rig())
+        bare = np.array([base.length, base.damping])
+        fit, anchor = begun
+        for effect in effects:
+            part = replace(part, effects=(*part.effects, effect))
+            fit = self.alone(part, (fit, anchor), effect, _at_truth(part.effects, base, drawn))
+            anchor = part.at(self.target, np.r_[bare, fit.values[len(bare):]])
+        return part, fit, anchor
 
     def alone(self, candidate: Candidate, fits: Sequence[Refit], effect: Effect,
               more: Sequence[Array]) -> Refit:
