@@ -190,6 +190,8 @@ def _diagnosed(model: str, train: pk.Recording, other: pk.Recording) -> tuple[Di
 
 def _row(recording: str, dx: Diagnosis, seconds: float, remark: str = "") -> Row:
     names = tuple(" + ".join("/".join(e.ids) for e in h.effects) for h in dx.hypotheses)
+    if dx.present:
+        names = ("surely " + " and ".join("/".join(p.ids) or p.family for p in dx.present),)
     proof = dx.held_out
     before, after = (np.nan, np.nan) if proof is None else (proof.rmse_before, proof.rmse_after)
     return Row(recording, dx.verdict, names, before, after, "" if proof is None else proof.unit,

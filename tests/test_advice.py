@@ -10,7 +10,7 @@ import pytest
 
 import pikanid as pk
 from pikanid.mismatch.data.whitened import Records
-from pikanid.mismatch.report.advice import EXPLORE, PROVE, STRENGTHEN, advice
+from pikanid.mismatch.report.advice import PROVE, STRENGTHEN, advice, explore
 from pikanid.mismatch.report.findings import Explanation
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
@@ -66,9 +66,19 @@ def test_the_best_profile_is_proposed_only_where_it_separates(
 
 def test_other_verdicts_have_sentences_of_their_own(records: Records) -> None:
     assert advice("named", (FRICTION,), records, RATE, True) == ""
-    assert advice("unnamed", (), records, RATE, True) == EXPLORE
+    assert explore(True, RATE) in advice("unnamed", (), records, RATE, True)
+    assert explore(True, RATE) in advice("unconfirmed", (FRICTION,), records, RATE, True)
+    assert explore(False, 0.0) in advice("partial", (FRICTION,), records, 0.0, True, driven=False)
     assert advice("unconfirmed", (FRICTION,), records, RATE, False) == PROVE
     assert advice("unconfirmed", (FRICTION,), records, RATE, True, weak=True) == STRENGTHEN
+
+
+def test_what_to_record_suits_the_plant() -> None:
+    assert "resonance" in explore(True, RATE) and "decay" in explore(True, RATE)
+    motor = explore(True, 0.0)
+    assert "steps" in motor and "resonance" not in motor and "decay" not in motor
+    pendulum = explore(False, RATE)
+    assert "decay" in pendulum and "resonance" not in pendulum and "steps" not in pendulum
 
 
 def test_a_likelier_law_outside_the_catalogue_is_to_be_told_apart(records: Records) -> None:

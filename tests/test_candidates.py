@@ -146,3 +146,65 @@ def test_resistance_is_the_force_against_the_motion(identifier: str) -> None:
     exponent = law.exponent.name if isinstance(law.exponent, pk.Parameter) else law.exponent
     assert exponent == {"coulomb_friction": 0.0, "quadratic_drag": 2.0,
                         "power_drag": "n"}.get(identifier)
+
+
+@pytest.mark.parametrize("variant, sign", [("forth", 1), ("back", -1)])
+def test_friction_in_one_direction_is_half_of_it_and_a_constant_force(variant: str, sign: int
+                                                                      ) -> None:
+    """The same law, written as a sum of entries; in one that starts at rest friction holds it."""
+    by_key = {c.key: c for c in made(systems.sloshing())}
+    sums = by_key[f"one_way_friction[{variant}]"].parts
+    assert sums is not None
+    free, held = sums([0.6])
+    assert [*free] == ["coulomb_friction", "static_bias"]
+    assert [*held] == ["coulomb_friction", "static_bias[held]"] and set(held) <= set(by_key)
+    for parts in (free, held):
+        (c,), (bias,) = parts.values()
+        for v in (-1.3, 0.7):
+            assert -c * np.sign(v) + bias == pytest.approx(-0.6 * (np.sign(v) + sign) / 2)
+
+
+def test_a_constant_force_beside_friction_need_not_be_in_balance() -> None:
+    """What starts at rest starts in balance, unless dry friction holds it where it is."""
+    by_key = {c.key: c for c in made(systems.sloshing())}
+    free, held = by_key["static_bias"], by_key["static_bias[held]"]
+    assert held.ids == free.ids and free.suits() and not held.suits()
+    assert held.suits([by_key["coulomb_friction"]])
+    model = systems.sloshing()
+    assert held.applied(model).state("theta").initial == 0
+    assert free.applied(model).state("theta").initial != 0
+    assert held.applied(model).equations == free.applied(model).equations
+
+
+@pytest.mark.parametrize("x, force", [(0.3, -2.0), (-0.3, 2.0), (0.1, 0.0), (-0.05, 0.0)])
+def test_walls_on_both_sides_push_back_from_either(x: float, force: float) -> None:
+    wall = {c.key: c for c in made(systems.sloshing())}["wall_impact[both sides]"]
+    model = systems.sloshing()
+    values = {**model.values, "wall": 0.1, "k_wall": 10.0}
+    at = [np.zeros(1), np.array([[x, 0.0]]), np.zeros((1, len(model.input_names)))]
+
+    def acceleration(m: Model) -> float:
+        p = np.array([values[n] for n in m.parameter_names])
+        return float(VectorField(m).rhs(*at, p)[0, 1])
+
+    assert acceleration(wall.applied(model)) - acceleration(model) == pytest.approx(force)
+
+
+def test_a_stiffness_of_its_own_is_an_explanation_beside_another_only() -> None:
+    """Alone it is the model's stiffness, and a gain."""
+    by_key = {c.key: c for c in made(systems.sloshing())}
+    stiffness = by_key["linear_stiffness"]
+    assert not stiffness.suits() and not stiffness.suits([by_key["coulomb_friction"]])
+    assert stiffness.suits([by_key["wall_impact"]]) and not stiffness.known
+
+
+def test_resistance_of_any_power_holds_damping_by_amplitude() -> None:
+    by_key = {c.key: c for c in made(systems.sloshing())}
+    wide, narrow = by_key["power_damping"], by_key["amplitude_damping"]
+    q, v, c = symbol("theta"), symbol("theta_dot"), 0.7
+    forces = [law.applied(systems.sloshing()).equations["theta_dot"] -
+              systems.sloshing().equations["theta_dot"] for law in (wide, narrow)]
+    start = {symbol(n): value for n, value in wide.covers["amplitude_damping"].items()}
+    for at in ({q: 0.3, v: -0.9}, {q: -0.2, v: 0.4}):
+        one = forces[0].subs({symbol("c_qn"): c, **start, **at})
+        assert float(one) == pytest.approx(float(forces[1].subs({symbol("c2"): c, **at})))

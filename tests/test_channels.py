@@ -96,14 +96,18 @@ def test_play_never_leaves_the_input_further_than_its_half(site: Site) -> None:
 
 
 def test_walls_stand_on_either_side(site: Site) -> None:
-    above, below = wall_impact(site)
+    above, below, both = wall_impact(site)
     x = {"theta": np.linspace(-0.2, 0.3, 501)}
     for wall, sign in ((above, 1.0), (below, -1.0)):
         for d in wall.directions(cast(Any, SimpleNamespace(x=x))):
             pushed = d.force != 0.0
             assert np.all(sign * x["theta"][pushed] > d.start["wall"] - 1e-12)
             assert np.all(sign * d.force[pushed] < 0.0)
-    assert above.key != below.key
+    assert len({above.key, below.key, both.key}) == 3
+    for d in both.directions(cast(Any, SimpleNamespace(x=x))):
+        # at the same distance, within what is reached on both sides but for the farthest
+        assert np.all(d.force * x["theta"] <= 0.0) and d.start["wall"] <= 1.03 * 0.2
+        assert np.any(d.force > 0.0) == (d.start["wall"] < 0.2) and np.any(d.force < 0.0)
 
 
 def test_soft_springs_have_a_natural_rate_too() -> None:

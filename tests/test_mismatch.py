@@ -178,7 +178,7 @@ def test_a_clean_recording_gets_no_diagnosis(recording: Recording) -> None:
     assert dx.verdict == "none" and not dx.mismatch and dx.hypotheses == ()
     assert not any("held-out" in note for note in dx.notes)
     content = json.loads(json.dumps(dx.to_dict(), allow_nan=False))
-    assert content["schema_version"] == 1 and content["hypotheses"] == []
+    assert content["schema_version"] == 2 and content["hypotheses"] == []
 
 
 def test_a_model_that_fails_on_the_held_out_recording_only_is_not_passed_over(

@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pikanid import Recording
-from pikanid.mismatch.beyond.patch import DEGREE, INTERVALS, _Basis
+from pikanid.mismatch.beyond.patch import DEGREE, INTERVALS, FreeCurve
 from pikanid.mismatch.beyond.penalised import Penalised, _prior
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import averaged, oversampling
@@ -106,8 +106,7 @@ def test_what_is_unexplained_knows_no_units() -> None:
 def test_a_patch_is_the_same_curve_as_what_was_fitted() -> None:
     model = systems.sloshing()
     (site,) = sites(model, (quick(np.linspace(0.0, 5.0, 101), 0.5),))
-    edge: Any = SimpleNamespace(argument="theta", curve=SimpleNamespace(low=-0.3, high=0.5))
-    basis = _Basis(edge, model)
+    basis = FreeCurve("theta", -0.3, 0.5, model)
     # all cubic splines on these intervals, but for the straight line
     assert len(basis.names) == INTERVALS + DEGREE - 1
     rng = np.random.default_rng(2)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -17,6 +18,8 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.search.neighbours import (
     Job,
     closest_of_each,
+    with_parts,
+    with_relatives,
     with_simpler,
     with_twins,
     with_wider,
@@ -66,6 +69,40 @@ def test_laws_that_hold_others_are_neighbours_both_ways(case: Case) -> None:
     power = hypothesis(case, "power_drag", c_n=0.01)
     simpler = [keys(effects) for effects, _ in with_simpler(power, case.candidates)]
     assert simpler == [{"coulomb_friction"}, {"quadratic_drag"}]
+
+
+def test_a_law_that_is_a_sum_is_split_into_its_parts(case: Case) -> None:
+    """What is there of a part already is added to."""
+    one_way = hypothesis(case, "one_way_friction[back]", "coulomb_friction", c_one=0.2, c=0.05)
+    jobs = [(keys(effects), starts[0]) for effects, starts in with_parts(
+        one_way, case.search.candidates)]
+    assert [k for k, _ in jobs] == [{"coulomb_friction", "static_bias"},
+                                    {"coulomb_friction", "static_bias[held]"}]
+    start = cast(Mapping[str, float], jobs[0][1])
+    values = one_way.values
+    assert start["c"] == pytest.approx(values["c"] + values["c_one"] / 2)
+    assert start["bias"] == pytest.approx(values["c_one"] / 2)
+    assert not list(with_parts(hypothesis(case, "cubic_stiffness"), case.candidates))
+    # no more effects than are tried together
+    few = copy(one_way.whitened)
+    few.settings = DEFAULTS.with_values({"budget.effects": 1})
+    assert not list(with_parts(replace(one_way, whitened=few), case.search.candidates))
+
+
+def test_relatives_are_of_one_family_and_not_there_yet(case: Case) -> None:
+    h = hypothesis(case, "quadratic_drag", "amplitude_damping", q2=0.01)
+    drag = next(e for e in h.effects if e.key == "quadratic_drag")
+    found = [keys(effects) - {"amplitude_damping"}
+             for effects, _ in with_relatives(h, drag, case.candidates)]
+    assert {"power_drag"} in found and {"boundary_layer"} in found
+    assert set() not in found and {"coulomb_friction"} not in found
+    assert all(len(one) == 1 for one in found)
+
+
+def test_a_gain_beside_a_restoring_force_may_be_a_stiffness(case: Case) -> None:
+    h = hypothesis(case, "cubic_stiffness", "sensor_gain")
+    assert {"cubic_stiffness", "linear_stiffness"} in [
+        keys(effects) for effects, _ in with_twins(h, case.search.candidates)]
 
 
 def test_a_search_comes_back_to_a_fit_that_lost_its_way(case: Case) -> None:
@@ -150,6 +187,16 @@ def test_no_pair_begins_with_a_law_that_gives_energy(case: Case) -> None:
              for e in both if drag(e)]
     assert sided and min(sided)[0] > 0.0
     assert all(len({e.key for e in both}) == 2 for both, _ in listed)
+
+
+def test_no_more_effects_are_put_together_than_the_budget_has(case: Case) -> None:
+    few = replace(case.records, settings=DEFAULTS.with_values({"budget.effects": 1}))
+    search = replace(case.search, records=few, fits={}, begun=set())
+    search.base()
+    alone = search._fit([c for c in case.candidates if c.key == "cubic_stiffness"], [{}])
+    assert len(alone.effects) == 1
+    search._extend(alone, 5, anyway=True)
+    assert max(map(len, search.fits)) == 1
 
 
 MANY = ("sensor_offset", "sensor_drift", "sensor_gain", "sensor_lag", "input_gain", "input_delay",

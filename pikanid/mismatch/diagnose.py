@@ -19,6 +19,7 @@ from pikanid.mismatch.steps.confirming import confirmed, with_laws_outside
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.mismatch.steps.reporting import reported
 from pikanid.mismatch.steps.searching import searched, with_noise_of_the_rest
+from pikanid.mismatch.steps.surely import with_sure_part
 from pikanid.model import Model
 from pikanid.problem.arguments import a_model, several
 from pikanid.recording import Recording
@@ -106,4 +107,5 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
         if answer.verdict == "unnamed" and case.later is not None:
             mend = patch(case.base, case.model, shape, site, case.records, case.later,
                          case.predicted)
+    answer = with_sure_part(case, answer)
     return replace(reported(case, detection, answer, site, shape), patch=mend)

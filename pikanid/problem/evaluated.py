@@ -79,12 +79,18 @@ def initial_state(model: Model) -> InitialState:
     value, slopes = _start_functions(tuple(start), tuple(p_symbols[k] for k in used),
                                      model.input_names)
 
+    # without a restoring force there is no balance to start in: the simulation says not finite
+    def at(p: np.ndarray, u: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.array(value(p[used], u), float)
+
     def jacobian(p: np.ndarray, u: np.ndarray) -> np.ndarray:
         full = np.zeros((n, len(p_symbols)))
-        full[:, used] = np.array(slopes(p[used], u), float).reshape(n, len(used))
+        with np.errstate(all="ignore"):
+            full[:, used] = np.array(slopes(p[used], u), float).reshape(n, len(used))
         return full
 
-    return InitialState(lambda p, u: np.array(value(p[used], u), float), jacobian)
+    return InitialState(at, jacobian)
 
 
 # models that differ elsewhere begin alike

@@ -22,7 +22,7 @@ h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
            padding: .8rem 1rem; }
 .named, .none { border-color: #15803d; }
 .unnamed { border-color: #c2410c; }
-.unconfirmed { border-color: #b45309; }
+.unconfirmed, .partial { border-color: #b45309; }
 table { border-collapse: collapse; margin: .5rem 0; } td, th { padding: .2rem .8rem .2rem 0;
         text-align: left; } th { font-weight: 600; border-bottom: 1px solid #ddd; }
 code { background: #f3f4f6; padding: .1rem .3rem; } img { max-width: 100%; }
@@ -41,7 +41,7 @@ def page(dx: Diagnosis, title: str) -> str:
         f"<h1>What is missing? {escape(title)}</h1>",
         f'<p class="verdict {dx.verdict}">{escape(dx.sentence())}</p>',
         _where(dx) if dx.mismatch else "",
-        _what(dx), _figure(dx), _proof(dx), _patch(dx), _next(dx),
+        _surely(dx), _what(dx), _figure(dx), _proof(dx), _patch(dx), _next(dx),
         "<h2>Noise and notes</h2><ul>" + "".join(
             f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes)) + "</ul>",
         f'<p class="small">p = {dx.p_value:.2g} at a false-alarm rate of {dx.alpha:g}; '
@@ -70,6 +70,27 @@ def _force(dx: Diagnosis) -> str:
     return (f" There the simultaneous {band:g} % band of the force that would explain it excludes "
             f"zero (means over {force.resolution:.2g} s). What a sensor or an input gets wrong can "
             f"look like a force too.{worth}")
+
+
+def _surely(dx: Diagnosis) -> str:
+    """What is there whatever is left, and what is left."""
+    if dx.remainder is None:
+        return ""
+    rows = []
+    for p in dx.present:
+        values = "<br>".join(
+            f"{escape(n)} = {rounded(v.value, p.std_with_remainder[n])} {escape(v.unit)}"
+            for n, v in p.parameters.items())
+        here = escape(p.name) if p.ids else (
+            f"{escape(p.name)}<br><span class=small>or {escape(', '.join(p.alternatives))}</span>")
+        rows.append(f"<tr><td><b>{escape(p.family)}</b></td><td>{here}</td><td>{values}</td>"
+                    f"<td>{'no other explains it' if p.dominance is None else f'{p.dominance:.2g}'}"
+                    "</td></tr>")
+    left = "".join(f"<li>{escape(line)}.</li>" for line in dx.remainder.lines())
+    return ("<h2>Surely there</h2><table><tr><th>family</th><th>here as</th><th>values, with "
+            "standard errors that count the remainder</th><th>times as much left without it</th>"
+            f"</tr>{''.join(rows)}</table><p>{escape(dx.remainder.sentence())}.</p>"
+            f"<ul>{left}</ul>")
 
 
 def _what(dx: Diagnosis) -> str:

@@ -73,7 +73,7 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
     if not edges:
         return None
     edge = max(edges, key=lambda e: e.alone)
-    basis = _Basis(edge, nominal)
+    basis = FreeCurve(edge.argument, edge.curve.low, edge.curve.high, nominal)
     found = fitted(nominal, [basis.candidate(site)], records, [base.point], 1)
     before = predict(base)
     if found is None or before is None or found.minimum.chi2 >= base.minimum.chi2:
@@ -97,15 +97,15 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
                  *(next(iter(p.rmse.values())) for p in (before, after)))
 
 
-class _Basis:
-    """Cubic splines of an edge's argument as truncated powers, of the argument scaled to ±1.
+class FreeCurve:
+    """Cubic splines of a state as truncated powers, of the argument scaled to ±1.
 
     Without the straight line, which belongs to the free parameters.
     """
 
-    def __init__(self, edge: Edge, model: Model):
-        self.argument, self.unit = edge.argument, model.state(edge.argument).unit
-        self.low, self.high = edge.curve.low, edge.curve.high
+    def __init__(self, argument: str, low: float, high: float, model: Model):
+        self.argument, self.unit = argument, model.state(argument).unit
+        self.low, self.high = low, high
         self.inner = np.linspace(-1.0, 1.0, INTERVALS + 1)[1:-1]
         self.name = "delta"
         while any(taken.startswith(self.name) for taken in model.symbols):

@@ -13,8 +13,11 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 Channel = Literal["dynamics", "input", "sensor"]
+Family = Literal["dry friction", "drag", "restoring force", "constant force", "timing", "gain",
+                 "input curve", "sensor curve", "mode", "slow change", "other axis", "once"]
 Array = np.ndarray
 Resistance = Callable[..., Array]  # (speed (N,), each parameter but the size) -> (N,)
+Parts = Callable[[Sequence[float]], Sequence[Mapping[str, Sequence[float]]]]
 SYMBOLIC = "symbolic:"  # before the formula, in the id of a law that no catalogue holds
 
 
@@ -79,6 +82,7 @@ class Candidate:
         extend: Adds it to a model that holds the parameters already.
         directions: How it would show.
         variant: Distinguishes candidates of one id.
+        families: Kinds of physics that it is an instance of.
         twin: Group of candidates that small motions cannot tell apart.
         per_recording: Whether another recording has its own instance (or none, if `absent`).
         absent: Whether another recording is not expected to show it.
@@ -86,6 +90,8 @@ class Candidate:
         fits: Whether it can be added and refitted, not only looked for.
         covers: Keys of candidates that it contains as special cases, each with values of its own
             further parameters from where a fit in that one's place begins; none: from several.
+        parts: From its parameter values to sums that are the same law: by key of each candidate in
+            the sum, that one's values.
         static: Whether it is a force that the state at the same instant determines.
         resistance: The force against the motion at size 1, where it is no more than that.
         exponent: Of the speed, where that force is a power of it: a number, or the parameter.
@@ -97,6 +103,7 @@ class Candidate:
         levels: Values of its parameters, from the best of which a fit begins where the model is far
             off: no first step leads to them.
         other: Adds it in another reading, which makes a difference beside other effects only.
+        instead_of: Ids of effects in whose place it is tried, once they are given.
         beside: Ids of effects, one of which has to be there: without them it is a twin of another
             entry.
     """
@@ -111,11 +118,13 @@ class Candidate:
     directions: Callable[[View], Sequence[TangentDirection]]
     variant: str = ""
     twin: str = ""
+    families: tuple[Family, ...] = ()
     per_recording: bool = False
     absent: bool = False
     known: bool = True
     fits: bool = True
     covers: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    parts: Parts | None = None
     static: bool = False
     resistance: Resistance | None = None
     exponent: float | Parameter | None = None
@@ -124,6 +133,7 @@ class Candidate:
     argument: str = ""
     other_minima: tuple[float, ...] = ()
     levels: tuple[Mapping[str, float], ...] = ()
+    instead_of: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     other: Callable[[Model], Model] | None = None
 

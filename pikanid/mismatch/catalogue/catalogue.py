@@ -3,52 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
-from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
 from pikanid.mismatch.catalogue.second_mode import second_mode
 from pikanid.mismatch.catalogue.site import Site
 
-ENTRIES: tuple[Callable[[Site], list[Candidate]], ...] = (
-    friction.coulomb_friction,
-    friction.quadratic_drag,
-    friction.power_drag,
-    friction.amplitude_damping,
-    forces.cubic_stiffness,
-    forces.static_bias,
-    forces.parameter_drift,
-    second_mode,
-    forces.wall_impact,
-    cross_axis,
-    forces.disturbance,
-    friction.boundary_layer,
-    friction.hysteresis,
-    channels.delay,
-    late_inputs.input_delay,
-    channels.lags,
-    channels.input_gain,
-    channels.sensor_gain,
-    channels.input_limits,
-    channels.input_backlash,
-    channels.sensor_offset,
-    channels.sensor_drift,
-    channels.sensor_saturation,
-    channels.sensor_nonlinearity,
-    forces.initial_state,
-    channels.input_hold,
+Make = Callable[[Site], list[Candidate]]
+# each with the families of physics that it belongs to
+ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
+    (friction.coulomb_friction, ("dry friction",)),
+    (friction.quadratic_drag, ("drag",)),
+    (friction.power_drag, ("drag",)),
+    (friction.amplitude_damping, ("drag",)),
+    (forces.cubic_stiffness, ("restoring force",)),
+    (forces.static_bias, ("constant force",)),
+    (forces.parameter_drift, ("slow change",)),
+    (second_mode, ("mode",)),
+    (forces.wall_impact, ("restoring force",)),
+    (cross_axis, ("other axis",)),
+    (forces.disturbance, ("once",)),
+    (friction.boundary_layer, ("drag",)),
+    (friction.hysteresis, ("dry friction",)),
+    (channels.delay, ("timing",)),
+    (late_inputs.input_delay, ("timing",)),
+    (channels.lags, ("timing",)),
+    (channels.input_gain, ("gain",)),
+    (channels.sensor_gain, ("gain",)),
+    (channels.input_limits, ("input curve",)),
+    (channels.input_backlash, ("input curve",)),
+    (channels.sensor_offset, ("constant force",)),
+    (channels.sensor_drift, ("slow change",)),
+    (channels.sensor_saturation, ("sensor curve",)),
+    (channels.sensor_nonlinearity, ("sensor curve",)),
+    (forces.initial_state, ("once",)),
+    (channels.input_hold, ("timing",)),
 )
-DECOYS: tuple[Callable[[Site], list[Candidate]], ...] = (
-    decoys.even_stiffness,
-    decoys.quintic_stiffness,
-    decoys.one_way_friction,
-    decoys.stribeck_friction,
-    decoys.dissipating_wall,
-    decoys.velocity_coupled_drive,
-    decoys.soft_saturation,
-    decoys.clock_error,
-    decoys.wobble,
-    decoys.rate_limit,
+DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
+    (decoys.even_stiffness, ("restoring force",)),
+    (decoys.quintic_stiffness, ("restoring force",)),
+    (decoys.linear_stiffness, ("restoring force",)),
+    (decoys.power_damping, ("drag",)),
+    # half of the difference between forth and back is a constant force
+    (decoys.one_way_friction, ("dry friction", "constant force")),
+    (decoys.stribeck_friction, ("dry friction",)),
+    (decoys.dissipating_wall, ("restoring force",)),
+    (decoys.velocity_coupled_drive, ("input curve",)),
+    (decoys.soft_saturation, ("input curve",)),
+    (decoys.clock_error, ("timing",)),
+    (decoys.wobble, ("slow change",)),
+    (decoys.rate_limit, ("timing",)),
 )
 
 
@@ -62,15 +68,15 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known and c.suits() for c in found), found[0].key
-    (28, 'coulomb_friction')
+    (29, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, which has one sensor
     first = {s.output.name: s.q for s in reversed(sites)}
     for table in (ENTRIES, DECOYS):
         for site in sites:
-            for entry in table:
-                for candidate in entry(site):
+            for make, families in table:
+                for candidate in make(site):
                     if candidate.channel != "sensor" or first[site.output.name] == site.q:
-                        made.setdefault(candidate.key, candidate)
+                        made.setdefault(candidate.key, replace(candidate, families=families))
     return tuple(made.values())

@@ -8,11 +8,12 @@ called quadratic drag, nor a soft limit a hard one.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
-from pikanid.mismatch.catalogue.forces import INF, term, wall_impact
+from pikanid.mismatch.catalogue.candidate import Candidate, Parts, TangentDirection, View
+from pikanid.mismatch.catalogue.forces import BOTH, INF, term, wall_impact
 from pikanid.mismatch.catalogue.friction import STICKING, sense
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -63,17 +64,51 @@ def quintic_stiffness(site: Site) -> list[Candidate]:
                  lambda w: -w.x[site.q] ** 5, one_sided=False, known=False)]
 
 
+def linear_stiffness(site: Site) -> list[Candidate]:
+    """-k q beside another restoring force: alone it is the model's own stiffness and a gain."""
+    if not site.rate:
+        return []
+    k = Parameter(site.name("k1"), 0.0, "1/s^2")
+    law = term(site, "linear_stiffness", "a stiffness beside the model's own",
+               f"-{k.name}*{site.q}", k, lambda w: -w.x[site.q], one_sided=False, known=False)
+    return [replace(law, instead_of=("input_gain", "sensor_gain"), beside=(
+        "wall_impact", "dissipating_wall", "cubic_stiffness", "quintic_stiffness",
+        "even_stiffness"))]
+
+
+def power_damping(site: Site) -> list[Candidate]:
+    """-c q² |v|ⁿ sgn v: resistance that grows with the amplitude; for small n it is dry friction
+    whose load does.
+    """
+    if not site.rate:
+        return []
+    c = Parameter(site.name("c_qn"), 0.0, f"1/(s^2*({site.unit}))", (0.0, INF))
+    n = Parameter(site.name("n_q"), 1.0, "", (0.05, 4.0))
+    text = f"-{c.name}*{site.q}**2*signed_power({site.v}, {n.name})"
+    return [Candidate(("power_damping",), "resistance that grows with amplitude", text, "dynamics",
+                      site, (c, n), _with_term(site.v, text), lambda view: [], known=False,
+                      covers={"amplitude_damping" + site.suffix: {n.name: 1.0}}, exponent=n)]
+
+
 def one_way_friction(site: Site) -> list[Candidate]:
     """Dry friction in one direction only."""
     found = []
     for sign in (1, -1):
         c = Parameter(site.name("c_one"), 0.0, f"{site.unit}/s^2", (0.0, INF))
-        found.append(term(
+        law = term(
             site, "one_way_friction", "friction in one direction",
             f"-{c.name}*(sign({site.v}) + {sign})/2", c,
             _half_sign(site.v, sign), one_sided=True,
-            variant="forth" if sign > 0 else "back", known=False, other_minima=STICKING))
+            variant="forth" if sign > 0 else "back", known=False, other_minima=STICKING)
+        found.append(replace(law, parts=_half_and_half(site.suffix, sign)))
     return found
+
+
+def _half_and_half(suffix: str, sign: int) -> Parts:
+    """Friction in one direction is half of it in both, and a constant force."""
+    return lambda values: [{
+        f"coulomb_friction{suffix}": [values[0] / 2],
+        f"static_bias{variant}{suffix}": [-sign * values[0] / 2]} for variant in ("", "[held]")]
 
 
 def stribeck_friction(site: Site) -> list[Candidate]:
@@ -108,7 +143,7 @@ def dissipating_wall(site: Site) -> list[Candidate]:
     found = []
     # with more, it would hold fast what leaves it at full speed
     most = 1.0 / max(site.half_range * site.rate, 1e-3)
-    for wall in wall_impact(site):
+    for wall in (w for w in wall_impact(site) if w.variant != BOTH):
         a = Parameter(site.name("a_wall"), 0.3 * most, f"s/({site.unit})", (0.0, most))
         text = f"({wall.expression})*(1 {'-' if wall.variant else '+'} {a.name}*{site.v})"
         found.append(Candidate(

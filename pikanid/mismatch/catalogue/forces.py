@@ -16,7 +16,7 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 INF = float("inf")
-SIDE = "negative side"
+SIDE, BOTH = "negative side", "both sides"
 
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
@@ -43,7 +43,9 @@ def cubic_stiffness(site: Site) -> list[Candidate]:
 
 
 def static_bias(site: Site) -> list[Candidate]:
-    """A constant force, or a tilt; a system that starts at rest starts where it holds balance."""
+    """A constant force, or a tilt; a system that starts at rest starts where it holds balance, or
+    where dry friction holds it.
+    """
     b = Parameter(site.name("bias"), 0.0, f"{site.unit}/s^2")
     k = site.stiffness
     # without a restoring force there is no balance to start in
@@ -66,8 +68,11 @@ def static_bias(site: Site) -> list[Candidate]:
         initial = {site.q: 1.0 / site.rate**2} if balanced else {}
         return [TangentDirection({b.name: 1.0}, force=np.ones(len(view.t)), initial=initial)]
 
-    return [Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site,
-                      (b,), extend, directions, twin="offset", static=True, form="constant")]
+    free = Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site, (b,),
+                     extend, directions, twin="offset", static=True, form="constant")
+    held = replace(free, variant="held", extend=lambda m: m.with_term(site.v, b.name),
+                   beside=("coulomb_friction", "hysteresis"))
+    return [free, held] if balanced else [free]
 
 
 def parameter_drift(site: Site) -> list[Candidate]:
@@ -86,33 +91,33 @@ def parameter_drift(site: Site) -> list[Candidate]:
 
 
 def wall_impact(site: Site) -> list[Candidate]:
-    """A stiff stop on one side that gives way elastically."""
+    """A stiff stop on one side, or two at the same distance, that give way elastically."""
     # a contact shorter than from one sample to the next looks the same, however short
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
     walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.half_range, np.array([0.03, 0.1, 0.3])
 
-    def one(side: int) -> Candidate:
-        w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
-        k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
-        text = (f"-{k.name}*max({site.q} - {w.name}, 0)" if side > 0
-                else f"{k.name}*max(-{site.q} - {w.name}, 0)")
+    w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
+    k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
+
+    def one(sides: Sequence[int], variant: str, name: str = "impact on a wall") -> Candidate:
+        text = " + ".join(f"{'-' if side > 0 else ''}{k.name}*max({'-' if side < 0 else ''}{site.q}"
+                          f" - {w.name}, 0)" for side in sides)
 
         def directions(view: View) -> list[TangentDirection]:
-            x = side * view.x[site.q]
-            top = float(x.max(initial=0.0))
-            return [TangentDirection({k.name: s, w.name: share * top},
-                                     force=-side * np.maximum(x - share * top, 0.0), one_sided=True,
-                                     scales=False)
-                    for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5) for s in (1e4,)] if top else []
+            tops = [float((side * view.x[site.q]).max(initial=0.0)) for side in sides]
+            return [TangentDirection(
+                {k.name: 1e4, w.name: share * min(tops)}, one_sided=True, scales=False,
+                force=np.sum([-side * np.maximum(side * view.x[site.q] - share * min(tops), 0.0)
+                              for side in sides], axis=0))
+                for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5)] if min(tops) else []
 
-        return Candidate(("wall_impact",), "impact on a wall", text, "dynamics", site, (w, k),
-                         lambda m: m.with_term(site.v, text), directions,
-                         variant="" if side > 0 else SIDE, static=True,
+        return Candidate(("wall_impact",), name, text, "dynamics", site, (w, k),
+                         lambda m: m.with_term(site.v, text), directions, variant, static=True,
                          other_minima=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))
 
-    return [one(1), one(-1)]
+    return [one((1,), ""), one((-1,), SIDE), one((1, -1), BOTH, "impact on walls on both sides")]
 
 
 def disturbance(site: Site) -> list[Candidate]:

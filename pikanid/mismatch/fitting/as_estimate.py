@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pikanid.estimate import Estimate
@@ -33,3 +35,11 @@ def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
         covariance=h.covariance, fits=tuple(fits), trajectories=tuple(trajectories),
         cost=total_cost(fits), adequacy=adequacy, converged=h.minimum.converged,
         settings={**like.settings, "effects": sorted(h.key)}, version=__version__)
+
+
+def widened(estimate: Estimate, overdispersion: float) -> Estimate:
+    """The same with standard errors that count what is left beside noise: where χ² is divided by
+    so much, covariances are multiplied by it (P. McCullagh and J. A. Nelder, Generalized Linear
+    Models, 1989, sec. 4.5).
+    """
+    return replace(estimate, covariance=overdispersion * estimate.covariance)

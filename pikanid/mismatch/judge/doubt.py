@@ -53,7 +53,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             first = (o.minimum.chi2 - h.minimum.chi2) / scale
             if below(first, asks.shown):
                 return f"the recording itself hardly shows {e.name}"
-            power = _worth(e, a, b) / scale
+            power = worth(e, a, b) / scale
             if below(power, least_proof):
                 return (f"the held-out recording could not have refuted {e.name} (it is worth "
                         f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
@@ -73,7 +73,7 @@ def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float =
     return a is not None and b is not None and below(a.deviance, b.deviance - margin)
 
 
-def _worth(effect: Candidate, with_it: HeldOut | None, without: HeldOut | None) -> float:
+def worth(effect: Candidate, with_it: HeldOut | None, without: HeldOut | None) -> float:
     """χ² that an effect is worth in held-out recordings, where it is there: how far apart the
     predictions with it and without it lie, each with its parameters moved within their errors.
 

@@ -201,6 +201,11 @@ def _shown(whitened: Whitened, theta: np.ndarray) -> tuple[np.ndarray, list[np.n
     return responses[0].y[: len(whitened.problem.experiments[0].samples[0].t)], gaps
 
 
+def rmse(whitened: Whitened, theta: np.ndarray) -> dict[str, float]:
+    """RMSE of each output at θ (n,), in its unit, over all recordings."""
+    return _rmse(_residuals(whitened, _shown(whitened, theta)[1]))
+
+
 def _rmse(residuals: Iterable[Residual]) -> dict[str, float]:
     """By output, over all recordings: residuals in several units have no mean."""
     found: dict[str, list[np.ndarray]] = {}

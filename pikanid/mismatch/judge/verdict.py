@@ -13,6 +13,7 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import below, in_order, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Predict, speaks, why_not
+from pikanid.mismatch.judge.partial import Part
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.same_law import integer_laws, merged_twins
 from pikanid.mismatch.settings.settings import Settings
@@ -21,7 +22,7 @@ from pikanid.mismatch.settings.verdict import VerdictSettings
 Test = Callable[[Hypothesis], Detection]
 
 
-Verdict = Literal["none", "named", "set", "unconfirmed", "unnamed"]
+Verdict = Literal["none", "named", "set", "partial", "unconfirmed", "unnamed"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,8 @@ class Answer:
     """Verdict, hypotheses given (most probable first) and the closest ones not given.
 
     `twins` lists, for a hypothesis given, the effects that stand for each other in it; `reasons`
-    why others are not given, and `doubt` what keeps the first one from being confirmed.
+    why others are not given, and `doubt` what keeps the first one from being confirmed.  `part` is
+    what is surely there although something is left.
     """
 
     verdict: Verdict
@@ -38,6 +40,7 @@ class Answer:
     twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = field(default_factory=dict)
     reasons: dict[frozenset[str], str] = field(default_factory=dict)
     doubt: str = ""
+    part: Part | None = None
 
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,

@@ -18,17 +18,27 @@ from pikanid.model.parts import Input
 
 PROVE = ("Record the system once more, driven differently and over another range of amplitudes, "
          "and give that recording as held-out: it decides what is confirmed.")
-EXPLORE = ("No law in the catalogue holds. Record (1) a free decay over a three-fold range of "
-           "amplitude, (2) a slow sweep through the resonance at two input levels, and (3) two "
-           "seconds at rest before each: they tell laws of the state, of the input and of the "
-           "sensor apart.")
 STRENGTHEN = ("Record the same again for several times as long, with a larger swing or with less "
               "noise: what an effect gains in chi-squared grows with the time, and with the square "
               "of its size over the noise.")
 
 
+def explore(driven: bool, rate: float) -> str:
+    """What tells laws of the state, of the input and of the sensor apart.
+
+    Args:
+        driven: Whether inputs act.
+        rate: Natural frequency [rad/s]; 0 where nothing restores.
+    """
+    swing = "a free decay over a three-fold range of amplitude, until it rests"
+    drive = ("a slow sweep through the resonance at two input levels" if rate > 0 else
+             "steps of three or more sizes in both directions, each held until the speed is steady")
+    wanted = ([swing] if rate > 0 or not driven else []) + ([drive] if driven else [])
+    return "; ".join([*wanted, "two seconds at rest before each"])
+
+
 def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rate: float,
-           proves: bool, workers: int = 1, weak: bool = False) -> str:
+           proves: bool, workers: int = 1, weak: bool = False, driven: bool = True) -> str:
     """The next experiment for a verdict; empty where none is needed.
 
     Args:
@@ -39,15 +49,18 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         proves: Whether a held-out recording was there.
         workers: Threads.
         weak: Whether something given predicts what is held out, but is too weak to be sure of.
+        driven: Whether inputs act.
     """
     if verdict in ("none", "named"):
         return ""
     outside = any(e.ids[0].startswith(SYMBOLIC) for h in given for e in h.effects)
     if verdict == "set" or (weak and outside and len(given) > 1):
         return _separating(given[:records.settings.budget.compared], records, rate, workers)
-    if not given:
-        return EXPLORE
-    return STRENGTHEN if weak else EXPLORE if proves else PROVE
+    if verdict == "partial":
+        return f"To learn what is left, record {explore(driven, rate)}."
+    if given and (weak or not proves):
+        return STRENGTHEN if weak else PROVE
+    return f"No law in the catalogue holds. Record {explore(driven, rate)}."
 
 
 def _separating(given: Sequence[Explanation], records: Records, rate: float, workers: int) -> str:

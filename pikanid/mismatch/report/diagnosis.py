@@ -10,7 +10,8 @@ import numpy as np
 
 from pikanid.estimate import Estimate
 from pikanid.mismatch.report.drawing import plot_diagnosis
-from pikanid.mismatch.report.findings import DiagnosisData, Value
+from pikanid.mismatch.report.findings import DiagnosisData
+from pikanid.mismatch.report.part import Value
 from pikanid.mismatch.report.text_report import lines_of
 
 if TYPE_CHECKING:
@@ -23,7 +24,8 @@ class Diagnosis(DiagnosisData):
 
     Attributes:
         verdict: "none" (nothing beyond noise), "named" (one explanation, confirmed on held-out
-            data), "set" (several that these data cannot tell apart, confirmed), "unconfirmed"
+            data), "set" (several that these data cannot tell apart, confirmed), "partial" (physics
+            that is surely there, though not all that is left is explained), "unconfirmed"
             (found, but not proved on other data), "unnamed" (something is missing that neither the
             catalogue nor a confirmed formula explains).
         p_value: Of a mismatch as large as seen, if there is none.
@@ -45,12 +47,14 @@ class Diagnosis(DiagnosisData):
             or where it is no help.
         doubt: What keeps an explanation that predicts held-out data from being confirmed, if
             anything does.
+        present: What is surely there, where the verdict is "partial".
+        remainder: What is left then.
     """
 
     def to_dict(self) -> dict[str, Any]:
         """The content of diagnosis.json."""
         return {
-            "schema_version": 1,
+            "schema_version": 2,
             "verdict": self.verdict,
             "mismatch": self.mismatch,
             "p_value": self.p_value,
@@ -69,6 +73,8 @@ class Diagnosis(DiagnosisData):
             "undetectable_below": {
                 n: {"value": v.value, "unit": v.unit} for n, v in self.undetectable_below.items()},
             "next_experiment": self.next_experiment,
+            "present": [p.to_dict() for p in self.present],
+            "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "settings": self.settings.to_dict(),
         }
 

@@ -12,8 +12,17 @@ from pikanid.mismatch.settings.verdict import VerdictSettings
 
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
-                 asks: VerdictSettings) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
-    """Given and rejected hypotheses, for reports."""
+                 asks: VerdictSettings, overdispersion: float = 1.0
+                 ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
+    """Given and rejected hypotheses, for reports.
+
+    Args:
+        answer: That is reported.
+        scale: That divides χ² where hypotheses are compared.
+        test, predict: Adequacy on the train and on the held-out recordings.
+        asks: What counts as evidence.
+        overdispersion: That variances of parameters are multiplied by.
+    """
     pool = [*answer.given, *answer.others]
     if not pool:
         return (), ()
@@ -26,7 +35,7 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         table = answer.twins.get(h.key, {})
         effects = tuple(NamedEffect(
             table.get(e.key, e.names), e.name, e.expression,
-            values_of(e.parameters, h.values, h.std), e.channel) for e in h.effects)
+            values_of(e.parameters, h.values, h.std, overdispersion), e.channel) for e in h.effects)
         p = predict(h) if h in answer.given else None
         return Explanation(effects, relative_weight, h.model.with_values(
             {n: v for n, v in h.values.items()}), h.score(scale),

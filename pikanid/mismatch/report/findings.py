@@ -13,18 +13,10 @@ from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.patch import Patch
 from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.mismatch.report.part import Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
-
-
-@dataclass(frozen=True)
-class Value:
-    """A number with its standard error and unit."""
-
-    value: float
-    std: float
-    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -55,7 +47,7 @@ class Explanation:
     @property
     def title(self) -> str:
         """In words."""
-        return " and ".join(e.name for e in self.effects) or "nothing"
+        return listed([e.name for e in self.effects] or ["nothing"])
 
 
 @dataclass(frozen=True)
@@ -164,6 +156,8 @@ class DiagnosisData:
     force_over_time: ForceOverTime | None = None
     patch: Patch | None = None
     doubt: str = ""
+    present: tuple[Present, ...] = ()
+    remainder: Remainder | None = None
 
     @property
     def alpha(self) -> float:
@@ -192,10 +186,24 @@ class DiagnosisData:
         if self.verdict == "set":
             return head + "one of " + "; or ".join(titles) + ", which these recordings cannot " \
                 "tell apart."
+        if self.verdict == "partial" and self.remainder is not None:
+            more = ", and something else" if self.remainder.p_value < self.settings.adequate else ""
+            return head + f"surely {listed([p.title for p in self.present])}{more}. " \
+                f"{self.remainder.sentence()}."
         if self.verdict == "unconfirmed":
             return head + "perhaps " + "; or ".join(titles) + ", not confirmed" + (
                 f": {self.doubt}." if self.doubt else " on other data.")
         return head + "nothing in the catalogue explains it."
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence.
+
+    >>> listed(["drag", "a delay", "a tilt"])
+    'drag, a delay and a tilt'
+    """
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def titles_apart(given: Sequence[Explanation]) -> list[str]:
@@ -206,7 +214,7 @@ def titles_apart(given: Sequence[Explanation]) -> list[str]:
 
 
 def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],
-              std: Mapping[str, float]) -> dict[str, Value]:
-    """Estimates of an effect's parameters."""
-    return {p.name: Value(values[p.name], std[p.name], p.unit) for p in parameters
-            if p.name in values}
+              std: Mapping[str, float], overdispersion: float = 1.0) -> dict[str, Value]:
+    """Estimates of an effect's parameters, with variances multiplied by the overdispersion."""
+    return {p.name: Value(values[p.name], std[p.name] * overdispersion**0.5, p.unit)
+            for p in parameters if p.name in values}

@@ -17,7 +17,8 @@ from pikanid.mismatch.detect.residual_tests import unit_columns
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.report.findings import Value, Where
+from pikanid.mismatch.report.findings import Where
+from pikanid.mismatch.report.part import Value
 
 
 def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site],
@@ -68,15 +69,17 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
     return Where(channel, site.v, states, spans, static)
 
 
-def smallest(base: Hypothesis, candidates: Sequence[Candidate]) -> dict[str, Value]:
-    """The size of each effect that would stand out by enough standard errors, by id.
+def smallest(base: Hypothesis, candidates: Sequence[Candidate],
+             overdispersion: float = 1.0) -> dict[str, Value]:
+    """The size of each effect that would stand out by enough standard errors, by id: of noise and
+    of what is left beside it, by which variances are multiplied.
 
     Only of effects that grow from nothing in proportion to one parameter.
     """
     found = directions(base.whitened, base.minimum.theta, [c for c in candidates if c.known])
     _, lengths = unit_columns(found.D, base.minimum.J)
     sizes: dict[str, Value] = {}
-    visible = base.whitened.settings.visible
+    visible = base.whitened.settings.visible * overdispersion**0.5
     for owner, sign, length in zip(found.owner, found.directions, lengths, strict=True):
         candidate = found.candidates[owner]
         if length > 0 and sign.scales and candidate.parameters and sign.start:

@@ -13,6 +13,8 @@ def lines_of(dx: DiagnosisData) -> list[str]:
         place = dx.where.channel if dx.where.channel != "undecided" else "channel undecided"
         spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time[:6])
         lines.append(f"Where: {place}" + (f"; in time at {spans}" if spans else ""))
+    lines += [f"Surely: {part.sentence()}" for part in dx.present]
+    lines += dx.remainder.lines() if dx.remainder is not None else []
     for h in dx.hypotheses:
         lines.append(f"What: {h.title} (relative weight {h.relative_weight:.2f})")
         for e in h.effects:

@@ -69,12 +69,39 @@ def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
             yield (*rest, other), [{**h.point, **start} for start in starts]
 
 
+def with_parts(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With the sum of other laws that one of its effects is in that one's place."""
+    by_key = {c.key: c for c in candidates}
+    for effect in (e for e in h.effects if e.parts):
+        assert effect.parts is not None
+        rest = {e.key: e for e in _rest(h, effect)}
+        for parts in effect.parts([h.values[p.name] for p in effect.parameters]):
+            if parts.keys() <= by_key.keys():
+                start = {p.name: v + (h.values[p.name] if key in rest else 0.0)
+                         for key, values in parts.items()
+                         for p, v in zip(by_key[key].parameters, values, strict=True)}
+                found = {**rest, **{key: by_key[key] for key in parts}}
+                if len(found) <= h.whitened.settings.budget.effects:
+                    yield [*found.values()], [{**h.point, **start}]
+
+
 def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """With what small motions cannot tell from one of its effects in that one's place."""
     for effect in h.effects:
         for other in candidates:
-            if effect.twin and other.twin == effect.twin and other.fits and other is not effect:
+            alike = (effect.twin and other.twin == effect.twin) or (
+                set(effect.ids) & set(other.instead_of))
+            if alike and other.fits and other.key not in h.key:
                 yield (*_rest(h, effect), other), [h.point]
+
+
+def with_relatives(h: Hypothesis, effect: Candidate, candidates: Sequence[Candidate]
+                   ) -> Iterator[Job]:
+    """Every other member of an effect's families in that one's place."""
+    for other in candidates:
+        if (other.fits and other.key not in h.key and other.site.q == effect.site.q
+                and set(other.families) & set(effect.families)):
+            yield (*_rest(h, effect), other), [h.point]
 
 
 def leading(ranked: Iterable[Hypothesis]) -> list[Hypothesis]:

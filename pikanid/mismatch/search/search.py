@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -17,19 +17,8 @@ from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
-from pikanid.mismatch.search.neighbours import (
-    Job,
-    afresh,
-    beside,
-    closest_of_each,
-    leading,
-    signature,
-    wide,
-    with_simpler,
-    with_twins,
-    with_wider,
-    without_one,
-)
+from pikanid.mismatch.search import neighbours
+from pikanid.mismatch.search.neighbours import Job
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, law, nothing
 from pikanid.mismatch.settings.settings import Settings
@@ -121,13 +110,14 @@ class Search:
         close = settings.verdict.indistinct
         for count in range(1, budget.effects):
             if not adequate(best := self.ranked()[0]):
-                self._fit_all([*afresh(best)], again=True)
+                self._fit_all([*neighbours.afresh(best)], again=True)
             if adequate(best := self.ranked()[0]) or self.budget_exhausted:
                 break
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
             near = rows + settings.fits.far * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
-            simple = [h for h in leading(self.ranked()) if not wide(h, self.fits)] or [best]
+            simple = [h for h in neighbours.leading(self.ranked())
+                      if not neighbours.wide(h, self.fits)] or [best]
             for h in simple[: budget.leading if count == 1 else 1]:
                 if len(h.effects) < budget.effects and (h is simple[0] or h.minimum.chi2 < near):
                     self._extend(h, budget.beside_one if count == 1 else budget.beside_more,
@@ -140,8 +130,8 @@ class Search:
         if not (best := self.ranked()[0]).known:
             self._exchange(best, anyway=True)
         if not adequate(self.ranked()[0]):
-            for h in leading(self.ranked())[:budget.leading]:
-                self._fit_all([job for job in with_wider(h, self.candidates)
+            for h in neighbours.leading(self.ranked())[:budget.leading]:
+                self._fit_all([job for job in neighbours.with_wider(h, self.candidates)
                                if all(e.known for e in job[0])], always=True)
         best = self.ranked()[0]
         if any(e.other_minima for e in best.effects) and not adequate(best):
@@ -162,7 +152,7 @@ class Search:
         # even without budget, no name without the laws that keep wrong ones away, of parts as well
         parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
         for h in (*parts, *self._contenders()):
-            for job in with_wider(h, self.candidates):
+            for job in neighbours.with_wider(h, self.candidates):
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
 
@@ -179,11 +169,13 @@ class Search:
         local minimum.
         """
         if self.ranked()[0].far:
-            for closest in closest_of_each(self.fits.values()):
-                self._fit_all([*without_one(closest)], again=True, always=True)
+            for closest in neighbours.closest_of_each(self.fits.values()):
+                self._fit_all([*neighbours.without_one(closest)], again=True, always=True)
         for _ in range(self.settings.budget.effects):
             best = self.ranked()[0]
-            self._fit_all([*without_one(best), *with_simpler(best, self.candidates)], again=True,
+            self._fit_all([*neighbours.without_one(best),
+                           *neighbours.with_simpler(best, self.candidates),
+                           *neighbours.with_parts(best, self.candidates)], again=True,
                           always=True, settled=best.key if self.budget_exhausted else frozenset())
             if self.ranked()[0] is best:
                 break
@@ -207,9 +199,15 @@ class Search:
         """
         before = {h.fit for h in self.fits.values()}
         for h in hypotheses[:self.settings.budget.asked_again]:
-            self._fit_all([*without_one(h), *with_twins(h, self.candidates)], again=True,
-                          always=True)
+            self._fit_all([*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates)],
+                          again=True, always=True)
             self._exchange(h, anyway=True)
+        return {h.fit for h in self.fits.values()} != before
+
+    def refine(self, jobs: Iterable[Job]) -> bool:
+        """Fit these effects from these starts, known or not; whether that found anything."""
+        before = {h.fit for h in self.fits.values()}
+        self._fit_all([*jobs], again=True, always=True)
         return {h.fit for h in self.fits.values()} != before
 
     def offer(self, formulas: Sequence[Candidate]) -> None:
@@ -241,7 +239,9 @@ class Search:
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
                 always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
-        screen = Screen(hypothesis, beside(hypothesis, self.candidates))
+        if len(hypothesis.effects) >= self.settings.budget.effects:
+            return
+        screen = Screen(hypothesis, neighbours.beside(hypothesis, self.candidates))
         needs, bent = self.settings.search, any(e.channel == "input" for e in hypothesis.effects)
         least = needs.much * hypothesis.minimum.chi2 if hypothesis.far else least
         jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
@@ -281,7 +281,7 @@ class Search:
             found, _ = result
             self.spent += self.settings.budget.setup + (found.whitened.work if found else 0.0)
             key = frozenset(e.key for e in job[0])
-            self.begun.add(signature(job))
+            self.begun.add(neighbours.signature(job))
             if found and hits(found.effects) and lost(
                     found.minimum.chi2, found.whitened.rows, self.settings):
                 self.failed_searches.add(key)
@@ -291,7 +291,7 @@ class Search:
 
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])
                 and (again or frozenset(e.key for e in job[0]) not in self.fits)
-                and signature(job) not in self.begun]  # from there it would end there again
+                and neighbours.signature(job) not in self.begun]  # it would end where it did
         ordered_parallel_map(
             jobs, lambda: max(self._closest_chi2(), reach), work, take, lambda: always or not
             self.budget_exhausted, self.workers, lambda result, chi2: result[1].stands(chi2))

@@ -14,7 +14,7 @@ from pikanid.mismatch.settings import thresholds
 from pikanid.mismatch.settings.budget import Budget
 from pikanid.mismatch.settings.fits import FitSettings, SearchSettings
 from pikanid.mismatch.settings.noise import NoiseSettings
-from pikanid.mismatch.settings.verdict import BeyondSettings, VerdictSettings
+from pikanid.mismatch.settings.verdict import BeyondSettings, PartSettings, VerdictSettings
 from pikanid.noise.settings import QuietSettings, RoundingSettings
 from pikanid.settings import Amount, Count, Rate, Share, changed, check, items, told
 from pikanid.storage.limits import MOST_MODEL, file_bytes
@@ -56,6 +56,7 @@ class Settings:
         fits: When a fit is a misfit.
         search: What one more effect must promise.
         verdict: What counts as evidence, and what as a proof.
+        part: What is sure although something is left.
         beyond: What is said of a missing force that has no name.
         budget: How much is computed.
 
@@ -88,6 +89,7 @@ class Settings:
     fits: FitSettings = field(default_factory=FitSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
+    part: PartSettings = field(default_factory=PartSettings)
     beyond: BeyondSettings = field(default_factory=BeyondSettings)
     budget: Budget = field(default_factory=Budget)
 

@@ -102,3 +102,12 @@ def price(parameters: int, effects: int, rows: int, choices: int, weight: float)
         weight: γ.
     """
     return parameters * float(np.log(rows)) + 2 * weight * effects * float(np.log(max(choices, 1)))
+
+
+def dominance(chance: float, spread: float) -> float:
+    """κ that a family that is not there exceeds at a rate: ln κ is half-normal, with a spread.
+
+    >>> round(dominance(0.002, 0.45), 1)
+    4.0
+    """
+    return float(np.exp(spread * quantile(chance / 2)))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pikanid.settings import Amount, Count, Factor, Share
+from pikanid.mismatch.settings.thresholds import dominance
+from pikanid.settings import Amount, Count, Factor, Rate, Share
 
 
 @dataclass(frozen=True)
@@ -96,3 +97,40 @@ class BeyondSettings:
     least_window: Count = 4
     louder: Amount = 4.0
     unexplained: Amount = 1.5
+
+
+@dataclass(frozen=True)
+class PartSettings:
+    """When physics is surely there although something is left.
+
+    Attributes:
+        rate: Posterior probability that may be missing to one.
+        chance: Rate at which a family that is not there may dominate.
+        spread: Of ln κ of families that are not there, which is about half-normal.
+        share: Of the held-out misfit's square that must be explained.
+        within: κ of an effect among explanations that hold the same family.
+        exact: Share of the held-out misfit's square that a name must explain.
+        form: κ of a free curve of the same state beside a named effect: from there on the form is
+            another one, and only the family is sure.
+        floor: Of σ²: less than that is not told from nothing.
+        rivals: Explanations without a family that are compared with the best one with it.
+        pool: Explanations that are looked at, the best first.
+        dry: Exponent of the speed at or below which a force is dry friction.
+    """
+
+    rate: Rate = 0.01
+    chance: Rate = 0.002
+    spread: Amount = 0.45
+    share: Share = 0.8
+    within: Factor = 1.2
+    exact: Share = 0.9
+    form: Factor = 2.0
+    floor: Amount = 0.04
+    rivals: Count = 6
+    pool: Count = 10
+    dry: Amount = 0.3
+
+    @property
+    def dominance(self) -> float:
+        """κ that is asked of a family: how many times more is left without it."""
+        return dominance(self.chance, self.spread)

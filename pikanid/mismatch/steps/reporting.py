@@ -7,7 +7,7 @@ from pikanid.mismatch.beyond.latent_force import force_over_time
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import Detection
-from pikanid.mismatch.fitting.as_estimate import as_estimate
+from pikanid.mismatch.fitting.as_estimate import as_estimate, widened
 from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer
@@ -16,6 +16,8 @@ from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import explanations
 from pikanid.mismatch.report.findings import OutputError, Proof
 from pikanid.mismatch.report.locate import locate, smallest
+from pikanid.mismatch.search.overdispersion import overdispersion
+from pikanid.mismatch.steps.remaining import present, remainder
 
 
 def reported(case: Case, detection: Detection, answer: Answer, site: Site,
@@ -25,9 +27,12 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     if case.excuse:
         case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
     best = answer.given[0] if answer.given else case.base
-    after = as_estimate(best, case.before) if answer.given else case.before
+    counts = _overdispersion(case, answer)
+    before = case.before if answer.verdict == "none" else widened(
+        case.before, overdispersion([case.base]))
+    after = widened(as_estimate(best, case.before), counts) if answer.given else before
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
-                                   case.settings.verdict)
+                                   case.settings.verdict, counts)
     proof = _proof(case, answer, best)
     if answer.verdict == "none" and proof is not None and proof.p_value < alpha:
         case.notes.append(
@@ -44,12 +49,21 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     return Diagnosis(
         answer.verdict, detection.p_value, case.settings,
         locate(case.base, best, answer, site, shape, force),
-        given, rejected, case.before, after, proof, tuple(levels),
-        tuple(case.notes), smallest(case.base, case.candidates),
+        given, rejected, before, after, proof, tuple(levels),
+        tuple(case.notes), smallest(case.base, case.candidates, counts),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
-               case.search.workers, bool(answer.doubt)), shape=shape,
+               case.search.workers, bool(answer.doubt),
+               any(i.default is None for i in case.model.inputs)), shape=shape,
         force_over_time=force,
-        doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""))
+        doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""),
+        present=present(answer), remainder=remainder(case, answer, proof))
+
+
+def _overdispersion(case: Case, answer: Answer) -> float:
+    """What χ² is divided by: one where everything is explained."""
+    if answer.part is not None:
+        return answer.part.overdispersion
+    return 1.0 if answer.verdict in ("none", "named", "set") else case.search.scale()
 
 
 def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:

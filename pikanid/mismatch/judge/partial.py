@@ -1,0 +1,268 @@
+"""Which physics is surely there although something is left: families of effects, and names.
+
+Where nothing explains everything, the posterior over hypotheses is worth little by itself: all of
+them are wrong, and the least wrong one takes all the weight.  What counts beside it is dominance
+over the remainder, κ: how many times more the best explanation without a family leaves than the
+best one with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from pikanid.mismatch.catalogue.candidate import Candidate, Family
+from pikanid.mismatch.fitting.decisions import below, smaller
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.doubt import Predict, worth
+from pikanid.mismatch.judge.prediction import HeldOut, rmse
+from pikanid.mismatch.search.overdispersion import repeated
+from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.settings.verdict import PartSettings
+from pikanid.model.parts import Parameter
+
+
+@dataclass(frozen=True)
+class Present:
+    """A family that is surely there, and its name where that is sure as well.
+
+    Attributes:
+        family: Of physics.
+        effect: The best explanation's member of it.
+        names: The effect's ids, where no other member does as well; else empty.
+        alternatives: Keys of the other members that were compared.
+        probability, probability_family: Posterior of the effect, and of the family.
+        dominance, dominance_within: κ over explanations without the family, and without the effect.
+        share: Of the held-out misfit's square that the best explanation with it explains.
+    """
+
+    family: Family
+    effect: Candidate
+    names: tuple[str, ...]
+    alternatives: tuple[str, ...]
+    probability: float
+    probability_family: float
+    dominance: float
+    dominance_within: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Doubtful:
+    """A family in the best explanation that is not surely there.
+
+    Attributes:
+        family: Of physics.
+        effect: The best explanation's member of it.
+        why: It is not sure, in words.
+    """
+
+    family: Family
+    effect: Candidate
+    why: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is surely there.
+
+    Attributes:
+        present: Families, the one that dominates most first.
+        doubtful: Others in the best explanation.
+        hypothesis: With the fewest effects, that holds what is present.
+        overdispersion: What χ² is divided by.
+        share: Of the held-out misfit's square that the hypothesis explains.
+    """
+
+    present: tuple[Present, ...]
+    doubtful: tuple[Doubtful, ...]
+    hypothesis: Hypothesis
+    overdispersion: float
+    share: float
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """A hypothesis with what it predicts, its criterion S, posterior weight, and what it leaves of
+    σ² in all recordings.
+    """
+
+    hypothesis: Hypothesis
+    predicted: HeldOut
+    left: float
+    score: float = 0.0
+    weight: float = 0.0
+    share: float = 0.0
+    families: frozenset[Family] = field(default_factory=frozenset)
+
+
+def families_of(effect: Candidate, h: Hypothesis, dry: float) -> tuple[Family, ...]:
+    """Of an effect as it was fitted: a force that hardly rises with speed is dry friction."""
+    if isinstance(effect.exponent, Parameter) and h.values[effect.exponent.name] <= dry:
+        return ("dry friction",)
+    return effect.families
+
+
+def surely_there(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
+                 noise: Sequence[dict[str, float]], settings: Settings,
+                 ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None
+                 ) -> Part | None:
+    """What is there whatever the remainder is; None where nothing is sure.
+
+    Args:
+        ranked: All hypotheses, best first, the nominal model among them.
+        scale: That divides χ², as far as the train recordings tell.
+        predict: What a hypothesis makes of the held-out recordings.
+        noise: σ of each output by name, in the train and in the held-out recordings.
+        settings: What is asked.
+        ahead: Given work that is all needed, before it is: to do it side by side.
+    """
+    rule = settings.part
+    pool = _pool(ranked, rule)
+    ahead([partial(predict, h) for h in pool])
+    found = [_Weighed(h, p, left_over(h, p, noise), families=frozenset(
+                 f for e in h.effects for f in families_of(e, h, rule.dry)))
+             for h in pool if (p := predict(h)) is not None]
+    nominal = next((w for w in found if not w.hypothesis.effects), None)
+    if nominal is None or len(found) < 2 or below(nominal.predicted.chi2 - len(
+            nominal.predicted.rest), settings.least_proof):
+        return None
+    found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
+    # of the explanations that predict most of what the nominal model misses
+    lead = next((w for w in found if not smaller(w.share, rule.share)), None)
+    if lead is None:
+        return None
+    examined = [_examined(family, lead, found, rule, counts * settings.least_proof)
+                for family in sorted(lead.families)]
+    present = [p for p in examined if isinstance(p, Present)]
+    if not present:
+        return None
+    sure = {p.family for p in present}
+    named = {p.effect.key for p in present if p.names}
+    # the fewest effects that hold all of it and leave about as much
+    enough = [w for w in found if sure <= w.families and named <= w.hypothesis.key
+              and not smaller(w.share, rule.share)
+              and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
+    fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
+    return Part(tuple(sorted(present, key=lambda p: -p.dominance)),
+                tuple(d for d in examined if isinstance(d, Doubtful)), fewest.hypothesis, counts,
+                fewest.share)
+
+
+def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Without those that hold a formula, or what happens once, which swallows remainders."""
+    return [h for h in ranked if not h.symbolic
+            and not any("once" in e.families for e in h.effects)]
+
+
+def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
+    """The best lasting hypotheses, the best ones without each family of the first and those with
+    another member of it, and the nominal model.
+    """
+    left = lasting(ranked)
+    chosen = left[: rule.pool]
+    first = next((h for h in left if h.effects), None)
+    for family in sorted({f for e in first.effects for f in families_of(e, first, rule.dry)}
+                         if first else ()):
+        apart = {h.fit: [e for e in h.effects if family in families_of(e, h, rule.dry)]
+                 for h in left}
+        own = {e.key for e in apart[first.fit]} if first else set()
+        chosen += [h for h in left if not apart[h.fit]][: rule.rivals]
+        chosen += [h for h in left if any(e.key not in own for e in apart[h.fit])][: rule.rivals]
+    chosen += [h for h in left if not h.effects]
+    return list({h.fit: h for h in chosen}.values())
+
+
+def left_over(h: Hypothesis, predicted: HeldOut, noise: Sequence[dict[str, float]]) -> float:
+    """Σ max(rms²/σ² - 1, 0) over outputs, in the train and the held-out recordings; there with the
+    parameters moved within their errors.
+    """
+    return sum(max((size / sigma[name]) ** 2 - 1, 0.0)
+               for sizes, sigma in zip((rmse(h.whitened, h.minimum.theta), predicted.rmse_moved),
+                                       noise, strict=True)
+               for name, size in sizes.items())
+
+
+def _weighed(found: list[_Weighed], nominal: _Weighed, scale: float,
+             handicap: float) -> tuple[list[_Weighed], float]:
+    """The same with criterion and weights, best first; and what divides χ².
+
+    That is the larger one of the overdispersions of the train recordings and of the best
+    prediction: a scale of the train recordings alone lets an overfit win.
+    """
+    closest = min(found, key=lambda w: w.predicted.chi2)
+    level = max(1.0, closest.predicted.chi2 / max(len(closest.predicted.rest), 1))
+    counts = max(scale, level * repeated(closest.predicted.rest) ** (1 - 1 / level))
+    scores = np.array([(w.hypothesis.minimum.chi2 + w.predicted.deviance) / counts
+                       + w.hypothesis.penalty
+                       + handicap * sum(not e.known for e in w.hypothesis.effects) for w in found])
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    before = max(nominal.predicted.misfit**2 - 1, 1e-12)
+    made = [replace(w, score=float(s), weight=float(p), share=1 - max(
+                w.predicted.misfit**2 - 1, 0.0) / before)
+            for w, s, p in zip(found, scores, weights / weights.sum(), strict=True)]
+    return sorted(made, key=lambda w: (w.score, w.hypothesis.place())), counts
+
+
+def _examined(family: Family, lead: _Weighed, found: Sequence[_Weighed], rule: PartSettings,
+              proof: float) -> Present | Doubtful:
+    """A family of the leading explanation: surely there, or why not.
+
+    Args:
+        family: Of an effect of it.
+        lead: The best explanation that predicts.
+        found: All explanations, best first.
+        rule: What is asked.
+        proof: χ² that the family must be worth in the held-out recordings.
+    """
+    holders = [w for w in found if family in w.families]
+    others = [w for w in found if family not in w.families]
+    members = [e for e in lead.hypothesis.effects
+               if family in families_of(e, lead.hypothesis, rule.dry)]
+    effect = members[0]
+    total = sum(w.weight for w in holders)
+    dominance = _dominance(lead, others, rule)
+    if smaller(total, 1 - rule.rate):
+        return Doubtful(family, effect, f"its probability is {total:.3g}")
+    if smaller(dominance, rule.dominance):
+        return Doubtful(family, effect, "without it the best explanation leaves "
+                        f"{dominance:.2g} times as much, {rule.dominance:.2g} are asked")
+    if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof):
+        return Doubtful(family, effect, "the held-out recording could not have refuted it (it is "
+                        f"worth {power:.2g} of chi-squared there, {proof:.2g} are asked)")
+    same = [w for w in holders if _holds(w.hypothesis, effect)]
+    # a law that contains the effect is no rival of it
+    rivals = [w for w in holders if w not in same and not any(
+        _contains(e, effect) for e in w.hypothesis.effects)]
+    own = sum(w.weight for w in same)
+    within = _dominance(lead, rivals, rule)
+    # what needs a law outside the catalogue beside it has no name of its own
+    exact = all(e.known for e in members) and not (
+        smaller(own, 1 - rule.rate) or smaller(within, rule.within)
+        or smaller(lead.share, rule.exact))
+    compared = dict.fromkeys(e.key for w in holders for e in w.hypothesis.effects
+                             if family in families_of(e, w.hypothesis, rule.dry))
+    return Present(family, effect, effect.ids if exact else (),
+                   tuple(k for k in compared if k != effect.key), own, total, dominance, within,
+                   lead.share)
+
+
+def _holds(h: Hypothesis, effect: Candidate) -> bool:
+    """Whether a hypothesis holds an effect, another variant of it, or a twin."""
+    return any(set(e.ids) & set(effect.ids) or (e.twin and e.twin == effect.twin)
+               for e in h.effects)
+
+
+def _contains(law: Candidate, effect: Candidate) -> bool:
+    """Whether a law has an effect as a special case, or is a sum of which it is one."""
+    sums = law.parts([p.value for p in law.parameters]) if law.parts else ()
+    return effect.key in law.covers or any(effect.key in parts for parts in sums)
+
+
+def _dominance(lead: _Weighed, others: Sequence[_Weighed], rule: PartSettings) -> float:
+    """κ: how many times more the best of its rivals leaves; infinite where it has none."""
+    least = min((w.left for w in others[: rule.rivals]), default=np.inf)
+    return float(least / max(lead.left, rule.floor))

@@ -1,0 +1,131 @@
+"""What a `Diagnosis` says where not everything is explained: what is surely there, what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its standard error and unit."""
+
+    value: float
+    std: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Present:
+    """A family of effects that is surely there although something is left.
+
+    Attributes:
+        family: Of physics, as "dry friction".
+        ids: Its name, where no other member of the family does as well; else empty.
+        name: Of the member in the best explanation, for people.
+        expression: As that is added to the model.
+        alternatives: Keys of the other members that were compared.
+        probability: Posterior of that member.
+        probability_family: Posterior of the family.
+        dominance: κ: how many times more the best explanation without the family leaves; None where
+            there is none.
+        dominance_within: The same of the best explanation with another member of the family.
+        share: Of the held-out misfit's square that the best explanation explains.
+        parameters: Estimates, with standard errors as the noise alone would have them.
+        std_with_remainder: Standard errors with the remainder counted in.
+    """
+
+    family: str
+    ids: tuple[str, ...]
+    name: str
+    expression: str
+    alternatives: tuple[str, ...]
+    probability: float
+    probability_family: float
+    dominance: float | None
+    dominance_within: float | None
+    share: float
+    parameters: Mapping[str, Value]
+    std_with_remainder: Mapping[str, float]
+
+    @property
+    def title(self) -> str:
+        """The name where it is sure, otherwise the family."""
+        return self.name if self.ids else self.family
+
+    def sentence(self) -> str:
+        """In words."""
+        others = f"; {' or '.join(self.alternatives)} would do" if self.alternatives else ""
+        within = "" if self.ids else f" (here as {self.name}{others})"
+        if self.dominance is None:
+            return f"{self.title}{within}: no explanation does without it"
+        return (f"{self.title}{within}: without it the best explanation leaves "
+                f"{self.dominance:.2g} times as much")
+
+    def to_dict(self) -> dict[str, Any]:
+        """For diagnosis.json."""
+        return {"family": self.family, "ids": list(self.ids) or None, "exact": bool(self.ids),
+                "expression": self.expression, "alternatives": list(self.alternatives),
+                "probability": self.probability, "probability_family": self.probability_family,
+                "dominance": self.dominance, "dominance_within": self.dominance_within,
+                "share_explained": self.share,
+                "parameters": {n: {"value": v.value, "std": v.std, "unit": v.unit,
+                                   "std_with_remainder": self.std_with_remainder[n]}
+                               for n, v in self.parameters.items()}}
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What the best explanation leaves, beside noise.
+
+    Attributes:
+        share_explained: Of the square of the nominal misfit, noise taken off, in the held-out
+            recordings, with the parameters as they were fitted.
+        share_train: The same in the recordings that were fitted.
+        rmse_before: Of the first output in the held-out recordings, nominal.
+        rmse: The same with the explanation.
+        rmse_moved: The same with its parameters moved within their errors.
+        noise: Of that output.
+        unit: Of these.
+        p_value: Of so much being left, if there is nothing but noise.
+        overdispersion: What χ² is divided by, as neighbouring rows of a misfit say the same.
+        independent_rows: What the rows that were fitted count for.
+        frequency: [Hz] below which half of the held-out remainder's power lies.
+        time: Seconds of the first recording in which it is louder than noise.
+        doubtful: Family or effect that is fitted but not sure, and why.
+    """
+
+    share_explained: float
+    share_train: float
+    rmse_before: float
+    rmse: float
+    rmse_moved: float
+    noise: float
+    unit: str
+    p_value: float
+    overdispersion: float
+    independent_rows: float
+    frequency: float
+    time: tuple[tuple[float, float], ...]
+    doubtful: tuple[tuple[str, str], ...]
+
+    def sentence(self) -> str:
+        """In words."""
+        size, before, noise = (f"{v:.3g} {self.unit}".rstrip()
+                               for v in (self.rmse, self.rmse_before, self.noise))
+        return (f"{100 * self.share_explained:.0f} % of the held-out misfit is explained; of "
+                f"{before} (RMSE) {size} are left, beside noise of {noise}")
+
+    def lines(self) -> list[str]:
+        """Where it is, and what keeps more from being sure."""
+        spans = ", ".join(f"{a:g} to {b:g} s" for a, b in self.time[:6]) or "no stretch of it"
+        return [f"Left: half of it below {self.frequency:.3g} Hz; louder than noise at {spans}",
+                *(f"Not sure: {what}: {why}" for what, why in self.doubtful)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For diagnosis.json."""
+        found = asdict(self)
+        found["time"] = [list(span) for span in self.time]
+        found["doubtful"] = [{"family": what, "why": why} for what, why in self.doubtful]
+        return found

@@ -1,0 +1,60 @@
+"""From a partial answer to what is reported of it: what is surely there, and what is left."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import periodogram
+
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.report.findings import Proof, values_of
+from pikanid.mismatch.report.locate import loud_windows
+from pikanid.mismatch.report.part import Present, Remainder
+
+
+def present(answer: Answer) -> tuple[Present, ...]:
+    """What is surely there, with standard errors that count the remainder."""
+    if answer.part is None:
+        return ()
+    h, counts = answer.part.hypothesis, answer.part.overdispersion
+    found = []
+    for p in answer.part.present:
+        values, wider = (values_of(p.effect.parameters, h.values, h.std, by)
+                         for by in (1.0, counts))
+        found.append(Present(
+            p.family, p.names, p.effect.name, p.effect.expression, p.alternatives, p.probability,
+            p.probability_family, _finite(p.dominance), _finite(p.dominance_within), p.share,
+            values, {n: v.std for n, v in wider.items()}))
+    return tuple(found)
+
+
+def remainder(case: Case, answer: Answer, proof: Proof | None) -> Remainder | None:
+    """What a partial answer leaves."""
+    if answer.part is None or proof is None:
+        return None
+    h, counts = answer.part.hypothesis, answer.part.overdispersion
+    before, after, rows = case.base.minimum.chi2, h.minimum.chi2, h.whitened.rows
+    return Remainder(
+        answer.part.share, 1 - max(after - rows, 0.0) / max(before - rows, 1e-12),
+        proof.rmse_before, proof.rmse_after, proof.rmse_moved, proof.noise, proof.unit,
+        proof.p_value, counts, rows * max(after / rows, 1.0) / counts,
+        median_frequency(proof.t, proof.measured - proof.after), loud_windows(h),
+        tuple((d.family, d.why) for d in answer.part.doubtful))
+
+
+def median_frequency(t: np.ndarray, values: np.ndarray) -> float:
+    """[Hz] below which half of the power of values (N,) at times t (N,) [s] lies.
+
+    >>> t = np.arange(400) / 100
+    >>> round(median_frequency(t, np.sin(2 * np.pi * 5 * t)), 1)
+    5.0
+    """
+    even = np.linspace(t[0], t[-1], len(t))
+    frequencies, power = periodogram(
+        np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0]), detrend=False)
+    total = np.cumsum(power)
+    return float(frequencies[np.searchsorted(total, total[-1] / 2)])
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

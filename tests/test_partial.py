@@ -1,0 +1,207 @@
+"""What is surely there although something is left: the rule, and what is reported of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.fitting.as_estimate import widened
+from pikanid.mismatch.judge.partial import Doubtful, Present, _examined, _Weighed
+from pikanid.mismatch.report import part as reported_as
+from pikanid.mismatch.report.diagnosis import Diagnosis
+from pikanid.mismatch.report.findings import Where, values_of
+from pikanid.mismatch.report.part import Remainder, Value
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.reporting.diagnosis_page import page
+
+RULE = DEFAULTS.part
+
+
+def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool = True,
+           twin: str = "", parts: Any = None) -> Candidate:
+    return cast(Candidate, SimpleNamespace(
+        key=name, ids=(name,), families=families, covers={key: {} for key in covers}, known=known,
+        twin=twin, parts=parts, parameters=(), exponent=None,
+        absent=False))
+
+
+COULOMB = effect("coulomb_friction", "dry friction")
+HYSTERESIS = effect("hysteresis", "dry friction")
+DRAG = effect("quadratic_drag", "drag")
+
+
+def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: float = 0.95,
+            later: float | None = None) -> _Weighed:
+    """An explanation that leaves so much [σ²], and so much of each held-out sample [σ]."""
+    h: Any = SimpleNamespace(effects=effects, values={})
+    predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
+                                     inert=frozenset())
+    return _Weighed(h, predicted, left, 0.0, weight, share,
+                    frozenset(f for e in effects for f in e.families))
+
+
+def examined(*found: _Weighed, family: Any = "dry friction") -> Present | Doubtful:
+    return _examined(family, found[0], found, RULE, DEFAULTS.least_proof)
+
+
+def test_a_family_that_dominates_is_there_and_has_a_name() -> None:
+    found = examined(weighed((COULOMB,), 1.0, 0.995), weighed((HYSTERESIS,), 1.3, 0.003),
+                     weighed((DRAG,), 5.0, 0.002))
+    assert isinstance(found, Present) and found.names == ("coulomb_friction",)
+    assert found.dominance == pytest.approx(5.0) and found.dominance_within == pytest.approx(1.3)
+    assert found.probability_family == pytest.approx(0.998)
+    assert found.alternatives == ("hysteresis",)
+
+
+@pytest.mark.parametrize("rivals, why", [
+    ([((DRAG,), 3.9, 0.001)], "3.9 times as much, 4 are asked"),
+    ([((DRAG,), 5.0, 0.02)], "its probability is 0.98")])
+def test_what_is_missing_to_a_family_is_said(rivals: list[Any], why: str) -> None:
+    found = examined(weighed((COULOMB,), 1.0, 1 - rivals[0][2]),
+                     *(weighed(*rival) for rival in rivals))
+    assert isinstance(found, Doubtful) and why in found.why
+
+
+def test_nothing_is_sure_that_held_out_data_could_not_have_refuted() -> None:
+    found = examined(weighed((COULOMB,), 1.0, 0.999, later=1.0),
+                     weighed((DRAG,), 9.0, 0.001, later=1.2))
+    assert isinstance(found, Doubtful) and "could not have refuted it (it is worth 4 " in found.why
+
+
+@pytest.mark.parametrize("lead, rival", [
+    ((1.0, 0.995, 0.95), (1.1, 0.004)),  # another member leaves hardly more
+    ((1.0, 0.7, 0.95), (1.3, 0.295)),  # another member is as probable
+    ((1.0, 0.995, 0.85), (1.3, 0.004))])  # too much is unexplained for a name
+def test_without_a_name_the_family_is_said(lead: Any, rival: Any) -> None:
+    found = examined(weighed((COULOMB,), *lead), weighed((HYSTERESIS,), *rival),
+                     weighed((DRAG,), 9.0, 0.001))
+    assert isinstance(found, Present) and found.names == ()
+
+
+def test_a_decoy_gives_no_name() -> None:
+    stribeck = effect("stribeck_friction", "dry friction", known=False)
+    found = examined(weighed((stribeck,), 1.0, 0.999), weighed((DRAG,), 9.0, 0.001))
+    assert isinstance(found, Present) and found.names == ()
+
+
+@pytest.mark.parametrize("wider", [
+    effect("stribeck_friction", "dry friction", covers=("coulomb_friction",), known=False),
+    effect("one_way_friction", "dry friction", known=False,
+           parts=lambda values: [{"coulomb_friction": [0.0], "static_bias": [0.0]}])])
+def test_a_law_that_contains_another_does_not_take_its_name(wider: Candidate) -> None:
+    """It leaves as little; whether it is worth its parameters, the posterior says."""
+    found = examined(weighed((COULOMB,), 1.0, 0.995), weighed((wider,), 1.0, 0.004),
+                     weighed((DRAG,), 9.0, 0.001))
+    assert isinstance(found, Present) and found.names == ("coulomb_friction",)
+    found = examined(weighed((COULOMB,), 1.0, 0.97), weighed((wider,), 1.0, 0.029),
+                     weighed((DRAG,), 9.0, 0.001))
+    assert isinstance(found, Present) and found.names == ()
+
+
+def test_what_noise_hides_is_no_remainder() -> None:
+    """Without a floor, explanations that leave nothing would dominate each other at random."""
+    found = examined(weighed((COULOMB,), 1e-9, 0.995), weighed((DRAG,), 0.1, 0.005))
+    assert isinstance(found, Doubtful) and "2.5 times" in found.why
+
+
+REMAINDER = Remainder(0.93, 0.95, 0.02, 0.004, 0.003, 0.0005, "rad", 1e-9, 16.0, 120.0, 3.2,
+                      ((1.0, 2.5),), (("timing", "its probability is 0.93"),))
+FRICTION = reported_as.Present(
+    "dry friction", (), "Coulomb friction", "-c*sign(v)", ("hysteresis",), 0.9, 0.999, 12.0, 1.1,
+    0.93, {"c": Value(0.5, 0.01, "rad/s^2")}, {"c": 0.04})
+DELAY = replace(FRICTION, family="timing", ids=("input_delay",), name="a delay", dominance=None)
+
+
+def diagnosis(p_value: float = 1e-9) -> pk.Diagnosis:
+    nothing = cast(pk.Estimate, None)
+    return Diagnosis("partial", 1e-12, DEFAULTS, Where("dynamics", "v", (), (), None), (), (),
+                     nothing, nothing, None, present=(FRICTION, DELAY),
+                     remainder=replace(REMAINDER, p_value=p_value))
+
+
+def test_a_partial_answer_says_what_is_sure_and_what_is_left() -> None:
+    said = diagnosis().sentence()
+    assert "surely dry friction and a delay, and something else." in said
+    assert "93 % of the held-out misfit is explained" in said and "0.004 rad are left" in said
+    assert "something else" not in diagnosis(p_value=0.5).sentence()
+    text = str(diagnosis())
+    assert "Surely: dry friction (here as Coulomb friction; hysteresis would do): without it the " \
+        "best explanation leaves 12 times as much" in text
+    assert "Surely: a delay: no explanation does without it" in text
+    assert "Left: half of it below 3.2 Hz; louder than noise at 1 to 2.5 s" in text
+    assert "Not sure: timing: its probability is 0.93" in text
+
+
+def test_a_partial_answer_as_json() -> None:
+    friction, delay = (p.to_dict() for p in (FRICTION, DELAY))
+    assert friction["ids"] is None and not friction["exact"] and friction["dominance"] == 12.0
+    assert delay["ids"] == ["input_delay"] and delay["exact"] and delay["dominance"] is None
+    assert friction["parameters"] == {"c": {
+        "value": 0.5, "std": 0.01, "unit": "rad/s^2", "std_with_remainder": 0.04}}
+    left = json.loads(json.dumps(REMAINDER.to_dict(), allow_nan=False))
+    assert left["time"] == [[1.0, 2.5]] and left["overdispersion"] == 16.0
+    assert left["doubtful"] == [{"family": "timing", "why": "its probability is 0.93"}]
+
+
+def test_variances_are_multiplied_by_the_overdispersion() -> None:
+    model = pk.systems.sloshing()
+    recording = pk.simulate(model, pk.excitation.two_pulse(), sigma=0.01, seed=0)
+    found = pk.NLS(starts=1).fit(model, recording)
+    np.testing.assert_allclose(widened(found, 4.0).covariance, 4 * found.covariance)
+    p = pk.Parameter("c", 0.0, "N")
+    assert values_of((p,), {"c": 2.0}, {"c": 0.1}, 9.0)["c"] == Value(2.0, pytest.approx(0.3), "N")
+
+
+@pytest.fixture(scope="module")
+def diagnosed() -> pk.Diagnosis:
+    """Dry friction beside a force that is periodic in the angle, which no entry is."""
+    parts = [pk.Parameter("c", 1.0, "rad/s^2"), pk.Parameter("a", 0.15, "rad/s^2")]
+    truth = pk.systems.sloshing().with_term(
+        "theta_dot", "-c*sign(theta_dot) - a*sin(60*theta + 1)", parts)
+    train, other = (pk.simulate(truth, pk.excitation.planar_moves(3, 5.0, seed=seed),
+                                sigma=0.0005, seed=seed) for seed in (1, 2))
+    return pk.diagnose(pk.systems.sloshing(), train, other)
+
+
+@pytest.mark.slow
+def test_friction_is_sure_beside_a_law_that_nobody_knows(diagnosed: pk.Diagnosis) -> None:
+    assert diagnosed.verdict == "partial"
+    assert [p.family for p in diagnosed.present] == ["dry friction"]
+    left = diagnosed.remainder
+    assert left is not None and 0.8 < left.share_explained < 0.999
+    assert left.noise < left.rmse < left.rmse_before and left.p_value < 1e-6
+    assert 0 < left.frequency < 25
+
+
+@pytest.mark.slow
+def test_standard_errors_count_the_remainder(diagnosed: pk.Diagnosis) -> None:
+    found, left = diagnosed.present[0], diagnosed.remainder
+    assert left is not None and left.overdispersion > 3
+    for name, value in found.parameters.items():
+        assert found.std_with_remainder[name] == pytest.approx(
+            value.std * np.sqrt(left.overdispersion))
+    # those of the explanation as well
+    shown = diagnosed.hypotheses[0].effects[0].parameters
+    assert all(v.std == found.std_with_remainder[n] for n, v in shown.items()
+               if n in found.std_with_remainder)
+
+
+@pytest.mark.slow
+def test_a_partial_answer_is_told_everywhere(diagnosed: pk.Diagnosis) -> None:
+    assert "surely" in diagnosed.sentence() and "something else" in diagnosed.sentence()
+    content = json.loads(json.dumps(diagnosed.to_dict(), allow_nan=False))
+    assert content["verdict"] == "partial" and content["schema_version"] == 2
+    entry = content["present"][0]
+    assert entry["family"] == "dry friction" and entry["exact"] == (entry["ids"] is not None)
+    assert set(entry["parameters"]["c"]) == {"value", "std", "unit", "std_with_remainder"}
+    assert content["remainder"]["share_explained"] == diagnosed.remainder.share_explained
+    text = page(diagnosed, "run")
+    assert "Surely there" in text and "dry friction" in text and "are left" in text
+    assert "Surely: " in str(diagnosed)
