@@ -70,8 +70,10 @@ def static_bias(site: Site) -> list[Candidate]:
 
     free = Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site, (b,),
                      extend, directions, twin="offset", static=True, form="constant")
-    held = replace(free, variant="held", extend=lambda m: m.with_term(site.v, b.name),
-                   beside=("coulomb_friction", "hysteresis"))
+    held = replace(
+        free, variant="held", extend=lambda m: m.with_term(site.v, b.name),
+        directions=lambda view: [TangentDirection({b.name: 1.0}, force=np.ones(len(view.t)))],
+        beside=("coulomb_friction", "hysteresis"))
     return [free, held] if balanced else [free]
 
 

@@ -135,7 +135,7 @@ def surely_there(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
     lead = next((w for w in found if not smaller(w.share, rule.share)), None)
     if lead is None:
         return None
-    examined = [_examined(family, lead, found, rule, counts * settings.least_proof)
+    examined = [_examined(family, lead, found, rule, scale * settings.least_proof)
                 for family in sorted(lead.families)]
     present = [p for p in examined if isinstance(p, Present)]
     if not present:
