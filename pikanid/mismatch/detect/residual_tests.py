@@ -88,8 +88,7 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
         powers = np.stack([np.einsum("ki,ki->k", part, part) for part in (
             scores[:, a:b] for a, b in pairwise(ends))], axis=1)
         # bands of many and of few lines compare by their standard scores (Wilson and Hilferty)
-        normal = ((powers / freedom) ** (1 / 3) - (1 - 2 / (9 * freedom))) / np.sqrt(
-            2 / (9 * freedom))
+        normal = _standard(powers, freedom)
         return np.stack([np.max(size, axis=1, initial=0.0) ** 2, np.max(normal[:, :-1], axis=1),
                          normal[:, -1]], axis=1)
 
@@ -97,9 +96,8 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
     rng = np.random.default_rng(seed)
     z = L.T @ r
     observed = statistics(z[None])[0]
-    loudest = int(np.argmax([
-        _standard(float(z[a:b] @ z[a:b]), k) for (a, b), k in zip(
-            pairwise(ends[:-1]), freedom, strict=False)])) if len(bands) else 0
+    powers = np.array([z[a:b] @ z[a:b] for a, b in pairwise(ends)])
+    loudest = int(np.argmax(_standard(powers, freedom)[:-1])) if len(bands) else 0
     drawn: list[np.ndarray] = []
     for _ in range(max(settings.budget.draws // BATCH, 1)):
         noise = rng.standard_normal((BATCH, len(root)), np.float32) @ root
@@ -156,10 +154,10 @@ def _chance(value: float, freedom: int, spread: float) -> float:
     return float(WEIGHTS @ chdtrc(k, power * np.exp(-spread * NODES)))
 
 
-def _standard(power: float, freedom: int) -> float:
+def _standard(power: np.ndarray, freedom: np.ndarray | int) -> np.ndarray:
     """The standard score of a χ² (E. B. Wilson and M. M. Hilferty, Proc. N. A. S. 17, 1931)."""
-    return ((power / freedom) ** (1 / 3) - (1 - 2 / (9 * freedom))) / float(
-        np.sqrt(2 / (9 * freedom)))
+    spread = 2 / (9 * freedom)
+    return np.asarray(((power / freedom) ** (1 / 3) - (1 - spread)) / np.sqrt(spread))
 
 
 def frequency_bands(t: np.ndarray, rate: float, count: int = 9) -> list[np.ndarray]:
