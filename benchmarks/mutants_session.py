@@ -25,9 +25,10 @@ MEMORY = 6 << 30
 SLOW = 1.5  # processor seconds: a test that takes longer is left out
 # Tests about the source text, the installation or other programs; mutants are none of theirs.
 LEFT_OUT = ("architecture", "readme", "concealed", "plots", "datasets", "interrupts", "public_api",
-            "no_traces", "study", "test_cli.py", "compiled_cache", "diagnosis_memory", "kan_build",
-            "kan_paper", "pinn", "pikan.py", "reading", "mlp", "excitation", "slosh_recording",
-            "units", "contributing", "hostile", "unforeseen", "excerpt")
+            "no_traces", "study", "test_cli.py", "cli_identify", "cli_mistakes", "cli_process",
+            "compiled_cache", "diagnosis_memory", "kan_build", "kan_paper", "pinn",
+            "pikan.py", "reading", "mlp", "excitation", "slosh_recording", "units",
+            "contributing", "hostile", "unforeseen", "excerpt")
 _durations: dict[str, float] = {}
 
 

@@ -10,6 +10,10 @@ from scipy.integrate import quad
 
 from pikanid.validation.concealed.experiment import Experiment, grid
 from pikanid.validation.concealed.rig import Rig
+from pikanid.validation.concealed.simulate import motion
+
+TIGHT = 1e-9
+COVERED: set[str] = set()  # the effects with an oracle, in the files read so far
 
 
 def push(duration: float, u_x: Callable[[np.ndarray], np.ndarray] | float = 0.0,
@@ -48,3 +52,14 @@ def crossings(t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Times at which a dense signal rises through zero."""
     up = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
     return t[up] - y[up] * (t[up + 1] - t[up]) / (y[up + 1] - y[up])
+
+
+def oracle(*ids: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Marks a test as the oracle of effects, so that none is forgotten."""
+    COVERED.update(ids)
+    return lambda test: test
+
+
+def dense(rig: Rig, duration: float, points: int = 20001) -> tuple[np.ndarray, np.ndarray]:
+    t = np.linspace(0.0, duration, points)
+    return t, motion(rig, still(duration), t)

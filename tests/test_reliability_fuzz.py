@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import reliability_fuzz as fuzzing
+import reliability_inputs as inputs
 
 from pikanid import Model, Recording
 from pikanid.estimate import Estimate
@@ -18,22 +19,22 @@ QUICK = [name for name in fuzzing.targets() if name not in ("network", "command 
 
 
 def test_what_is_damaged_was_sound(tmp_path: Path) -> None:
-    for ending in fuzzing.RECORDINGS:
+    for ending in inputs.RECORDINGS:
         if ending != ".xls":  # nothing here writes old workbooks
             path = tmp_path / f"run{ending}"
-            path.write_bytes(fuzzing.sound_recording(ending))
+            path.write_bytes(inputs.sound_recording(ending))
             assert len(Recording.read(path).names) >= 2, ending
-    assert Model.from_dict(tomllib.loads(fuzzing.MODEL)).name == "pendulum"
-    (tmp_path / "fit.json").write_text(json.dumps(fuzzing.estimate_content()))
+    assert Model.from_dict(tomllib.loads(inputs.MODEL)).name == "pendulum"
+    (tmp_path / "fit.json").write_text(json.dumps(inputs.estimate_content()))
     assert str(Estimate.load(tmp_path / "fit.json"))
-    assert judge(fuzzing.CASE, fuzzing.ANSWER).outcome == "right"
+    assert judge(inputs.CASE, inputs.ANSWER).outcome == "right"
 
 
 @pytest.mark.kan
 def test_the_network_that_is_damaged_was_sound(tmp_path: Path) -> None:
     from pikanid.approximators.kan import load
 
-    (tmp_path / "net.json").write_text(json.dumps(fuzzing.network_content()))
+    (tmp_path / "net.json").write_text(json.dumps(inputs.network_content()))
     assert load(tmp_path / "net.json") is not None
 
 

@@ -1,0 +1,41 @@
+"""What options mean: quantities, changes to a model, outputs that may be written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from commandline import Run
+
+import pikanid as pk
+from pikanid.commands.options import adjusted, check_outputs, quantity
+
+
+def test_an_output_never_overwrites_an_input(run: Run, recorded: str, tmp_path: Path) -> None:
+    os.symlink(tmp_path / recorded, tmp_path / "link.json")
+    content = (tmp_path / recorded).read_bytes()
+    code, _, err = run("identify", recorded, "--model", "sloshing", "--json", "link.json")
+    assert code == 2 and "overwrite" in err
+    assert (tmp_path / recorded).read_bytes() == content
+
+
+def test_outputs_are_checked_before_inputs_are_read(run: Run) -> None:
+    code, _, err = run("identify", "absent.csv", "-m", "sloshing", "--plot", "absent/a.png")
+    assert code == 2 and "--plot" in err
+
+
+def test_devices_are_not_replaced() -> None:
+    with pytest.raises(pk.errors.BadSetting, match="no regular file"):
+        check_outputs({"--json": (os.devnull, [""])}, [])
+
+
+def test_a_sigma_is_a_difference() -> None:
+    assert quantity("1 degC", "K", "x", difference=True) == 1.0
+    assert quantity("1 degC", "K", "x") == pytest.approx(274.15)
+
+
+def test_free_then_fix_then_set() -> None:
+    model = adjusted(pk.systems.sloshing(), ["m=200g"], ["d_theta"], ["g"])
+    assert model.free_names == ("l_theta", "g")
+    assert model.parameter("m").value == pytest.approx(0.2)
