@@ -57,13 +57,14 @@ LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "says where, how large or what next once the verdict stands": (
         "band", "beyond.own", "beyond.line", "beyond.inside", "beyond.knots_a_period",
         "beyond.resolved", "beyond.rows_a_knot", "beyond.louder", "beyond.unexplained",
-        "verdict.sensitive", "budget.force_passes", "budget.force_knots", "budget.slow_knots",
+        "verdict.sensitive", "uncertainty.far", "uncertainty.far_from_zero",
+        "uncertainty.condition", "budget.force_passes", "budget.force_knots", "budget.slow_knots",
         "budget.windows", "beyond.least_window"),
     "plans experiments, diagnoses none": (
         "confusion", "signs", "budget.planned_refits", "budget.planned_sizes", "budget.finalists",
-        "budget.compared", "budget.profile", "budget.profile_rate", "reached"),
+        "budget.compared", "budget.profile", "budget.profile_rate", "reached", "budget.smaller"),
     "acts on longer recordings only": (
-        "budget.samples", "budget.put_together", "budget.samples_a_period",
+        "budget.samples", "budget.put_together", "budget.samples_a_period", "budget.fastest",
         "budget.rows_searched", "budget.rows_tested", "budget.carried_far"),
     "acts on much shorter recordings only": ("noise.least_spectrum", "noise.least_alone"),
     "acts on rounded recordings only": ("rounding.changes", "rounding.dwell"),
@@ -75,7 +76,9 @@ LEFT_OUT: Mapping[str, tuple[str, ...]] = {
         "budget.relevelled", "budget.rechecked", "budget.iterations", "budget.hurried",
         "budget.hop_iterations", "budget.several_starts", "budget.patience", "budget.noise_refit",
         "budget.hops", "budget.finer", "budget.relinearised", "budget.levels", "budget.held_out",
-        "budget.beginnings"),
+        "budget.beginnings", "formulas.searched", "formulas.starts", "formulas.iterations"),
+    "acts where noise is not known from the recording": ("adequacy.samples", "adequacy.far"),
+    "acts where nothing oscillates": ("detection.spans",),
     "number of threads": ("budget.threads",),
     "number of draws": ("budget.draws",),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from math import inf
 from sys import float_info
@@ -51,23 +51,36 @@ Signed = Annotated[float, Range()]
 Count = Annotated[int, Range(1, whole=True)]
 
 
-def check(settings: Any, group: str = "") -> None:
+class Checked:
+    """Base of settings: frozen dataclasses whose fields keep to the ranges they are annotated with.
+
+    Raises:
+        BadSetting: If a value is none that its field can have.
+    """
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def check(settings: Any, group: str = "", values: Mapping[str, Any] | None = None) -> None:
     """Refuse values that the annotations of their fields do not allow.
 
     Args:
         settings: A dataclass; its fields are annotated with a range, with a tuple of ranges (which
             may be `ASCENDING`), or are such dataclasses; others are not looked at.
         group: Before the names of its fields.
+        values: Of some fields, in place of what it holds.
 
     Raises:
         BadSetting: With the name of the field.
     """
     hints = get_type_hints(type(settings), include_extras=True)
-    for f in fields(settings):
-        value, hint, name = getattr(settings, f.name), hints[f.name], f"{group}{f.name}"
-        if is_dataclass(hint):
-            if not isinstance(value, hint):  # type: ignore[arg-type]  # a type, as `hints` has it
-                raise _refused(name, value, f"a {hint.__name__}")  # type: ignore[union-attr]
+    given = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    for field, value in (given if values is None else values).items():
+        hint, name = hints[field], f"{group}{field}"
+        if isinstance(hint, type) and is_dataclass(hint):
+            if type(value) is not hint:  # one of a narrower kind would have fields unknown here
+                raise _refused(name, value, f"a {hint.__name__}")
             check(value, f"{name}.")
         elif (ranges := ranges_of(hint)) is not None:
             _check_numbers(name, value, ranges, ASCENDING in getattr(hint, "__metadata__", ()))

@@ -49,6 +49,26 @@ def test_a_fit_that_comes_far_closer_than_all_before_is_simulated_finely() -> No
     assert max(whitened.step_errors(found.theta)) <= 1
 
 
+def test_settings_say_how_much_closer_that_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth = pk.systems.sloshing().with_term("theta_dot", "-3000.0*max(theta - 0.15, 0)")
+    case = opened(truth, pk.excitation.two_pulse(), 0.002)
+    begin = {"l_theta": 0.045, "d_theta": 0.15}
+
+    def chosen(share: float) -> int:
+        """How often steps are chosen."""
+        settings = DEFAULTS.with_values({"fits.closer": share})
+        whitened = Whitened(case.model, replace(case.records, settings=settings))
+        calls: list[object] = []
+        choose = Whitened.choose_steps
+        monkeypatch.setattr(Whitened, "choose_steps", lambda self, *args, **named: (
+            calls.append(args), choose(self, *args, **named))[1])
+        descended(whitened, [begin], Closest(1e6 * whitened.rows), 30, lambda chi2: False)
+        monkeypatch.undo()
+        return len(calls)
+
+    assert chosen(1.0) > chosen(0.0)
+
+
 def test_steps_that_are_too_long_elsewhere_are_seen() -> None:
     truth = pk.systems.sloshing().with_term("theta_dot", "-70000*max(theta - 0.15, 0)")
     case = opened(truth, pk.excitation.two_pulse(), 0.002)

@@ -40,6 +40,16 @@ def test_the_missing_law_is_among_the_formulas(case: Case) -> None:
     assert f"{SYMBOLIC}a_theta*theta**3" not in formulas  # the catalogue's own
 
 
+def test_settings_say_how_formulas_are_read(case: Case) -> None:
+    shape = force_shape(case.base, case.sites[0], case.candidates)
+    few, simple = (symbolic_candidates(
+        shape, case.sites[0], case.candidates, DEFAULTS.with_values(values))
+        for values in ({"formulas.forms": 1}, {"formulas.simpler": 1e6}))
+    usual = symbolic_candidates(shape, case.sites[0], case.candidates, DEFAULTS)
+    assert 0 < len(few) < len(usual)
+    assert {c.key for c in simple} != {c.key for c in usual}
+
+
 def test_constants_of_a_formula_have_units(case: Case) -> None:
     shape = force_shape(case.base, case.sites[0], case.candidates)
     for c in symbolic_candidates(shape, case.sites[0], case.candidates, DEFAULTS):

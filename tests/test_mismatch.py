@@ -119,8 +119,8 @@ def gaussian_case(seed: int, lift: float = 0.0, spread: float = 0.0) -> float:
     r = r + lift * units[:, 4]
     r -= J @ np.linalg.lstsq(J, r, rcond=None)[0]
     u = np.where((t > 1) & (t < 2), 1.0, 0.0)
-    return detect(r, J, units, np.zeros(30, bool), frequency_bands(t, 15.0),
-                  past_inputs(t, [(t, u)], 15.0), spread, DEFAULTS).p_value
+    return detect(r, J, units, np.zeros(30, bool), frequency_bands(t, 15.0, DEFAULTS.detection),
+                  past_inputs(t, [(t, u)], 15.0, DEFAULTS.detection), spread, DEFAULTS).p_value
 
 
 @pytest.mark.slow

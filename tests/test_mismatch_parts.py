@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -30,7 +31,7 @@ from pikanid.simulation.vectorfield import VectorField
 
 def test_bands_share_out_the_lines_of_a_record() -> None:
     t = np.linspace(2.0, 12.0, 2001)
-    bands = frequency_bands(t, rate=9.0)
+    bands = frequency_bands(t, 9.0, DEFAULTS.detection)
     assert len(bands) == 9
     every = np.concatenate(bands, axis=1)
     lines = int(6 * 9.0 * 10.0 / (2 * np.pi))  # up to six natural rates
@@ -81,8 +82,14 @@ def test_samples_are_put_together_only_where_nothing_moves_between() -> None:
     uneven = t + 0.0001 * np.sin(np.arange(len(t)))
     assert oversampling(model, (quick(uneven, 0.5),), DEFAULTS.budget) == 1
     assert oversampling(model, (quick(t[::100], 0.5),), DEFAULTS.budget) == 1
+    slow = quick(t, 0.5)
+    hum = slow.with_channels(replace(
+        slow["theta"], values=slow["theta"].values + 0.1 * np.sin(2 * np.pi * 40.0 * t)))
+    coarser = DEFAULTS.with_values({"budget.fastest": 0.9}).budget
+    assert oversampling(model, (hum,), DEFAULTS.budget) == 1
+    assert oversampling(model, (hum,), coarser) == count
     # never so many that a period keeps fewer than thirty
-    slow = averaged(quick(t, 0.5)["theta"], count)
+    slow = averaged(slow["theta"], count)
     assert np.diff(slow.time).max() < 2.0 / 25
     np.testing.assert_allclose(slow.values, np.sin(np.pi * slow.time), atol=1e-3)
     rng = np.random.default_rng(0)

@@ -16,6 +16,7 @@ from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
 from pikanid.mismatch.design.profiles import Bounds, motion, profiles, scaled
 from pikanid.mismatch.design.response import Watched, joined, natural_frequency, response
 from pikanid.mismatch.design.separation import distance, mean_precision, refitted, unexplained
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model, Parameter, systems
 from pikanid.recording import excitation
 
@@ -232,6 +233,10 @@ def test_limits_make_profiles_smaller() -> None:
                        candidates=[excitation.two_pulse()])
     reached = np.max(np.abs(pk.simulate(systems.sloshing(), chosen.profile)["theta"].values))
     assert 0.04 < reached <= 0.05
+    with pytest.raises(errors.SimulationFailed):
+        d_optimal(systems.sloshing(), sigma=SIGMA, limits={"theta": 0.05},
+                  candidates=[excitation.two_pulse()],
+                  settings=DEFAULTS.with_values({"budget.smaller": 1}))
 
 
 def test_d_optimal_agrees_with_the_cramer_rao_bound() -> None:

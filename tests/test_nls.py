@@ -9,7 +9,9 @@ import pytest
 import pikanid as pk
 from pikanid import errors
 from pikanid.model import Model, Parameter, systems
+from pikanid.objective.settings import AdequacySettings
 from pikanid.recording import Recording, excitation
+from pikanid.uncertainty.settings import UncertaintySettings
 
 SIGMA = 0.1 * np.pi / 180
 START = systems.sloshing().with_values(l_theta=0.06, d_theta=0.05)
@@ -135,6 +137,19 @@ def test_misfit_is_reported_never_as_success() -> None:
     right = pk.NLS(starts=1).fit(truth.with_values(mu=1.6), recording)
     assert right.ok
     assert abs(right.value("mu") - 2.0) < 4 * right.std("mu")
+
+
+def test_settings_say_what_explains_and_what_is_determined() -> None:
+    model, rec = pk.systems.sloshing(), pk.simulate(
+        pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=0.002, seed=0)
+    usual = pk.NLS().fit(model, rec)
+    strict = pk.NLS(adequacy=AdequacySettings(alpha=0.999),
+                    uncertainty=UncertaintySettings(far=1e-6)).fit(model, rec)
+    assert (usual.adequacy.verdict, strict.adequacy.verdict) == ("fits", "misfit")
+    assert usual.settings["tried"] == 1 < strict.settings["tried"]
+    assert not usual.warnings and any("l_theta" in w for w in strict.warnings)
+    assert strict.settings["adequacy"] == {"alpha": 0.999}
+    assert "adequacy" not in usual.settings
 
 
 def test_starts_that_cannot_be_simulated_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from pikanid.errors import BadRecording
 from pikanid.noise import autoregressive as noise_ar
 from pikanid.noise import level as noise
 from pikanid.noise.quiet import _is_quiet, even_parts, find_quiet, without_moves
-from pikanid.noise.settings import USUAL, QuietSettings
+from pikanid.noise.settings import USUAL, QuietSettings, RoundingSettings
 from pikanid.recording.channel import Channel
 
 DT = 0.01
@@ -90,6 +90,11 @@ def test_rounding_counts_as_noise() -> None:
     y = Channel("y", t, np.round(0.3 * np.sin(1.3 * t) / step) * step)
     sigma, _ = noise.high_band_sigma(y)
     assert sigma >= step / np.sqrt(12) * 0.999
+    slow = Channel("y", t, np.round(0.1 * np.sin(0.4 * t) / step) * step)
+    careful = RoundingSettings(changes=10**6)
+    assert noise.estimate(slow).sigma == pytest.approx(step / np.sqrt(12))
+    assert noise.estimate(slow, rounding=careful).sigma < 0.9 * step / np.sqrt(12)
+    assert noise.high_band_sigma(slow, careful)[0] < 1e-6 * step
 
 
 def test_outliers_and_gaps_do_not_disturb_the_highest_frequencies() -> None:

@@ -49,7 +49,7 @@ def test_a_random_motion_does_not_count_as_coloured_noise() -> None:
     motion = drive * np.clip((T - 2.0) / 8.0, 0.0, 1.0) * 0.05
     y = motion + 0.001 * rng.standard_normal(len(T))
     recording = Recording.from_arrays(T, {"u": drive, "y": y}, {"u": "m/s^2", "y": "rad"})
-    blind, seeing = (first_level(recording, "y", None, DEFAULTS.quiet, inputs)
+    blind, seeing = (first_level(recording, "y", None, DEFAULTS, inputs)
                      for inputs in ([], ["u"]))
     assert blind.rho > 0.3
     assert seeing.rho == 0 and seeing.sigma == pytest.approx(0.001, rel=0.15)
@@ -210,11 +210,11 @@ def test_the_standard_error_of_a_power_is_one_over_the_root_of_its_ordinates() -
 
 def test_what_a_recording_states_is_taken() -> None:
     stated = Recording.from_arrays(T, {"y": MOVING}, sigma={"y": np.linspace(0.1, 0.3, 1000)})
-    level = first_level(stated, "y", None, DEFAULTS.quiet)
+    level = first_level(stated, "y", None, DEFAULTS)
     assert level.sigma == pytest.approx(0.2) and (level.rho, level.spread) == (0.0, 0.0)
     assert level.source == "given" and level.interval == pytest.approx(0.01)
     y = MOVING + 0.01 * coloured(0.6, 3)[:1000]
-    read = first_level(Recording.from_arrays(T, {"y": y}), "y", (0.0, 1.99), DEFAULTS.quiet)
+    read = first_level(Recording.from_arrays(T, {"y": y}), "y", (0.0, 1.99), DEFAULTS)
     assert read.sigma == pytest.approx(0.01, rel=0.3) and read.rho == pytest.approx(0.6, abs=0.2)
     assert 0.1 < read.spread < 0.6 and read.stretch == pytest.approx((0.0, 1.99))
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pikanid.mismatch.design.next_experiment import _default_candidates
-from pikanid.mismatch.design.profiles import _pulses, profiles
+from pikanid.mismatch.design.profiles import _pulses, profiles, profiles_for
 from pikanid.model import systems
 
 
@@ -20,7 +19,7 @@ def test_every_pulse_has_its_counterpart() -> None:
 
 def test_profiles_are_as_random_as_their_seed() -> None:
     def values(seed: int) -> list[np.ndarray]:
-        made = _default_candidates({"one": systems.sloshing()}, None, 10.0, 0.02, seed)
+        made = profiles_for({"one": systems.sloshing()}, None, 10.0, 0.02, seed)
         return [r["u_x"].values for r in made]
 
     once, again, other = values(1), values(1), values(2)

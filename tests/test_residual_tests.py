@@ -19,6 +19,7 @@ from pikanid.mismatch.detect.residual_tests import (
     project,
     unit_columns,
 )
+from pikanid.mismatch.settings.detection import DetectionSettings
 from pikanid.mismatch.settings.settings import DEFAULTS
 
 N = 200
@@ -157,7 +158,7 @@ def test_projection_and_unit_columns_by_hand() -> None:
 def test_bands_hold_every_line_once() -> None:
     """Up to six natural rates: 2 s at 10 rad/s are 19 lines of 0.5 Hz."""
     t = 3.0 + np.arange(200) * 0.01
-    bands = frequency_bands(t, 10.0)
+    bands = frequency_bands(t, 10.0, DEFAULTS.detection)
     every = np.hstack([np.hstack(np.split(b, 2, axis=1)) for b in bands])
     assert len(bands) == 8 and every.shape == (200, 2 * 19)
     span = t[-1] - t[0]
@@ -169,13 +170,20 @@ def test_bands_hold_every_line_once() -> None:
     widths = [b.shape[1] for b in bands]
     assert widths == sorted(widths) and widths[-1] > 2 * widths[0]
     # never beyond what the samples, or 150 lines, can hold
-    assert sum(b.shape[1] for b in frequency_bands(t, 1e4)) == 2 * int(0.9 * 50 * span)
+    assert sum(b.shape[1] for b in frequency_bands(
+        t, 1e4, DEFAULTS.detection)) == 2 * int(0.9 * 50 * span)
+
+    own = DetectionSettings(bands=3, reach=4.0, lines=5)
+    assert len(frequency_bands(t, 10.0, own)) == 3
+    assert sum(b.shape[1] for b in frequency_bands(t, 1e4, own)) == 2 * 5
+    low = frequency_bands(t, 10.0, DetectionSettings(reach=4.0))
+    assert sum(b.shape[1] for b in low) == 2 * int(4.0 * 10.0 * span / (2 * np.pi))
 
 
 def test_past_inputs_span_the_input_at_every_lag_of_a_period() -> None:
     t = np.linspace(0.0, 6.0, 301)
     u = np.sin(3 * t) + np.sin(7.3 * t) + (t > 2)
-    columns = past_inputs(t, [(t, u)], 5.0)
+    columns = past_inputs(t, [(t, u)], 5.0, DEFAULTS.detection)
     np.testing.assert_allclose(columns.T @ columns, np.eye(columns.shape[1]), atol=1e-10)
     for lag in np.linspace(0.0, 2 * np.pi / 5.0, 12):
         late = np.interp(t - lag, t, u, left=u[0])
@@ -185,14 +193,18 @@ def test_past_inputs_span_the_input_at_every_lag_of_a_period() -> None:
     later = np.interp(t - 2.5, t, u, left=u[0])
     later -= later.mean()
     assert np.linalg.norm(later - columns @ (columns.T @ later)) > 0.2 * np.linalg.norm(later)
-    assert past_inputs(t, [], 5.0).shape == (301, 0)
+    assert past_inputs(t, [(t, u)], 5.0, DetectionSettings(lags=4)).shape[1] <= 4
+    assert past_inputs(t, [], 5.0, DEFAULTS.detection).shape == (301, 0)
 
 
 def test_without_a_natural_rate_inputs_act_over_a_twentieth_of_the_record() -> None:
     t = np.linspace(3.0, 13.0, 1001)
     pulse = (np.abs(t - 5.0) < 0.05).astype(float)
-    columns = past_inputs(t, [(t, pulse)], 0.0)
+    columns = past_inputs(t, [(t, pulse)], 0.0, DEFAULTS.detection)
     moved = np.abs(np.diff(columns, axis=0)).max(axis=1) > 1e-6
     where = t[1:][moved]
     assert where.min() == pytest.approx(4.95, abs=0.02)
     assert where.max() == pytest.approx(5.05 + 0.5, abs=0.02)
+    longer = past_inputs(t, [(t, pulse)], 0.0, DetectionSettings(spans=10))
+    moved = np.abs(np.diff(longer, axis=0)).max(axis=1) > 1e-6
+    assert t[1:][moved].max() == pytest.approx(5.05 + 1.0, abs=0.02)

@@ -46,9 +46,7 @@ GROUPS = groups()
 
 @pytest.mark.parametrize("group", GROUPS, ids=lambda g: type(g).__name__)
 def test_every_field_is_described(group: Any) -> None:
-    text = inspect.getdoc(type(group)) or ""
-    described = set(re.findall(r"^    (\w+): \S", text, re.MULTILINE))
-    assert described >= {f.name for f in fields(group)}
+    assert set(described(group)) >= {f.name for f in fields(group)}
 
 
 def test_thresholds_follow_from_their_rates() -> None:
@@ -94,6 +92,7 @@ def test_a_table_describes_settings_and_back() -> None:
     ({"search.faint": -1.0}, "search.faint.*0 or more"),
     ({"search.faint": float("nan")}, "search.faint.*0 or more"),
     ({"verdict.strong": (1.0, 2.0)}, "verdict.strong.*4 of these"),
+    ({"adequacy.alpha": 2.0}, r"The setting adequacy\.alpha is 2"),
     ({"search.fainter": 1.0}, "no setting 'search.fainter'.*search.faint"),
     ({"verdict": 1.0}, "no setting 'verdict'"),
     ({"budget.singles.x": 1}, "no setting 'budget.singles.x'"),
@@ -151,8 +150,11 @@ def test_a_result_says_by_which_settings_it_came(tmp_path: Path) -> None:
 
 
 def test_no_step_falls_back_to_the_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever is whitened, in opening, search, prediction, force and advice, has the settings."""
+    """Whatever is whitened, in opening, search, prediction, force and advice, has the settings; of
+    no group are the usual ones asked for anything.
+    """
     own = Settings().with_values({"budget.singles": 2, "budget.pairs": 1, "budget.effort": 0.0})
+    asked = watch(monkeypatch)
     seen: list[Settings] = []
     made = Whitened.__init__
 
@@ -164,9 +166,38 @@ def test_no_step_falls_back_to_the_defaults(monkeypatch: pytest.MonkeyPatch) -> 
     truth = pk.systems.sloshing().with_term("theta_dot", "-k*theta**3", [pk.Parameter("k", 200.0)])
     train, other = (pk.simulate(truth, pk.excitation.planar_moves(3, 6.0, seed=seed), sigma=0.002,
                                 seed=seed) for seed in (1, 2))
+    train = train.with_channels(replace(train["theta"], sigma=None))  # noise is read as well
     dx = pk.diagnose(pk.systems.sloshing(), train, other, settings=own, workers=1)
     assert dx.settings is own and dx.mismatch
     assert len(seen) > 5 and all(settings is own for settings in seen)
+    usual = {id(one) for one in USUAL}
+    assert [name for group, name in asked if group in usual] == []
+    reached = {id(getattr(own, f.name)): f.name for f in fields(own) if f.name not in LATER
+               and is_dataclass(getattr(own, f.name))}
+    assert set(reached) <= {group for group, _ in asked}, reached
+
+
+# Asked where something without a name, or sure beside a remainder, is found.
+LATER = ("beyond", "part", "formulas")
+USUAL = [one for name in ("noise", "objective", "uncertainty", "symbolic", "discrepancy",
+                          "mismatch.settings")
+         for one in vars(import_module(f"pikanid.{name}.settings")).values() if one in GROUPS]
+USUAL += [getattr(DEFAULTS, f.name) for f in fields(DEFAULTS)
+          if is_dataclass(getattr(DEFAULTS, f.name))]
+
+
+def watch(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, str]]:
+    """From now on: which field of which object is asked for, of all kinds of settings."""
+    asked: list[tuple[int, str]] = []
+
+    def look(self: Any, name: str) -> Any:
+        if not name.startswith("__"):
+            asked.append((id(self), name))
+        return object.__getattribute__(self, name)
+
+    for group in GROUPS:
+        monkeypatch.setattr(type(group), "__getattribute__", look, raising=False)
+    return asked
 
 
 def test_the_rate_of_false_alarms_decides_what_is_missing() -> None:
@@ -212,8 +243,8 @@ def _sizes(base: Any, own: Settings, effect: Any) -> dict[str, Any]:
 
 
 def described(group: Any) -> dict[str, str]:
-    """What the documentation says of each field."""
-    text = inspect.getdoc(type(group)) or ""
+    """What the documentation says of each field, of a base class where it has it from there."""
+    text = "\n".join(inspect.cleandoc(kind.__doc__ or "") for kind in type(group).__mro__)
     return dict(re.findall(r"^    (\w+): (\S.*)", text, re.MULTILINE))
 
 

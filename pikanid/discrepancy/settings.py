@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from pikanid.settings import ASCENDING, Amount, Count, Range, Share, Signed, check
+from pikanid.settings import ASCENDING, Amount, Checked, Count, Range, Share, Signed
 
 
 @dataclass(frozen=True)
-class DiscrepancySettings:
+class DiscrepancySettings(Checked):
     """What `kan_discrepancy` takes as given, beside the level of its tests.
 
     Evidence is the marginal likelihood of the linearised problem; its differences are logarithms of
@@ -39,9 +39,6 @@ class DiscrepancySettings:
         idle: [χ²] by which two steps in a row must lower the cost, or the fit ends.
         turns: Of fit and choice of the smoothness, by relaxation.
         settled_turns: [log λ] that the last of these may change.
-
-    Raises:
-        BadSetting: If a value is none that its field can have.
     """
 
     strong: Amount = 5.0
@@ -64,9 +61,6 @@ class DiscrepancySettings:
     idle: Amount = 0.05
     turns: Count = 6
     settled_turns: Amount = 0.3
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 USUAL = DiscrepancySettings()

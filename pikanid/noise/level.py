@@ -17,7 +17,7 @@ from pikanid import errors
 from pikanid.noise.autoregressive import autocorrelation, fit
 from pikanid.noise.floor import rounding_noise
 from pikanid.noise.quiet import even_parts, find_quiet, without_moves
-from pikanid.noise.settings import USUAL, QuietSettings
+from pikanid.noise.settings import ROUNDING, USUAL, QuietSettings, RoundingSettings
 from pikanid.recording.channel import Array, Channel, check_times, check_values
 
 
@@ -70,7 +70,8 @@ class NoiseModel:
 
 
 def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
-             drives: Sequence[Channel] = (), settings: QuietSettings = USUAL) -> NoiseModel:
+             drives: Sequence[Channel] = (), settings: QuietSettings = USUAL,
+             rounding: RoundingSettings = ROUNDING) -> NoiseModel:
     """The noise of a signal, from a quiet stretch if it has one.
 
     Args:
@@ -78,6 +79,7 @@ def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
         quiet: Start and stop [s] of a stretch known to be quiet; looked for if None.
         drives: Inputs; a stretch that is looked for is quiet while none of them moves.
         settings: What counts as quiet.
+        rounding: What counts as rounded: σ is at least what rounding leaves.
 
     Raises:
         BadRecording: If there are fewer samples (in `quiet`) than `shortest`, or none vary.
@@ -92,12 +94,13 @@ def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
     check_values(channel, channel.name, missing_allowed=True)
     stretch = find_quiet(channel, settings) if quiet is None else quiet
     if stretch is None:
-        return _from_highest(channel)
+        return _from_highest(channel, rounding)
     return _from_quiet(channel, *(without_moves(channel, drives, *stretch, settings)
-                                  if quiet is None else stretch), settings)
+                                  if quiet is None else stretch), settings, rounding)
 
 
-def high_band_sigma(channel: Channel) -> tuple[float, float]:
+def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
+                    ) -> tuple[float, float]:
     """(sigma, its standard error) of white noise under a signal, from fourth differences.
 
     Fourth differences pass the noise at the highest frequencies and hardly anything of a signal
@@ -121,7 +124,7 @@ def high_band_sigma(channel: Channel) -> tuple[float, float]:
         raise errors.BadRecording(errors.noise_short(channel.name, len(differences) + 4))
     # 0.6745: the median absolute deviation of a unit Gaussian; 70 = Σ weights².
     sigma = float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(70.0))
-    sigma = max(sigma, rounding_noise(channel.values))
+    sigma = max(sigma, rounding_noise(channel.values, rounding))
     if sigma == 0:
         raise errors.BadRecording(errors.noise_none(channel.name))
     lags = np.correlate(weights, weights, "full") / 70.0
@@ -130,14 +133,14 @@ def high_band_sigma(channel: Channel) -> tuple[float, float]:
     return sigma, float(spread)
 
 
-def _from_quiet(channel: Channel, start: float, stop: float, settings: QuietSettings
-                ) -> NoiseModel:
+def _from_quiet(channel: Channel, start: float, stop: float, settings: QuietSettings,
+                rounding: RoundingSettings) -> NoiseModel:
     inside = (channel.time >= start) & (channel.time <= stop) & np.isfinite(channel.values)
     time, values = channel.time[inside], channel.values[inside]
     n = len(values)
     if n < settings.shortest:
         raise errors.BadRecording(errors.noise_short(channel.name, n))
-    least = rounding_noise(channel.values)
+    least = rounding_noise(channel.values, rounding)
     if np.ptp(values) == 0 and not least:
         raise errors.BadRecording(errors.noise_none(channel.name))
     sigma, rho, spread = least, 0.0, 2 / float(np.sqrt(2 * n))
@@ -151,8 +154,8 @@ def _from_quiet(channel: Channel, start: float, stop: float, settings: QuietSett
                       (first, last) if n >= settings.low else None)
 
 
-def _from_highest(channel: Channel) -> NoiseModel:
-    sigma, error = high_band_sigma(channel)
+def _from_highest(channel: Channel, rounding: RoundingSettings) -> NoiseModel:
+    sigma, error = high_band_sigma(channel, rounding)
     seen = channel.time[np.isfinite(channel.values)]
     return NoiseModel(sigma, 0.0, 2 * error / sigma, channel.interval,
                       f"the highest frequencies ({seen[0]:g} s to {seen[-1]:g} s)")

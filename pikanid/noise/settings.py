@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pikanid.settings import Amount, Count, Factor, Rate, Share, check
+from pikanid.settings import Amount, Checked, Count, Factor, Rate, Share
 
 
 @dataclass(frozen=True)
-class QuietSettings:
+class QuietSettings(Checked):
     """When a stretch of a signal shows noise only, and what its noise is known by.
 
     Attributes:
@@ -24,9 +24,6 @@ class QuietSettings:
         still_noise: The same [standard deviations of the input's own noise].
         low: Samples of a quiet stretch that say something about low frequencies.
         steepest: Correlation of neighbours that a quiet stretch can show: beyond it, it drifts.
-
-    Raises:
-        BadSetting: If a value is none that its field can have.
     """
 
     chance: Rate = 0.01
@@ -40,28 +37,19 @@ class QuietSettings:
     low: Count = 100
     steepest: Share = 0.98
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class RoundingSettings:
+class RoundingSettings(Checked):
     """When a signal counts as rounded to the steps of its sensor.
 
     Attributes:
         changes: Of the signal, at least, that are compared: one is a multiple of itself.
         dwell: Equal samples in a row that are as many observations: more are one, as the error of
             rounding is the same in all of them.
-
-    Raises:
-        BadSetting: If a value is none that its field can have.
     """
 
     changes: Count = 2
     dwell: Count = 5
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 USUAL = QuietSettings()

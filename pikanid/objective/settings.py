@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pikanid.settings import Amount, Count, Factor, Rate, check
+from pikanid.settings import Amount, Checked, Count, Factor, Rate
 
 
 @dataclass(frozen=True)
-class AdequacySettings:
+class AdequacySettings(Checked):
     """What a χ² test of the residuals takes as given.
 
     Attributes:
@@ -18,9 +18,6 @@ class AdequacySettings:
         samples: Of an output from which on they show its noise: eight fourth differences.
         far: [χ² per sample] from which on a residual is a misfit where its noise is read off the
             samples: coloured noise fools differences.
-
-    Raises:
-        BadSetting: If a value is none that its field can have.
     """
 
     alpha: Rate = 1e-3
@@ -28,9 +25,6 @@ class AdequacySettings:
     power: Rate = 0.5
     samples: Count = 12
     far: Amount = 4.0
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 USUAL = AdequacySettings()

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pikanid.objective.adequacy import Adequacy, difference_noise, judge
+from pikanid.objective.settings import USUAL, AdequacySettings
 from pikanid.problem.problem import Problem, Samples
 from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
 
@@ -23,8 +24,10 @@ class Shooting:
     finished gives huge residuals: a bad step, not a crash.
     """
 
-    def __init__(self, problem: Problem, method: MethodChoice = "auto"):
+    def __init__(self, problem: Problem, method: MethodChoice = "auto",
+                 settings: AdequacySettings = USUAL):
         self.problem = problem
+        self.settings = settings
         self.method = method
         self.simulators = [Simulator(problem.model, e) for e in problem.experiments]
         self.columns = [problem.columns(r) for r in range(len(self.simulators))]
@@ -141,7 +144,7 @@ class Shooting:
         """The χ² verdict at θ."""
         r = self.residual(theta) / self.weights
         ends = np.cumsum([len(d) for d in self.data])[:-1]
-        return judge(np.split(r, ends), self.known, self.data, len(theta))
+        return judge(np.split(r, ends), self.known, self.data, len(theta), self.settings)
 
     def explains(self, theta: np.ndarray) -> bool:
         """Whether the fit at θ is within the noise, so that no other start is needed."""

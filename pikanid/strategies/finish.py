@@ -19,12 +19,13 @@ from pikanid.uncertainty.information import (
     identifiability_warnings,
     undetermined_warnings,
 )
+from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 
 
 def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarray, *,
            converged: bool, history: Sequence[Mapping[str, float]], settings: Mapping[str, Any],
            seed: int | None, begun: float, warnings: Sequence[str] = (),
-           approximator: Any = None) -> Estimate:
+           approximator: Any = None, uncertainty: UncertaintySettings = USUAL) -> Estimate:
     """Assemble the `Estimate` at θ."""
     jacobian = shooting.jacobian(theta)
     adequacy = shooting.adequacy(theta)
@@ -47,8 +48,8 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         notes.append("The model, simulated at these estimates, does not explain the recording: "
                      "they are biased or make up for missing physics, and standard errors mean "
                      "little.")
-    notes += identifiability_warnings(jacobian, problem.free, ~at_bound)
-    notes += undetermined_warnings(problem.free, theta, cov)
+    notes += identifiability_warnings(jacobian, problem.free, ~at_bound, uncertainty)
+    notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
     for e in problem.experiments:
         if e.unused:
             notes.append(f"Recording '{e.name}': the model does not use {', '.join(e.unused)}.")

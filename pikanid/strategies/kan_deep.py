@@ -127,9 +127,9 @@ def deep_fit(setup: Setup, start: RelaxedFit, shape: Shape, lam: float | None,
 def _concluded(setup: Setup, system: BorderedSystem, stop: Stop, grid: KanGrid,
                lam: float) -> RelaxedFit:
     at = stop.at
-    # of both it reads the data's rows, which networks and splines share
     sandwich, naive, effective = network_covariance(
-        system, at, lambda count: row_noise(system.functional, at, count))  # type: ignore[arg-type]
+        system, at,
+        lambda count: row_noise(system.functional, at, count))  # type: ignore[arg-type]  # data's rows are alike
     std = np.sqrt(np.diag(sandwich))
     # A redundant network creeps on long after θ has come to rest.
     last = setup.settings.calm

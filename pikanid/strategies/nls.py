@@ -10,20 +10,25 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.model import Model
+from pikanid.objective.settings import USUAL as ADEQUACY
+from pikanid.objective.settings import AdequacySettings
 from pikanid.objective.shooting import Accuracy, Shooting
 from pikanid.optimise.minpack import Optimum, minimise
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
+from pikanid.settings import changed
 from pikanid.strategies.finish import finish
 from pikanid.strategies.multiple_shooting import multiple_shooting
 from pikanid.strategies.starts import starting_points
+from pikanid.uncertainty.settings import USUAL as UNCERTAINTY
+from pikanid.uncertainty.settings import UncertaintySettings
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,8 @@ class NLS:
         method: Integration method, see `pikanid.simulate`.
         segments: With more than one, every start is first led to a basin by multiple shooting.
         extra: Starting points that "auto" adds.
+        adequacy: When a fit explains the recording.
+        uncertainty: When a parameter counts as not determined.
 
     >>> import pikanid as pk
     >>> model = pk.systems.sloshing()
@@ -60,6 +67,8 @@ class NLS:
     method: Literal["auto", "explicit", "implicit"] = "auto"
     segments: int = 1
     extra: int = 8
+    adequacy: AdequacySettings = ADEQUACY
+    uncertainty: UncertaintySettings = UNCERTAINTY
 
     def fit(self, model: Model, recordings: Recording | Sequence[Recording]) -> Estimate:
         """Estimate the model's free parameters from one recording, or from several jointly.
@@ -70,7 +79,7 @@ class NLS:
         """
         begun = time.perf_counter()
         problem = Problem(model, recordings)
-        shooting = Shooting(problem, self.method)
+        shooting = Shooting(problem, self.method, self.adequacy)
         history: list[dict[str, float]] = []
         best: Optimum | None = None
         found: Optimum | None = None
@@ -92,12 +101,16 @@ class NLS:
             raise errors.SimulationFailed(errors.bad_start())
         if best is not found:
             shooting.choose_steps(best.theta, "fine")
-        settings = {"starts": self.starts, "protocol": self.protocol, "tolerance": self.tolerance,
+        settings: dict[str, Any] = {
+            "starts": self.starts, "protocol": self.protocol, "tolerance": self.tolerance,
                     "method": shooting.steps[0].method, "segments": self.segments,
                     "tried": len(history)}
+        for name in ("adequacy", "uncertainty"):
+            if own := changed(getattr(self, name)):
+                settings[name] = own
         return finish(
             self.name, problem, shooting, best.theta, converged=best.converged, history=history,
-            settings=settings, seed=self.seed, begun=begun)
+            settings=settings, seed=self.seed, begun=begun, uncertainty=self.uncertainty)
 
     def one_start(self, shooting: Shooting, start: np.ndarray) -> Optimum | None:
         """One local fit from θ = start: coarse steps first, then steps fine enough to finish.

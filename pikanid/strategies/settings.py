@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
-from pikanid.settings import Amount, Count, Factor, Share, changed, check
+from pikanid.settings import Amount, Checked, Count, Factor, Share, changed
 
 
 @dataclass(frozen=True)
-class RelaxationSettings:
+class RelaxationSettings(Checked):
     """What iPDA and PIKAN take as given.
 
     Attributes:
@@ -21,9 +21,6 @@ class RelaxationSettings:
         iterations: Of a deep network, at one λ.
         calm: Of these without a move of the parameters, and they have settled: a redundant network
             creeps on long after.
-
-    Raises:
-        BadSetting: If a value is none that its field can have.
     """
 
     settled: Amount = 0.05
@@ -33,12 +30,9 @@ class RelaxationSettings:
     iterations: Count = 30
     calm: Count = 10
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 @dataclass(frozen=True)
-class ClimbSettings:
+class ClimbSettings(Checked):
     """What a PINN takes as given while λ climbs, and after.
 
     Attributes:
@@ -50,9 +44,6 @@ class ClimbSettings:
         overfit: Share of the noise's cost below which the curve follows the noise.
         far: [standard errors] by which a simulation may be fitted elsewhere before the curve is
             called misleading.
-
-    Raises:
-        BadSetting: If a value is none that its field can have.
     """
 
     settled: Amount = 0.05
@@ -61,9 +52,6 @@ class ClimbSettings:
     share: Amount = 0.1
     overfit: Share = 0.8
     far: Amount = 5.0
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 RELAXATION = RelaxationSettings()

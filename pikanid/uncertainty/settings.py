@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pikanid.settings import Amount, Factor, check
+from pikanid.settings import Amount, Checked, Factor
 
 
 @dataclass(frozen=True)
-class UncertaintySettings:
+class UncertaintySettings(Checked):
     """From which standard errors on a parameter is told of.
 
     Attributes:
@@ -17,17 +17,11 @@ class UncertaintySettings:
         condition: Ratio of the largest to the least singular value of the scaled Jacobian from
             which on a combination of parameters is not determined: half of double precision's
             digits are lost there.
-
-    Raises:
-        BadSetting: If a value is none that its field can have.
     """
 
     far: Amount = 10.0
     far_from_zero: Amount = 100.0
     condition: Factor = 1e6
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 USUAL = UncertaintySettings()

@@ -32,6 +32,7 @@ from pikanid.symbolic.curve import Curve
 INTERVALS, DEGREE = 8, 3  # numerical: knots to spare, which the penalty holds down; cubic
 GRID = 101  # numerical: points at which an edge is drawn
 TYPICAL = 120  # numerical: and visited ones at which laws are compared with it
+RIDGES = 10.0 ** np.arange(-9.0, 4.0, 0.5)  # numerical: weights of roughness that are compared
 GAUGE = 1e-3  # numerical: of a sign: less is left when the free parameters can do the same
 
 
@@ -193,7 +194,7 @@ def _smoothed(rest: np.ndarray, target: np.ndarray, owner: np.ndarray, size: np.
     count = len(target)
     best, chosen = np.inf, np.diag(s**2)
     scale = np.trace(np.diag(s**2)) / max(np.trace(penalty), 1e-300)
-    for rho in scale * 10.0 ** np.arange(-9.0, 4.0, 0.5):
+    for rho in scale * RIDGES:
         normal = np.diag(s**2) + rho * penalty
         hat = s[:, None] * np.linalg.solve(normal, np.diag(s))
         left = float(target @ target - pull @ (2 * hat - hat.T @ hat) @ pull)

@@ -8,7 +8,7 @@ estimated anew inside the equation.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from pikanid.formula import units
 from pikanid.formula.expressions import symbol
@@ -22,6 +22,7 @@ from pikanid.symbolic.laws import Laws, sum_of_laws
 from pikanid.symbolic.library import NOTHING
 from pikanid.symbolic.naming import name_curve
 from pikanid.symbolic.search import shortlist
+from pikanid.symbolic.settings import SymbolicSettings
 
 LINEAR = "linear"  # what free parameters do already, as a rule
 CONSTANT = ("constant", "")
@@ -36,20 +37,23 @@ def symbolic_candidates(shape: ForceShape, site: Site, entries: Sequence[Candida
         shape: The missing force.
         site: Where it acts.
         entries: The catalogue: a form that is an entry of it is no formula of its own.
-        settings: How much an edge must explain, and how many formulas are read of it.
+        settings: How much an edge must explain, how it is named, and how many
+            formulas are read of it.
     """
     named = {(e.form, e.argument): e.key for e in entries if e.form and e.site.q == site.q}
     best, asks = max((e.alone for e in shape.edges), default=0.0), settings.beyond
     edges = [e for e in shape.edges if e.alone > max(asks.read, asks.read_beside * best)]
     return [_candidate(site, edge, fit, constant, named)
-            for edge in edges for fit in _forms(edge, settings.budget.forms)
+            for edge in edges for fit in _forms(edge, settings)
             for constant in (False, True)
             if constant or (fit.form.name, edge.argument) not in named]
 
 
-def _forms(edge: Edge, count: int) -> list[FormFit]:
-    fits = shortlist(name_curve(edge.curve))
-    return [f for f in fits if f.form is not NOTHING and f.form.family != LINEAR][:count]
+def _forms(edge: Edge, settings: Settings) -> list[FormFit]:
+    asks = SymbolicSettings(**asdict(settings.formulas))
+    fits = shortlist(name_curve(edge.curve, settings=asks))
+    laws = [f for f in fits if f.form is not NOTHING and f.form.family != LINEAR]
+    return laws[:settings.budget.forms]
 
 
 def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entries) -> Candidate:

@@ -11,6 +11,8 @@ from scipy.stats import norm
 MEMORIES = (2.0, 50.0)  # numerical: the likelihood takes one of two, and is flat between them
 DECADES = 10  # numerical: of the penalty's weight, from almost no force downwards
 HOPELESS = 60.0  # numerical: -2 ln likelihood above the best: e^-30, lighter weights are worse
+NEARBY = 10.0 ** np.array([-0.6, -0.3, 0.0, 0.3, 0.6])  # numerical: of the weight of a like fit
+LARGEST = 40.0  # numerical: standard errors: the normal tail is zero beyond, in double precision
 GAUGE = 1e-6  # numerical: of the prior: tells apart forces that do the same as a parameter
 
 
@@ -68,7 +70,7 @@ class Penalised:
     def _near(self, before: Penalised) -> tuple[float, float]:
         """(weight, memory) about those of another fit."""
         prior = _prior(len(self.pull), before.memory)
-        weights = before.weight * 10.0 ** np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
+        weights = before.weight * NEARBY
         return float(min(weights, key=lambda w: self._unlikely(w, prior))), before.memory
 
     def _unlikely(self, weight: float, prior: np.ndarray) -> float:
@@ -105,4 +107,4 @@ def critical_value(spread: np.ndarray, level: float) -> float:
     unit = spread / np.maximum(np.linalg.norm(spread, axis=0), 1e-300)
     way = float(np.sum(np.linalg.norm(np.diff(unit, axis=1), axis=0)))
     return float(brentq(lambda z: way / np.pi * np.exp(-z * z / 2) + 2 * norm.sf(z) - (1 - level),
-                        0.0, 40.0))
+                        0.0, LARGEST))

@@ -17,17 +17,23 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.thresholds import bic
 from pikanid.noise.floor import rounding_noise
 from pikanid.noise.level import NoiseModel, estimate
-from pikanid.noise.settings import QuietSettings
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
 LONGEST = 50  # numerical: samples of a gap beyond which a line across it leaves nothing that counts
+UNEVEN = 0.2  # numerical: of an interval, by which samples may be off an even grid
+TAPER = 0.2  # numerical: share of a residual that the window tapers, half of it at each end
+TAPERED = 0.9  # numerical: (Σw²)²/(N Σw⁴): share of the ordinates that stay independent under that
+BRIDGED = 0.1  # numerical: least share of white noise's power that a spectrum is divided by
+HIGHEST = 0.97  # numerical: of half the sampling rate: beyond, anti-alias filters bend a spectrum
+MEAN_OF = 50  # numerical: frequencies that a mean power is taken over
+STANDARD = 0.683  # definition: probability within one standard deviation
 GRID = np.linspace(0.0, 0.95, 191)  # numerical: correlations of neighbours that are compared
 Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
 
 
 def first_level(recording: Recording, output: str, quiet: tuple[float, float] | None,
-                settings: QuietSettings, inputs: Sequence[str] = ()) -> NoiseModel:
+                settings: Settings, inputs: Sequence[str] = ()) -> NoiseModel:
     """What the recording alone says, before any fit; a stretch is quiet while no input moves.
 
     Raises:
@@ -36,7 +42,8 @@ def first_level(recording: Recording, output: str, quiet: tuple[float, float] | 
     channel = recording[output]
     if channel.sigma is not None:
         return NoiseModel(float(np.median(channel.sigma)), 0.0, 0.0, channel.interval, "given")
-    return estimate(channel, quiet, [recording[u] for u in inputs if u in recording], settings)
+    drives = [recording[u] for u in inputs if u in recording]
+    return estimate(channel, quiet, drives, settings.quiet, settings.rounding)
 
 
 def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
@@ -57,19 +64,20 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
 
     h = level.interval
     grid = np.round((t - t[0]) / h).astype(int)
-    uneven = np.max(np.abs((t - t[0]) / h - grid)) > 0.2
+    uneven = np.max(np.abs((t - t[0]) / h - grid)) > UNEVEN
     if uneven or len(t) < settings.noise.least_spectrum:
         return level
     even = np.interp(np.arange(grid[-1] + 1), grid, residual)
     share = len(t) / len(even)
-    window = tukey(len(even), 0.2)
+    window = tukey(len(even), TAPER)
     power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)
     omega = np.linspace(0, np.pi, len(power))
-    power /= np.maximum(bridged(grid), 0.1)
+    power /= np.maximum(bridged(grid), BRIDGED)
     # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
     low, top = (share * np.pi for share in settings.noise.begins)
-    high = (omega > np.clip(settings.noise.above * rate * h, low, top)) & (omega < 0.97 * np.pi)
-    spectra = [(omega[high], power[high], 0.9 * share)]
+    high = (omega > np.clip(settings.noise.above * rate * h, low, top)) & (
+        omega < HIGHEST * np.pi)
+    spectra = [(omega[high], power[high], TAPERED * share)]
     source = "the residual's highest frequencies"
     found = quiet or level.stretch
     if found is not None:
@@ -86,8 +94,8 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
     # A stretch in which a motion dies out is no quiet one, and the shape of high frequencies can
     # mislead.  What explains all that a test sees leaves noise alone: it is read at all
     # frequencies, unless where noise was sure that makes it unlikely.
-    every = (omega > 0) & (omega < 0.97 * np.pi)
-    whole = _whittle([(omega[every], power[every], 0.9 * share)], given, settings.noise)
+    every = (omega > 0) & (omega < HIGHEST * np.pi)
+    whole = _whittle([(omega[every], power[every], TAPERED * share)], given, settings.noise)
     louder = np.log(_power(*whole[:2], low) / _power(sigma, rho, low))
     dearer = (_against(spectra, *whole[:2], settings.noise)
               - _against(spectra, sigma, rho, settings.noise))
@@ -152,10 +160,10 @@ def _whittle(spectra: list[Spectrum], given: float | None, settings: NoiseSettin
 
 
 def _two_thirds(distances: np.ndarray, weights: np.ndarray) -> float:
-    """Below which 68 % of the weight lies."""
+    """Below which as much of the weight lies as within one standard deviation."""
     order = np.argsort(distances)
     share = np.cumsum(weights[order]) / np.sum(weights)
-    return float(np.interp(0.683, share, distances[order]))
+    return float(np.interp(STANDARD, share, distances[order]))
 
 
 def _against(spectra: list[Spectrum], sigma: float, rho: float, settings: NoiseSettings) -> float:
@@ -169,7 +177,7 @@ def _against(spectra: list[Spectrum], sigma: float, rho: float, settings: NoiseS
 
 def _power(sigma: float, rho: float, top: float) -> float:
     """Mean power of ε between frequency zero and `top` [rad]."""
-    return float(sigma**2 * (1 - rho**2) * np.mean(_shape(rho, np.linspace(0.0, top, 50))))
+    return float(sigma**2 * (1 - rho**2) * np.mean(_shape(rho, np.linspace(0.0, top, MEAN_OF))))
 
 
 def _shape(rho: float, omega: np.ndarray) -> np.ndarray:

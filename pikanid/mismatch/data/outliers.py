@@ -10,6 +10,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
+from pikanid.mismatch.settings.settings import Settings
 from pikanid.noise.level import high_band_sigma
 from pikanid.recording import Recording
 
@@ -17,19 +18,19 @@ CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0  # numerical: through two ne
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
-def without_outliers(recording: Recording, output: str, noise: NoiseSettings
+def without_outliers(recording: Recording, output: str, settings: Settings
                      ) -> tuple[Recording, int]:
     """The recording without samples that leave the cubic through their neighbours, and how many.
 
     The worst goes first: beside a spike its neighbours look bad as well.
     """
-    channel = recording[output]
+    channel, noise = recording[output], settings.noise
     seen = np.flatnonzero(np.isfinite(channel.values))
     y = channel.values[seen].copy()
     if len(y) < noise.least_alone:
         return recording, 0
     try:
-        sigma, _ = high_band_sigma(channel)
+        sigma, _ = high_band_sigma(channel, settings.rounding)
     except errors.BadRecording:
         return recording, 0
     gap = np.zeros(len(y))

@@ -21,6 +21,7 @@ from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
+UNEVEN = 0.01  # numerical: of an interval, by which the others may differ
 EXACT = 1e-6  # numerical: of an output's half range: no simulation is compared with less noise
 
 
@@ -38,7 +39,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
         for output in model.outputs:
             channel = recording.as_output(output.name, output.unit or None)
             recording, count = without_outliers(
-                recording.with_channels(channel), output.name, settings.noise)
+                recording.with_channels(channel), output.name, settings)
             if count:
                 notes.append(f"Recording '{recording.name}': {count} outliers of "
                              f"'{output.name}' are left out.")
@@ -57,7 +58,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
                 continue
             # of a signal at rest the noise is seen where it still holds all its samples
             whole = recording.with_channels(own)
-            level = first_level(whole, output.name, quiet, settings.quiet, model.input_names)
+            level = first_level(whole, output.name, quiet, settings, model.input_names)
             found[output.name] = loud_enough(level, own)
             if found[output.name] is not level:
                 notes.append(f"Recording '{recording.name}': noise of '{output.name}' below "
@@ -124,8 +125,8 @@ def oversampling(model: Model, recordings: tuple[Recording, ...], budget: Budget
     """How many samples of the outputs may become one: of records that are long, and recorded far
     faster than anything in them moves.
 
-    Above the frequency that 99.9 % of an output's changes stay below, the budget's samples a period
-    are kept.
+    Of the frequency that nearly all of an output's changes stay below, the budget's samples a
+    period are kept.
     """
     total = sum(len(r[o].time) for r in recordings for o in model.output_names)
     counts = [total // budget.put_together]
@@ -134,11 +135,11 @@ def oversampling(model: Model, recordings: tuple[Recording, ...], budget: Budget
             c = recording[name]
             y = c.values[np.isfinite(c.values)]
             steps = np.diff(c.time)
-            if len(y) < budget.put_together // 4 or np.ptp(steps) > 0.01 * np.median(steps):
+            if len(y) < budget.put_together // 4 or np.ptp(steps) > UNEVEN * np.median(steps):
                 return 1
             y = (y - np.linspace(y[0], y[-1], len(y))) * np.hanning(len(y))
             power = np.cumsum(np.abs(np.fft.rfft(y)) ** 2)
-            fast = int(np.searchsorted(power, 0.999 * power[-1])) + 1
+            fast = int(np.searchsorted(power, budget.fastest * power[-1])) + 1
             counts.append(int(len(y) / (budget.samples_a_period * fast)))
     odd = max(min(counts), 1)
     return odd - 1 + odd % 2

@@ -16,6 +16,8 @@ from pikanid.simulation.simulator import Response, Steps
 from pikanid.simulation.translated import Translated
 
 SHARE = 0.05  # numerical: of the noise that a simulation may err by, 1/400 of its power
+OF_MISFIT = 0.2  # numerical: of the root of χ² per row, that a simulation may err more by
+TOO_ROUGH = 20  # numerical: times the error that steps are chosen for: beyond, they are none
 SHARP = 8  # numerical: steps a sample from which on stopping at corners is cheaper than finer steps
 FINEST, COARSEST = 64, 16  # numerical: steps a sample, at most; of a motion that misses grossly
 
@@ -67,7 +69,7 @@ def _cut(recording: Recording, stop: float) -> Recording:
 
 def allowance(misfit: float) -> float:
     """How many times more than usual an integration may err where χ² per row is `misfit`."""
-    return max(1.0, 0.2 * misfit**0.5)
+    return max(1.0, OF_MISFIT * misfit**0.5)
 
 
 class Whitened:
@@ -114,7 +116,7 @@ class Whitened:
                     self.simulators[r] = simulator
                     steps = self._steps(r, theta, allowed, finest)
                 self._weigh(steps, share)
-            if steps is None or steps.error > 20 * allowed:
+            if steps is None or steps.error > TOO_ROUGH * allowed:
                 return False
             found.append(steps)
         self.steps = found

@@ -24,25 +24,25 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from pikanid import errors
-from pikanid.mismatch.design.profiles import Bounds, profiles, scaled
+from pikanid.mismatch.design.profiles import Bounds, profiles_for, scaled
 from pikanid.mismatch.design.response import (
     Sigma,
     Watch,
     WhitenedResponse,
     joined,
-    natural_frequency,
 )
 from pikanid.mismatch.design.separation import distance, mean_precision, refitted_within
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Model
 from pikanid.problem.arguments import a_model, several
 from pikanid.recording import Recording
-from pikanid.recording.channel import Array, Channel
+from pikanid.recording.channel import Array
 from pikanid.uncertainty.information import covariance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+LESS = 0.99  # numerical: of a proportional size, which a softening spring would never come down to
 Score = Callable[[Mapping[str, list[WhitenedResponse]], Sequence[Recording]], float]
 
 
@@ -172,7 +172,7 @@ def next_experiment(
 
         return min(watch.of_each(nearest).values())
 
-    offered = (_default_candidates(models, bounds, duration, dt, seed) if candidates is None
+    offered = (profiles_for(models, bounds, duration, dt, seed) if candidates is None
                else candidates)
     return _chosen(watch, "separate", worst, refit, known, past, offered, limits, settings)
 
@@ -205,7 +205,7 @@ def d_optimal(
         every = [*known[model.name], *new[model.name]]
         return mean_precision(joined(every).jacobian) if every else 0.0
 
-    offered = (_default_candidates(watch.models, bounds, duration, dt, seed) if candidates is None
+    offered = (profiles_for(watch.models, bounds, duration, dt, seed) if candidates is None
                else candidates)
     return _chosen(watch, "parameters", precision, precision, known, past, offered, limits,
                    settings)
@@ -220,7 +220,8 @@ def _chosen(
     tried = []
     for candidate in candidates:
         try:
-            profile, responses = _within(watch, candidate, limits or {})
+            profile, responses = _within(watch, candidate, limits or {},
+                                         settings.budget.smaller)
         except errors.SimulationFailed:
             continue  # a profile too rough for one of the hypotheses is no candidate
         new = {name: [r] for name, r in responses.items()}
@@ -255,10 +256,10 @@ def _foretold(model: Model, known: Mapping[str, list[WhitenedResponse]],
     return {name: float(x) for name, x in zip(shared, spread, strict=False)}
 
 
-def _within(watch: Watch, profile: Recording, limits: Mapping[str, float]
+def _within(watch: Watch, profile: Recording, limits: Mapping[str, float], tries: int
             ) -> tuple[Recording, dict[str, WhitenedResponse]]:
     """The profile, made smaller until every model keeps to the limits, and the responses to it."""
-    for _ in range(8):
+    for _ in range(tries):
         try:
             responses = {name: found[0] for name, found in watch.responses([profile]).items()}
         except errors.SimulationFailed:
@@ -270,31 +271,5 @@ def _within(watch: Watch, profile: Recording, limits: Mapping[str, float]
                      for output, limit in limits.items()), default=1.0)
         if share >= 1.0:
             return profile, responses
-        # A little more than proportional, or a softening spring would never get there.
-        profile = scaled(profile, 0.99 * share)
+        profile = scaled(profile, LESS * share)
     raise errors.SimulationFailed(errors.limits_not_kept(profile.name))
-
-
-def _default_candidates(models: Mapping[str, Model], bounds: Bounds | None, duration: float,
-                        dt: float, seed: int) -> list[Recording]:
-    """Profiles for the first input, and others at the same time for further axes of motion."""
-    inputs = {i.name: i for model in models.values() for i in model.inputs if i.default is None}
-    if not inputs:
-        raise errors.BadSetting(errors.nothing_to_drive(", ".join(models)))
-    first, *others = inputs.values()
-    frequency = natural_frequency(next(iter(models.values()))) or 10.0 / duration
-    # A hypothesis that rings faster than the profile can follow is driven at the fastest it can.
-    frequency = min(frequency, 0.05 / dt)
-    made = profiles(frequency, bounds, duration, dt, min(2.0, 0.2 * duration), first.name,
-                    first.unit, seed=seed)
-    channels = []
-    for k, profile in enumerate(made):
-        along = profile
-        for shift, other in enumerate(others, 1):
-            values = made[(k + 2 * shift) % len(made)][first.name].values
-            if other.unit != first.unit:
-                values = np.zeros_like(values)
-            along = along.with_channels(
-                Channel(other.name, profile.t, values, other.unit, hold="zero"))
-        channels.append(along)
-    return channels

@@ -5,16 +5,33 @@ Every profile rests at first, is scaled to the bounds and ends at rest.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.design.response import natural_frequency
+from pikanid.model import Model
 from pikanid.recording import Recording
-from pikanid.recording.channel import Array
+from pikanid.recording.channel import Array, Channel
 from pikanid.recording.excitation.sampling import grid
 
+# Kinds of profile; times in periods of the model, frequencies in its own.
+PART = 1.0 / 3.0  # definition: the smaller size: what is not linear shows by the ratio
+HAIR = 0.9995  # numerical: below the bounds: rounding adds up along the way
+FADE = 0.1  # definition: share of a profile over which it swells, and over which it fades
+SIZES = (1.0, 0.5, 0.2)  # definition: of kicks of three sizes
+RANGE = (3.0, 6.0)  # definition: of the ratio between the ends of a chirp
+LINES = (0.4, 2.6, 0.15)  # definition: first, end and distance of the lines of a multisine
+BESIDE = (0.55, 0.75, 1.3, 1.6)  # definition: frequencies beside resonance
+LENGTH, GAP, PAUSE = (0.2, 1.0), (0.0, 1.0), (0.3, 4.0)  # definition: of pulses, between, and after
+SIZE = (0.3, 1.0)  # definition: of pulses
+BIT = 0.2  # definition: shortest time that a binary sequence stays
+FINEST = 0.1  # limit: of a period, that the sampling interval may be
+RESOLVED = 0.05  # numerical: natural periods a sampling interval, at most, that kicks can follow
+REST = (2.0, 0.2)  # limit: [s], and share of a profile, that the drive rests at first
+PERIODS = 10.0  # limit: in a profile, of the frequency that is taken where a model has none
 DIGITS = 6  # numerical: of a profile's values: a file of decimals is run as it was designed
 
 
@@ -85,22 +102,50 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
     """
     bounds = bounds or Bounds()
     t = grid(duration, dt)
-    if not (0 < frequency * dt < 0.1 and quiet >= 0 and duration - quiet > 2 / frequency):
+    if not (0 < frequency * dt < FINEST and quiet >= 0 and duration - quiet > 2 / frequency):
         raise errors.BadSetting(errors.no_room_for_profile(duration, quiet, frequency, dt))
     first = int(np.ceil(quiet / dt - 1e-9))
     rng = np.random.default_rng(seed)
     made = []
     for draw in range(draws):
         for name, u in _drawn(rng, t, first, frequency, dt):
-            # Rounding adds up along the way: a hair below the bounds.
-            share = 0.9995 * bounds.share(u, dt)
-            for size, word in ((1.0, "full"), (1.0 / 3.0, "a third")):
+            share = HAIR * bounds.share(u, dt)
+            for size, word in ((1.0, "full"), (PART, "a third")):
                 values = _rounded(u * share * size)
                 title = f"{name}, {word if word == 'a third' else 'full size'}"
                 made.append(Recording.from_arrays(
                     t, {channel: values}, {channel: unit}, hold={channel: "zero"},
                     name=title + (f" ({draw + 1})" if draws > 1 else "")))
     return made
+
+
+def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: float,
+                 dt: float, seed: int) -> list[Recording]:
+    """Profiles for the first input, and others at the same time for further axes of motion.
+
+    Raises:
+        BadSetting: If the models have no input, or as for `profiles`.
+    """
+    inputs = {i.name: i for model in models.values() for i in model.inputs if i.default is None}
+    if not inputs:
+        raise errors.BadSetting(errors.nothing_to_drive(", ".join(models)))
+    first, *others = inputs.values()
+    frequency = natural_frequency(next(iter(models.values()))) or PERIODS / duration
+    # A hypothesis that rings faster than the profile can follow is driven at the fastest it can.
+    frequency = min(frequency, RESOLVED / dt)
+    made = profiles(frequency, bounds, duration, dt, min(REST[0], REST[1] * duration), first.name,
+                    first.unit, seed=seed)
+    channels = []
+    for k, profile in enumerate(made):
+        along = profile
+        for shift, other in enumerate(others, 1):
+            values = made[(k + 2 * shift) % len(made)][first.name].values
+            if other.unit != first.unit:
+                values = np.zeros_like(values)
+            along = along.with_channels(
+                Channel(other.name, profile.t, values, other.unit, hold="zero"))
+        channels.append(along)
+    return channels
 
 
 def scaled(profile: Recording, factor: float) -> Recording:
@@ -114,7 +159,7 @@ def _drawn(rng: np.random.Generator, t: Array, first: int, frequency: float,
     """One profile of every kind, of any size."""
     n = len(t) - first
     s = np.linspace(0.0, 1.0, n)
-    window = np.sin(0.5 * np.pi * np.clip(np.minimum(s, 1 - s) / 0.1, 0, 1)) ** 2
+    window = np.sin(0.5 * np.pi * np.clip(np.minimum(s, 1 - s) / FADE, 0, 1)) ** 2
     active = t[first:] - t[first]
     span = active[-1]
 
@@ -122,19 +167,19 @@ def _drawn(rng: np.random.Generator, t: Array, first: int, frequency: float,
         return np.concatenate([np.zeros(first), u])
 
     yield "kicks", laid(_kicks(n, frequency, dt, (1.0,), int(rng.integers(2, 5))))
-    yield "kicks of three sizes", laid(_kicks(n, frequency, dt, (1.0, 0.5, 0.2),
+    yield "kicks of three sizes", laid(_kicks(n, frequency, dt, SIZES,
                                               int(rng.integers(1, 4))))
     yield "pulses", laid(_at_rest(_pulses(rng, n, frequency, dt), dt))
     yield "binary", laid(_at_rest(_binary(rng, n, frequency, dt), dt))
-    ratio = rng.uniform(3.0, 6.0)
+    ratio = rng.uniform(*RANGE)
     low = frequency / np.sqrt(ratio)
     phase = 2 * np.pi * low * span / np.log(ratio) * (ratio**s - 1)
     yield "chirp", laid(_at_rest(np.sin(phase + rng.uniform(0, 2 * np.pi)) * window, dt))
-    lines = frequency * np.arange(0.4, 2.6, 0.15)
+    lines = frequency * np.arange(*LINES)
     phases = rng.uniform(0, 2 * np.pi, len(lines))
     sines = np.cos(2 * np.pi * np.outer(active, lines) + phases).sum(axis=1)
     yield "multisine", laid(_at_rest(sines * window, dt))
-    off = frequency * float(rng.choice([0.55, 0.75, 1.3, 1.6]))
+    off = frequency * float(rng.choice(BESIDE))
     swell = np.sin(np.pi * s) ** 2
     yield "drive beside resonance", laid(_at_rest(np.sin(2 * np.pi * off * active) * swell, dt))
 
@@ -155,19 +200,19 @@ def _pulses(rng: np.random.Generator, n: int, frequency: float, dt: float) -> Ar
     """Pulses of random size, length and distance, each with its counterpart."""
     u, at = np.zeros(n), 0
     while True:
-        length = max(1, round(rng.uniform(0.2, 1.0) / frequency / dt))
-        gap = round(rng.uniform(0.0, 1.0) / frequency / dt)
+        length = max(1, round(rng.uniform(*LENGTH) / frequency / dt))
+        gap = round(rng.uniform(*GAP) / frequency / dt)
         if at + 2 * length + gap >= n:
             return u
-        size = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 1.0))
+        size = float(rng.choice([-1.0, 1.0]) * rng.uniform(*SIZE))
         u[at : at + length] += size
         u[at + length + gap : at + 2 * length + gap] -= size
-        at += 2 * length + gap + round(rng.uniform(0.3, 4.0) / frequency / dt)
+        at += 2 * length + gap + round(rng.uniform(*PAUSE) / frequency / dt)
 
 
 def _binary(rng: np.random.Generator, n: int, frequency: float, dt: float) -> Array:
     """A random sequence of full acceleration either way."""
-    step = max(1, round(0.2 / frequency / dt))
+    step = max(1, round(BIT / frequency / dt))
     signs = rng.choice([-1.0, 1.0], n // step + 1)
     return np.repeat(signs, step)[:n]
 

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.data.whitened import TOO_ROUGH
 from pikanid.mismatch.fitting.parallel import side_by_side
 from pikanid.model import Model
 from pikanid.problem.problem import Problem, Samples
@@ -21,6 +22,7 @@ from pikanid.simulation.translated import Translated
 Sigma = float | Mapping[str, float] | None
 Result = TypeVar("Result")
 SHARE = 0.01  # numerical: of σ that an integration error may reach
+SLOW = 1e-6  # numerical: of the fastest rate, below which rounding makes an oscillation
 COARSE = 16.0  # numerical: sub-steps of a sample beyond which a motion is too wild to plan with
 
 
@@ -112,7 +114,7 @@ class Watched:
     def _chosen_steps(self, p: Array) -> Steps:
         finest = float(np.median(np.diff(self.samples[0].t))) / COARSE
         steps = self.simulator.choose_steps(p, SHARE, "explicit", finest=finest, scale=self.spread)
-        if steps.error > 20 * SHARE:
+        if steps.error > TOO_ROUGH * SHARE:
             raise errors.SimulationFailed(errors.too_rough_to_plan(self.model.name, self.name))
         return steps
 
@@ -198,7 +200,7 @@ def natural_frequency(model: Model) -> float | None:
     if not np.all(np.isfinite(jacobian)):
         return None
     rates = np.abs(np.linalg.eigvals(jacobian).imag)
-    ringing = rates[rates > 1e-6 * max(float(rates.max(initial=0.0)), 1e-12)]
+    ringing = rates[rates > SLOW * max(float(rates.max(initial=0.0)), 1e-12)]
     return float(ringing.min()) / (2 * np.pi) if len(ringing) else None
 
 

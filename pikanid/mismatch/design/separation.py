@@ -20,6 +20,8 @@ from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 
+FAR = 1e6  # numerical: [σ] of every sample where a rival cannot be simulated
+
 
 def distance(true: Sequence[WhitenedResponse], rival: Sequence[WhitenedResponse]) -> float:
     """D [σ] of a rival from the truth over the same excitations; 0 without any."""
@@ -60,7 +62,7 @@ def refitted_within(true: Sequence[WhitenedResponse], watched: Sequence[Watched]
                 kept[v.tobytes()] = (np.concatenate([s.y for s in responses]) - target,
                                      np.vstack([s.jacobian[:, shared] for s in responses]))
             except errors.SimulationFailed:
-                kept[v.tobytes()] = (np.full(len(target), 1e6), np.zeros((len(target), len(v))))
+                kept[v.tobytes()] = (np.full(len(target), FAR), np.zeros((len(target), len(v))))
         return kept[v.tobytes()]
 
     low, high = watched[0].problem.lower[shared], watched[0].problem.upper[shared]

@@ -10,7 +10,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
-from pikanid.mismatch.design.response import Sigma
+from pikanid.mismatch.design.response import SHARE, Sigma
 from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.fitting.descent import start_from
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
@@ -21,6 +21,8 @@ from pikanid.noise.level import NoiseModel
 from pikanid.recording import Channel, Recording
 from pikanid.simulation.synthetic import with_outputs
 
+LEAST = 1e-3  # numerical: of a distance: less is not told from none
+STRIDE = 0.7  # numerical: of ln amplitude: a factor of two
 CLOSE = 0.1  # numerical: relative error of a distance that is good enough
 
 
@@ -67,7 +69,7 @@ def recorded(model: Model, excitation: Recording, sigma: Sigma, settings: Settin
             float(np.median(known)), 0.0, 0.0, full[o.name].interval, "given")
     whitened = Whitened(model, Records((full,), (levels,), settings))
     theta = whitened.problem.guess
-    if not whitened.choose_steps(theta, 0.01):
+    if not whitened.choose_steps(theta, SHARE):
         raise errors.SimulationFailed(errors.too_rough_to_plan(model.name, excitation.name))
     response = whitened.responses(theta)[0]
     if not response.finished:
@@ -129,7 +131,7 @@ def sized(candidate: Candidate, screen: Screen, own: np.ndarray, wanted: float, 
             best = _refitted(name, own_values, null, slope < 0, records, base)
             if best is None or not name or abs(best.distance / wanted - 1) < 2 * CLOSE:
                 break
-            absorbed = max(best.distance / first_order, 1e-3)
+            absorbed = max(best.distance / first_order, LEAST)
             tried = [(amplitude, best.distance)]
         amplitude = _next(tried, wanted, slope)
     if best is None and tried:
@@ -165,8 +167,8 @@ def _next(tried: Sequence[tuple[float, float]], wanted: float, slope: float) -> 
         near = (max(below), min(above)) if slope > 0 else (min(below), max(above))
         return float(np.sqrt(near[0] * near[1]))
     amplitude, distance = tried[-1]
-    step = np.log(wanted / max(distance, 1e-3 * wanted)) / slope
-    return float(amplitude * np.exp(np.clip(step, -0.7, 0.7)))
+    step = np.log(wanted / max(distance, LEAST * wanted)) / slope
+    return float(amplitude * np.exp(np.clip(step, -STRIDE, STRIDE)))
 
 
 def _shown(candidate: Candidate, values: Mapping[str, float], base: Hypothesis,

@@ -55,13 +55,14 @@ def lines(whitened: Whitened, rate: float, more: int,
     """Bands of frequency and the inputs' past, for all rows (and `more` rows of zeros), each made
     `short` at once.
     """
+    asks = whitened.settings.detection
     blocks: list[list[np.ndarray]] = []
     pasts: list[np.ndarray] = []
     for experiment in whitened.problem.experiments:
         held = [(h.time, h.values) for h in experiment.held if len(h.time) > 1]
         for s in experiment.samples:
-            blocks.append(frequency_bands(s.t, rate))
-            pasts.append(past_inputs(s.t, held, rate))
+            blocks.append(frequency_bands(s.t, rate, asks))
+            pasts.append(past_inputs(s.t, held, rate, asks))
     count = min(len(b) for b in blocks)
     bands = [short(_stacked([b[k] for b in blocks], more)) for k in range(count)]
     return bands, short(_stacked(pasts, more))

@@ -17,10 +17,17 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtrc, roots_hermitenorm
 
+from pikanid.mismatch.settings.detection import DetectionSettings
 from pikanid.mismatch.settings.settings import Settings
 
 BATCH = 500  # numerical: draws at once, between which it is asked whether more would matter
 CLEAR = (1e-6, 0.1)  # numerical: p-values beyond which more draws would decide nothing
+COUNTED = 10  # numerical: draws above a value from which on their share is its p-value
+TAIL = 0.01  # numerical: share of the draws beyond which a tail is continued, not counted
+SPANNED = 1e-4  # numerical: of a sign's length, that rounding leaves of what parameters take up
+REPEATED = 1e-3  # numerical: of the largest singular value: what is below repeats other columns
+ROOT = 1e-7  # numerical: single precision, in which draws are made
+BELOW_NYQUIST = 0.9  # numerical: share of half the sampling rate up to which a sine is resolved
 NODES, WEIGHTS = roots_hermitenorm(21)  # numerical: means over a normal error of ln power
 WEIGHTS = WEIGHTS / WEIGHTS.sum()
 
@@ -53,7 +60,7 @@ def unit_columns(D: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         before = np.linalg.norm(D, axis=0)
         rest = project(J, D)
         length = np.linalg.norm(rest, axis=0)
-    good = np.isfinite(length) & (length > 1e-4 * before) & (before > 0)
+    good = np.isfinite(length) & (length > SPANNED * before) & (before > 0)
     scaled = np.where(good, rest / np.where(good, length, 1.0), 0.0)
     return scaled, np.where(good, length, 0.0)
 
@@ -113,7 +120,7 @@ def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarra
 
 
 def _root(C: np.ndarray) -> np.ndarray:
-    """R (k, n) with RᵀR = C (n, n), up to 1e-7 of its largest element.
+    """R (k, n) with RᵀR = C (n, n), up to `ROOT` of its largest element.
 
     Signs and bands overlap: half of the rows are enough.
 
@@ -123,7 +130,7 @@ def _root(C: np.ndarray) -> np.ndarray:
     from scipy.linalg.lapack import dpstrf
 
     largest = float(np.diag(C).max(initial=0.0))
-    factor, order, rank, _ = dpstrf(C, tol=1e-7 * max(largest, 1e-12))
+    factor, order, rank, _ = dpstrf(C, tol=ROOT * max(largest, 1e-12))
     rows = np.triu(factor)[:rank]
     return np.asarray(rows[:, np.argsort(order - 1)])
 
@@ -134,10 +141,10 @@ def _tail(observed: float, drawn: np.ndarray, chance: Callable[[float], float]) 
     """
     drawn = np.sort(drawn)
     above = len(drawn) - int(np.searchsorted(drawn, observed))
-    if above >= 10:
+    if above >= COUNTED:
         return (above + 1) / (len(drawn) + 1)
-    edge = drawn[int(0.99 * len(drawn))]
-    return float(max(0.01 * min(chance(observed) / max(chance(edge), 1e-300), 1.0), 1e-300))
+    edge = drawn[int((1 - TAIL) * len(drawn))]
+    return float(max(TAIL * min(chance(observed) / max(chance(edge), 1e-300), 1.0), 1e-300))
 
 
 def _chance(value: float, freedom: int, spread: float) -> float:
@@ -160,16 +167,20 @@ def _standard(power: np.ndarray, freedom: np.ndarray | int) -> np.ndarray:
     return np.asarray(((power / freedom) ** (1 / 3) - (1 - spread)) / np.sqrt(spread))
 
 
-def frequency_bands(t: np.ndarray, rate: float, count: int = 9) -> list[np.ndarray]:
-    """Sines and cosines (N, k) of about unit length at times t, in bands up to six natural rates.
+def frequency_bands(t: np.ndarray, rate: float, settings: DetectionSettings) -> list[np.ndarray]:
+    """Sines and cosines (N, k) of about unit length at times t, in bands of frequency.
 
-    Bands widen with frequency, so that a line and a broad hump are both seen.
+    Args:
+        t: (N,) [s].
+        rate: Natural frequency [rad/s]; 0 where nothing oscillates.
+        settings: Number and reach of the bands.
     """
     span = float(t[-1] - t[0])
     step = float(np.median(np.diff(t)))
-    top = min(6 * rate if rate else np.inf, 0.9 * np.pi / step, 2 * np.pi * 150 / span)
+    top = min(settings.reach * rate if rate else np.inf, BELOW_NYQUIST * np.pi / step,
+              2 * np.pi * settings.lines / span)
     lines = np.arange(1, max(int(top * span / (2 * np.pi)), 3) + 1)
-    edges = np.unique(np.round(np.geomspace(1, len(lines) + 1, count + 1)).astype(int))
+    edges = np.unique(np.round(np.geomspace(1, len(lines) + 1, settings.bands + 1)).astype(int))
     bands = []
     for a, b in pairwise(edges):
         phase = 2 * np.pi / span * np.outer(t - t[0], lines[a - 1:b - 1])
@@ -178,13 +189,20 @@ def frequency_bands(t: np.ndarray, rate: float, count: int = 9) -> list[np.ndarr
 
 
 def past_inputs(t: np.ndarray, inputs: list[tuple[np.ndarray, np.ndarray]], rate: float,
-                lags: int = 12) -> np.ndarray:
-    """Orthonormal columns (N, k): each input (times, values) at lags up to a natural period."""
-    period = 2 * np.pi / rate if rate else (t[-1] - t[0]) / 20
+                settings: DetectionSettings) -> np.ndarray:
+    """Orthonormal columns (N, k): each input (times, values) at lags up to a natural period.
+
+    Args:
+        t: (N,) [s].
+        inputs: Their times and values.
+        rate: Natural frequency [rad/s]; 0 where nothing oscillates.
+        settings: Number and reach of the lags.
+    """
+    period = 2 * np.pi / rate if rate else (t[-1] - t[0]) / settings.spans
     columns = [np.interp(t - lag, time, values, left=values[0])
-               for time, values in inputs for lag in np.linspace(0, period, lags)]
+               for time, values in inputs for lag in np.linspace(0, period, settings.lags)]
     if not columns:
         return np.empty((len(t), 0))
     stacked = np.stack(columns, axis=1)
     u, s, _ = np.linalg.svd(stacked - stacked.mean(axis=0), full_matrices=False)
-    return np.asarray(u[:, s > 1e-3 * max(float(s[0]), 1e-300)])
+    return np.asarray(u[:, s > REPEATED * max(float(s[0]), 1e-300)])

@@ -22,6 +22,7 @@ from pikanid.recording import Recording
 from pikanid.simulation.input_paths import combined
 from pikanid.simulation.vectorfield import VectorField
 
+SMALL, MOVED = 1e-3, 1e-4  # numerical: least size of an input, and share moved for a difference
 TOGETHER = 100  # numerical: signs integrated at once
 CELLS = 400_000  # numerical: signs times steps at once, to keep memory small
 STABLE = 1.5  # numerical: rate times step that the Runge-Kutta method follows well enough
@@ -115,7 +116,7 @@ class Tangent:
         """∂f/∂u (L, n, m) by differences: exact where f is linear in u."""
         columns = []
         for j in range(u.shape[1]):
-            size = max(float(np.abs(u[:, j]).max(initial=0.0)), 1e-3) * 1e-4
+            size = max(float(np.abs(u[:, j]).max(initial=0.0)), SMALL) * MOVED
             up, down = u.copy(), u.copy()
             up[:, j] += size
             down[:, j] -= size

@@ -29,7 +29,8 @@ def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
                             response.y[row:row + len(s.t)].copy(), np.full(len(s.t), sigma)))
             row += len(s.t)
     adequacy = judge([f.residual for f in fits], [f.sigma for f in fits],
-                     [f.measured for f in fits], len(h.minimum.theta))
+                     [f.measured for f in fits], len(h.minimum.theta),
+                     whitened.settings.adequacy)
     return Estimate(
         model=problem.model, strategy="nls", free=problem.free, theta=h.minimum.theta,
         covariance=h.covariance, fits=tuple(fits), trajectories=tuple(trajectories),

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pikanid.mismatch.data.whitened import Whitened, allowance
+from pikanid.mismatch.data.whitened import TOO_ROUGH, Whitened, allowance
 
 Answer = TypeVar("Answer")
 
@@ -55,8 +55,9 @@ class Closest:
 
         def decided(chi2: float) -> object:
             loose = allowance(misfit(chi2))
-            return misfit(chi2) < gross, [
-                (error <= share * loose, error > 20 * (share * loose)) for error, share in weighed]
+            return misfit(chi2) < gross, [(error <= share * loose,
+                                           error > TOO_ROUGH * (share * loose))
+                                          for error, share in weighed]
 
         self.ask(decided)
         return good

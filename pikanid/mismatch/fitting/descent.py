@@ -17,6 +17,7 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.optimise.levenberg_marquardt import Minimum, minimise
 
 TOLERATED = 2.0  # numerical: times the error that steps are chosen for, before they are chosen anew
+BACK = (1.0, 0.25, 0.06, 0.01)  # numerical: shares of a first step, tried until χ² falls
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,8 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
               closest: Closest, limit: int, beyond: Callable[[float], bool]) -> Minimum | None:
     """The lowest of the minima that the starts lead to."""
     problem, rows = whitened.problem, max(whitened.rows, 1)
-    gross, budget = whitened.settings.fits.gross, whitened.settings.budget
+    fits, budget = whitened.settings.fits, whitened.settings.budget
+    gross, closer = fits.gross, fits.closer
     give_up = impatient(beyond, whitened.settings)
     misfit = partial(per_row, rows=rows)
     best: Minimum | None = None
@@ -67,7 +69,7 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
     if best is None:
         return None
     coarse = best.chi2
-    finer = closest.ask(lambda chi2: misfit(chi2) > gross and coarse < 0.25 * chi2)
+    finer = closest.ask(lambda chi2: misfit(chi2) > gross and coarse < closer * chi2)
     if finer or (not best.converged and not beyond(coarse)):
         if not closest.choose_steps(whitened, best.theta,
                                     lambda chi2: min(coarse / rows, misfit(chi2))):
@@ -169,7 +171,7 @@ def _begun(whitened: Whitened, start: Start | Mapping[str, float],
                 return None
         return goal if closest.choose_steps(whitened, goal, misfit) else None
     best, least = None, np.inf
-    for share in (1.0, 0.25, 0.06, 0.01):
+    for share in BACK:
         theta = home + share * (goal - home)
         if not closest.choose_steps(whitened, theta, misfit):
             continue

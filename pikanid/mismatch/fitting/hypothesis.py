@@ -24,6 +24,8 @@ from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
 from pikanid.optimise.levenberg_marquardt import Minimum
 
+NEAR = 1e-6  # numerical: of a parameter, by which an estimate at its bound may be off it
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -76,7 +78,7 @@ class Hypothesis:
     def pinned(self) -> bool:
         """Whether an estimate lies at a bound."""
         problem, theta = self.whitened.problem, self.minimum.theta
-        near = 1e-6 * np.maximum(np.abs(theta), 1e-12)
+        near = NEAR * np.maximum(np.abs(theta), 1e-12)
         return bool(np.any((theta - problem.lower < near) | (problem.upper - theta < near)))
 
     @property

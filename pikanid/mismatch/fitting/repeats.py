@@ -25,6 +25,7 @@ from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 
+KNOWN = 1e-4  # numerical: least relative standard error of a power: below, it counts as given
 SHARED = 0.01  # numerical: of the largest singular value: less of a direction no fit takes up
 
 
@@ -246,7 +247,7 @@ class Spectra:
 
         shape = 1 - 2 * level.rho * np.cos(self.omega) + level.rho**2
         sizes, _, power = self._by_block(shape / (level.sigma**2 * (1 - level.rho**2)))
-        known = 2 / max(level.spread, 1e-4) ** 2
+        known = 2 / max(level.spread, KNOWN) ** 2
         each = np.asarray(f.sf(power / sizes, self.freedom * sizes, known))
         return min(1.0, len(each) * float(np.min(each)))
 

@@ -15,6 +15,8 @@ from pikanid.mismatch.fitting.descent import Start, start_from
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 
 MOSTLY = 0.8  # numerical: of a parameter, in whose place a fit with an effect begins
+ALIKE = 1e-4  # numerical: 1 - cos² of two signs below which they are one
+SPANNED = 1e-8  # numerical: of the largest singular value, below which columns repeat each other
 NOWHERE: Mapping[str, float] = {}
 
 
@@ -115,7 +117,7 @@ class Screen:
         self.names = [f.label for f in about.whitened.problem.free]
         norms = np.maximum(np.linalg.norm(about.minimum.J, axis=0), 1e-300)
         # what the parameters take up of each sign, as far as they are told apart
-        scaled = np.linalg.lstsq(about.minimum.J / norms, self.found.D, 1e-8)[0]
+        scaled = np.linalg.lstsq(about.minimum.J / norms, self.found.D, SPANNED)[0]
         self.taken = scaled / norms[:, None]
 
     def best(self, candidate: int, count: int = 1) -> list[int]:
@@ -224,7 +226,7 @@ class Screen:
             first = (z[:, None] - C * z[None, :]) / rest
             gain = first * z[:, None] + first.T * z[None, :]
         sided = self.found.one_sided[good]
-        bad = (rest < 1e-4) | (owner[:, None] == owner[None, :]) | (
+        bad = (rest < ALIKE) | (owner[:, None] == owner[None, :]) | (
             sided[:, None] & (first <= 0)) | (sided[None, :] & (first.T <= 0))
         gain = np.triu(np.where(bad, 0.0, gain), 1)
         listed: list[tuple[tuple[Candidate, Candidate], list[Start]]] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from pikanid.settings import ASCENDING, Amount, Count
+from pikanid.settings import ASCENDING, Amount, Count, Share
 
 
 @dataclass(frozen=True)
@@ -16,6 +16,7 @@ class Budget:
         samples: Of all outputs, put together where they may be, that are diagnosed: a minute's.
         put_together: Samples of a recording below which none are put together.
         samples_a_period: That are kept where they are, of the fastest motion.
+        fastest: Share of an output's power below the frequency of its fastest motion.
         rows_searched: That a search is made on before its best hypotheses get all.
         rows_tested: Of a residual that is tested as it is.
         modes: Of the residuals of repeats that are told apart.
@@ -58,6 +59,7 @@ class Budget:
         windows: Of time in which a residual is called loud or not.
         planned_refits: Rivals whose simulations are refitted; the others keep the first order.
         planned_sizes: Simulations of one effect on the way to the wanted visibility.
+        smaller: Times that a profile is made smaller until every hypothesis keeps to its limits.
         finalists: Profiles that are judged again after refitting simulations.
         compared: Hypotheses in a set, the most probable, that an experiment is planned for.
         profile: Length of a profile that is proposed [s].
@@ -69,6 +71,7 @@ class Budget:
     samples: Count = 25_000
     put_together: Count = 4000
     samples_a_period: Count = 30
+    fastest: Share = 0.999
     rows_searched: Count = 6000
     rows_tested: Count = 6000
     modes: Count = 800
@@ -111,6 +114,7 @@ class Budget:
     windows: Count = 40
     planned_refits: Count = 4
     planned_sizes: Count = 7
+    smaller: Count = 8
     finalists: Count = 5
     compared: Count = 2
     profile: Amount = 20.0

@@ -24,6 +24,7 @@ class FitSettings:
         glance: [χ² per row] that is good enough to see whether a start is worth more.
         wild: Times the closest χ², and that of the noise: starts above both are given up.
         far: Times the closest χ², and that of the noise: fits above both together are given up.
+        closer: Share of the closest χ² below which a gross fit is worth finer steps all the same.
         slow: Share of χ² left by one iteration from which on a fit far away is given up.
         other_order: [χ²] that another way to put the same effects together has to matter.
         lower_hill: [χ²] by which a minimum beyond a hill has to be lower.
@@ -38,6 +39,7 @@ class FitSettings:
     glance: Amount = 1e4
     wild: Factor = 1000.0
     far: Factor = 2.0
+    closer: Share = 0.25
     slow: Share = 0.7
     other_order: Amount = 1.0
     lower_hill: Amount = 1.0

@@ -12,12 +12,16 @@ from typing import Any
 from pikanid import errors
 from pikanid.mismatch.settings import thresholds
 from pikanid.mismatch.settings.budget import Budget
+from pikanid.mismatch.settings.detection import DetectionSettings
 from pikanid.mismatch.settings.fits import FitSettings, SearchSettings
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.verdict import BeyondSettings, PartSettings, VerdictSettings
 from pikanid.noise.settings import QuietSettings, RoundingSettings
+from pikanid.objective.settings import AdequacySettings
 from pikanid.settings import Amount, Count, Rate, Share, changed, check, items, told
 from pikanid.storage.limits import MOST_MODEL, file_bytes
+from pikanid.symbolic.settings import FormulaSettings
+from pikanid.uncertainty.settings import UncertaintySettings
 
 
 @dataclass(frozen=True)
@@ -52,12 +56,16 @@ class Settings:
             number of rows (J. Chen and Z. Chen, Biometrika 95, 2008).
         quiet: When a stretch of a recording shows noise only.
         rounding: When a signal counts as rounded to the steps of its sensor.
+        adequacy: When the nominal fit, and the extended one, explain a recording.
+        uncertainty: When a parameter counts as not determined.
         noise: What counts as noise, as an outlier, as a repeat.
+        detection: What a residual is tested for.
         fits: When a fit is a misfit.
         search: What one more effect must promise.
         verdict: What counts as evidence, and what as a proof.
         part: What is sure although something is left.
         beyond: What is said of a missing force that has no name.
+        formulas: How formulas are read of its shape.
         budget: How much is computed.
 
     Raises:
@@ -85,12 +93,16 @@ class Settings:
     choice_weight: Amount = 1.0
     quiet: QuietSettings = field(default_factory=QuietSettings)
     rounding: RoundingSettings = field(default_factory=RoundingSettings)
+    adequacy: AdequacySettings = field(default_factory=AdequacySettings)
+    uncertainty: UncertaintySettings = field(default_factory=UncertaintySettings)
     noise: NoiseSettings = field(default_factory=NoiseSettings)
+    detection: DetectionSettings = field(default_factory=DetectionSettings)
     fits: FitSettings = field(default_factory=FitSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
     part: PartSettings = field(default_factory=PartSettings)
     beyond: BeyondSettings = field(default_factory=BeyondSettings)
+    formulas: FormulaSettings = field(default_factory=FormulaSettings)
     budget: Budget = field(default_factory=Budget)
 
     def __post_init__(self) -> None:
@@ -154,7 +166,9 @@ class Settings:
             place = groups.setdefault(group, {}) if dot else whole
             place[inner] = tuple(value) if isinstance(value, list) else value
         for group, own in groups.items():
-            whole[group] = replace(getattr(self, group), **own)
+            kept = getattr(self, group)
+            check(kept, f"{group}.", own)  # in the words of the whole
+            whole[group] = replace(kept, **own)
         return replace(self, **whole)
 
     def changed(self) -> dict[str, Any]:

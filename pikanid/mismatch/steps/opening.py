@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from pikanid.mismatch.case import Case, note_outliers
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
@@ -65,9 +66,10 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     records = prepared(model, train, quiet, notes, settings, together)
     check_freedom(model, records)
     short = records.beginning(settings.budget.rows_searched)
-    before = NLS().fit(model, with_sigma(short, model))
+    nls = NLS(adequacy=settings.adequacy, uncertainty=settings.uncertainty)
+    before = nls.fit(model, with_sigma(short, model))
     if short is not records:
-        before = NLS(starts=1).fit(before.fitted_model, with_sigma(records, model))
+        before = replace(nls, starts=1).fit(before.fitted_model, with_sigma(records, model))
     nominal = before.fitted_model
     rate = sites(nominal, records.recordings)[0].rate
     records, count = with_refined_noise(records, before, rate, quiet)

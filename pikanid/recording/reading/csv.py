@@ -64,8 +64,7 @@ def read(content: bytes, where: str, options: Options) -> Table:
     rows, numbers = _squared(rows, numbers, where)
     if not rows:
         raise errors.BadRecording(errors.no_rows(where))
-    # rows of text are rows of objects, which lists are too strict to say
-    return from_rows(where, rows, numbers, decimal or _decimal(rows, delimiter))  # type: ignore[arg-type]
+    return from_rows(where, rows, numbers, decimal or _decimal(rows, delimiter))
 
 
 def _plain(lines: list[str], numbers: list[int], delimiter: str, decimal: str | None,

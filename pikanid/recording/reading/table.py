@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -78,7 +79,7 @@ class Table:
 
 
 def from_rows(
-    where: str, rows: list[list[object]], numbers: list[int], decimal: str = "."
+    where: str, rows: Sequence[Sequence[object]], numbers: list[int], decimal: str = "."
 ) -> Table:
     """A table from rows of cells, the first of which is the header unless it is all numbers.
 
@@ -137,15 +138,15 @@ def from_cells(
     return Column(header, values, defect, text=words > np.isfinite(values).sum())
 
 
-def _quick(cells: Sequence[object], decimal: str) -> Array | None:
+def _quick(cells: Sequence[Any], decimal: str) -> Array | None:
     """All cells at once, where all of them are plainly numbers or empty text."""
     try:
         if decimal == ",":
-            if any("." in cell for cell in cells):  # type: ignore[operator]  # caught below
+            if any("." in cell for cell in cells):
                 return None
-            cells = [cell.replace(",", ".") for cell in cells]  # type: ignore[attr-defined]  # likewise
+            cells = [cell.replace(",", ".") for cell in cells]
         # what is no text ends in the except clause
-        values = np.array([float(cell) if cell != "" else np.nan for cell in cells])  # type: ignore[arg-type]
+        values = np.array([float(cell) if cell != "" else np.nan for cell in cells])
     except (ValueError, TypeError, AttributeError, OverflowError):
         return None
     # float() takes "1_000", which no instrument writes.
