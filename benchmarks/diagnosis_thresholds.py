@@ -57,7 +57,7 @@ LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "says where, how large or what next once the verdict stands": (
         "band", "beyond.own", "beyond.line", "beyond.inside", "beyond.knots_a_period",
         "beyond.resolved", "beyond.rows_a_knot", "beyond.louder", "beyond.unexplained",
-        "verdict.sensitive", "uncertainty.far", "uncertainty.far_from_zero",
+        "beyond.idle", "verdict.sensitive", "uncertainty.far", "uncertainty.far_from_zero",
         "uncertainty.condition", "budget.force_passes", "budget.force_knots", "budget.slow_knots",
         "budget.windows", "beyond.least_window"),
     "plans experiments, diagnoses none": (

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import cast
 
 import pytest
 
 import pikanid as pk
 from pikanid.estimate import Estimate
+from pikanid.mismatch.beyond.region import Interval
 from pikanid.mismatch.judge.verdict import Answer, Verdict
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import _behind
@@ -16,6 +18,7 @@ from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.mismatch.steps.reporting import reported
 from pikanid.model.systems import sloshing
+from pikanid.reporting.diagnosis_page import _where
 
 
 def explanation(name: str, expression: str, relative_weight: float = 0.5) -> Explanation:
@@ -25,8 +28,22 @@ def explanation(name: str, expression: str, relative_weight: float = 0.5) -> Exp
 
 def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:
     nothing = cast(Estimate, None)
-    return Diagnosis(verdict, 1e-9, DEFAULTS, Where("dynamics", "v", (), (), None), given, (),
+    return Diagnosis(verdict, 1e-9, DEFAULTS, Where(("dynamics",), "v", (), (), None), given, (),
                      nothing, nothing, None)
+
+
+def test_where_is_said_in_words_and_as_data() -> None:
+    said = replace(diagnosis("named", explanation("impact on a wall", "-k*max(q - w, 0)")), where=(
+        Where(("dynamics",), "v", ("q",), ((1.0, 2.5),), True, (Interval("q", 0.1, 0.3, "rad"),))))
+    assert "Where: dynamics; at q from 0.1 to 0.3 rad; in time at 1 to 2.5 s" in str(said)
+    assert _where(said).startswith(
+        "<h2>Where</h2><p>Channel: the dynamics; depends on q. It acts at q from 0.1 to 0.3 rad.")
+    several = replace(said, where=replace(said.where, channels=("dynamics", "sensor"), region=()))
+    assert "Where: dynamics and sensor; in time" in str(several)
+    assert "the dynamics and the sensor" in _where(several) and "acts at" not in _where(several)
+    none = replace(said, where=replace(said.where, channels=()))
+    assert [d.where.channel for d in (said, several, none)] == ["dynamics", "several", "undecided"]
+    assert "channel undecided" in str(none) and "undecided between" in _where(none)
 
 
 @pytest.mark.parametrize("verdict", ["set", "unconfirmed"])

@@ -53,10 +53,11 @@ def page(dx: Diagnosis, title: str) -> str:
 
 def _where(dx: Diagnosis) -> str:
     spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time) or "spread over the recording"
-    channel = {"dynamics": "the dynamics", "input": "the input", "sensor": "the sensor"}.get(
-        dx.where.channel, "undecided between input, sensor and dynamics")
+    channel = " and ".join(f"the {c}" for c in dx.where.channels) or (
+        "undecided between input, sensor and dynamics")
+    region = f" It acts at {', '.join(map(str, dx.where.region))}." if dx.where.region else ""
     depends = f"; depends on {', '.join(dx.where.depends_on)}" if dx.where.depends_on else ""
-    return (f"<h2>Where</h2><p>Channel: {escape(channel)}{escape(depends)}. "
+    return (f"<h2>Where</h2><p>Channel: {escape(channel)}{escape(depends)}.{escape(region)} "
             f"In time: {escape(spans)}.{_force(dx) if dx.where.time else ''}</p>")
 
 

@@ -30,7 +30,7 @@ class Diagnosis(DiagnosisData):
             catalogue nor a confirmed formula explains).
         p_value: Of a mismatch as large as seen, if there is none.
         settings: What was taken as given: error rates, thresholds, budgets.
-        where: In which channel, equation, states and seconds.
+        where: In which channels, equation, states, seconds and part of the state.
         hypotheses: Explanations given, most probable first.
         rejected: The closest ones that lost, and why.
         before, after: Estimates of the nominal and of the extended model.
@@ -59,10 +59,13 @@ class Diagnosis(DiagnosisData):
             "mismatch": self.mismatch,
             "p_value": self.p_value,
             "alpha": self.alpha,
-            "where": {"channel": self.where.channel, "equation": self.where.equation,
+            "where": {"channel": self.where.channel, "channels": list(self.where.channels),
+                      "equation": self.where.equation,
                       "depends_on": list(self.where.depends_on),
                       "time": [list(span) for span in self.where.time],
-                      "static_law": self.where.static_law},
+                      "static_law": self.where.static_law,
+                      "region": [{"state": r.state, "from": r.low, "to": r.high, "unit": r.unit}
+                                 for r in self.where.region]},
             "hypotheses": [{
                 "effects": [{"ids": list(e.ids), "name": e.name, "expression": e.expression,
                              "parameters": {n: _entry(v) for n, v in e.parameters.items()}}

@@ -12,6 +12,8 @@ from pikanid.estimate import Estimate
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.patch import Patch
+from pikanid.mismatch.beyond.region import Interval
+from pikanid.mismatch.catalogue.candidate import Channel
 from pikanid.mismatch.judge.verdict import Verdict
 from pikanid.mismatch.report.part import Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
@@ -52,13 +54,31 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Where:
-    """Channel, equation, states, seconds, and whether a static law of the states can do it."""
+    """Where something is missing.
 
-    channel: Literal["dynamics", "input", "sensor", "undecided"]
+    Attributes:
+        channels: In which something surely acts; none where that is not decided.
+        equation: Whose right-hand side is incomplete.
+        depends_on: States, and of a force without a name also inputs.
+        time: Seconds of the first recording.
+        static_law: Whether a static law of the states can do it; None where that is not known.
+        region: Part of a state or an input in which it acts; empty where it acts always, or no
+            region can be told.
+    """
+
+    channels: tuple[Channel, ...]
     equation: str
     depends_on: tuple[str, ...]
     time: tuple[tuple[float, float], ...]
     static_law: bool | None
+    region: tuple[Interval, ...] = ()
+
+    @property
+    def channel(self) -> Literal["dynamics", "input", "sensor", "several", "undecided"]:
+        """The one channel, "several", or "undecided"."""
+        if len(self.channels) == 1:
+            return self.channels[0]
+        return "several" if self.channels else "undecided"
 
 
 @dataclass(frozen=True)

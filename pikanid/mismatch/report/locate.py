@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
-from typing import Literal
+from typing import get_args
 
 import numpy as np
 
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
+from pikanid.mismatch.beyond.region import Course, course, regions_of_laws
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import unit_columns
@@ -19,6 +21,9 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Where
 from pikanid.mismatch.report.part import Value
+from pikanid.mismatch.settings.settings import Settings
+
+SURE = ("named", "set", "partial")
 
 
 def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site],
@@ -38,20 +43,18 @@ def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site
 
 
 def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
-           shape: ForceShape | None, force: ForceOverTime | None) -> Where:
+           shape: ForceShape | None, force: ForceOverTime | None,
+           candidates: Sequence[Candidate] = ()) -> Where:
     """The place of a mismatch, as far as the answer and the nominal residual tell.
 
-    In time it is where the force that would explain it is not zero, or, without a force that the
+    Where all laws of a sure answer act in a part of the recording only, that is its place in time.
+    Otherwise it is where the force that would explain it is not zero, or, without a force that the
     recording resolves, where the residual is louder than noise.
 
     Without an answer the shape of the missing force says what it depends on, and whether a static
     law can be all that is missing.
     """
-    channels: set[Channel] = {e.channel for h in answer.given for e in h.effects}
-    ambiguous = any(len(ids) > 1 for table in answer.twins.values() for ids in table.values())
-    channel: Channel | Literal["undecided"] = "undecided"
-    if len(channels) == 1 and not ambiguous:
-        channel = next(iter(channels))
+    settings = base.whitened.settings
     # what the new terms are made of
     states = tuple(n for n in site.model.state_names
                    if any(re.search(rf"\b{n}\b", e.expression) for e in best.effects)
@@ -60,13 +63,88 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
     if answer.given:
         static = all(e.static for e in best.effects)
     elif shape is not None:
-        states, static = shape.depends_on(base.whitened.settings), shape.static_law
-    spans: tuple[tuple[float, float], ...] = ()
+        states, static = shape.depends_on(settings), shape.static_law
+    courses = [course(best, base.model, e) for e in _sure(answer)]
+    region = regions_of_laws(courses, site, settings)
+    channels = _channels(answer, site, candidates) or _channel_of_shape(
+        answer, site, shape, settings)
+    return Where(channels, site.v, states, _seconds(base, answer, courses, force), static, region)
+
+
+def _sure(answer: Answer) -> tuple[Candidate, ...]:
+    """Effects whose law is sure: all that are given, or what is there beside a remainder."""
+    if answer.part is not None:
+        return tuple(p.effect for p in answer.part.present if p.names)
+    return answer.given[0].effects if answer.verdict in ("named", "set") else ()
+
+
+def _seconds(base: Hypothesis, answer: Answer, courses: Sequence[Course | None],
+             force: ForceOverTime | None) -> tuple[tuple[float, float], ...]:
+    local = [one for one in courses if one is not None and not one.acts.all() and one.acts.any()]
+    if answer.verdict in ("named", "set") and len(local) == len(courses) > 0:
+        whole = replace(local[0], acts=np.any([one.acts for one in local], axis=0))
+        if whole.acts.mean() <= 1 - base.whitened.settings.beyond.idle:
+            site = answer.given[0].effects[0].site
+            return whole.windows(2 * np.pi / site.rate if site.rate else 0.0)
     if force is not None and force.resolved:
-        spans = force.windows
-    elif answer.verdict != "none":
-        spans = loud_windows(base)
-    return Where(channel, site.v, states, spans, static)
+        return force.windows
+    return loud_windows(base) if answer.verdict != "none" else ()
+
+
+def _channels(answer: Answer, site: Site, candidates: Sequence[Candidate]) -> tuple[Channel, ...]:
+    """Channels in which something surely acts, whichever of the explanations holds.
+
+    Of an answer that is not confirmed: the one that all effects of all its hypotheses share.
+    """
+    def of(e: Candidate, names: Sequence[str]) -> frozenset[Channel]:
+        if len(e.ids) > 1:
+            return frozenset(get_args(Channel))  # exact twins: a delay of input and of sensor
+        others = {c.channel for c in candidates for i in c.ids if i in names and i not in e.ids}
+        if not e.known and e.channel == "dynamics":
+            return _channels_of_formula(e, site)
+        return frozenset({e.channel} if e.channel in others else {e.channel} | others)
+
+    def of_family(family: str) -> frozenset[Channel]:
+        return frozenset(c.channel for c in candidates if family in c.families)
+
+    found: list[set[Channel]] = []
+    if answer.part is not None:
+        told = [of(p.effect, p.names) if p.names else of_family(p.family)
+                for p in answer.part.present]
+        found = [{next(iter(c)) for c in told if len(c) == 1}]
+    for h in () if answer.part is not None else answer.given:
+        table = answer.twins.get(h.key, {})
+        told = [of(e, table.get(e.key, e.names)) for e in h.effects]
+        sure = answer.verdict in SURE or len(frozenset().union(*told)) == 1
+        found.append({next(iter(c)) for c in told if len(c) == 1} if sure else set())
+    shared = set.intersection(*found) if found else set()
+    if answer.verdict not in SURE and any(own != shared for own in found):
+        return ()
+    return tuple(c for c in get_args(Channel) if c in shared)
+
+
+def _channels_of_formula(e: Candidate, site: Site) -> frozenset[Channel]:
+    """A force of inputs alone is what an input's curve makes; one of inputs and states is either's.
+    """
+    def holds(names: Sequence[str]) -> bool:
+        return any(re.search(rf"\b{n}\b", e.expression) for n in names)
+
+    if not holds(site.inputs):
+        return frozenset({"dynamics"})
+    return frozenset({"dynamics", "input"} if holds(site.model.state_names) else {"input"})
+
+
+def _channel_of_shape(answer: Answer, site: Site, shape: ForceShape | None, settings: Settings
+                      ) -> tuple[Channel, ...]:
+    """Of a force without a name that is all that is missing: of inputs alone it is an input's, of
+    the rate alone the dynamics'; one of the coordinate can be a sensor's curve as well.
+    """
+    if answer.given or shape is None or not shape.static_law:
+        return ()
+    arguments = set(shape.depends_on(settings))
+    if arguments and arguments <= set(site.inputs):
+        return ("input",)
+    return ("dynamics",) if arguments == {site.v} else ()
 
 
 def smallest(base: Hypothesis, candidates: Sequence[Candidate],

@@ -10,9 +10,11 @@ def lines_of(dx: DiagnosisData) -> list[str]:
     """Verdict, where, what, proof, what to do next, notes and settings, line by line."""
     lines = [dx.sentence()]
     if dx.mismatch:
-        place = dx.where.channel if dx.where.channel != "undecided" else "channel undecided"
+        place = " and ".join(dx.where.channels) or "channel undecided"
         spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time[:6])
-        lines.append(f"Where: {place}" + (f"; in time at {spans}" if spans else ""))
+        region = ", ".join(map(str, dx.where.region))
+        lines.append(f"Where: {place}" + (f"; at {region}" if region else "")
+                     + (f"; in time at {spans}" if spans else ""))
     lines += [f"Surely: {part.sentence()}" for part in dx.present]
     lines += dx.remainder.lines() if dx.remainder is not None else []
     for h in dx.hypotheses:

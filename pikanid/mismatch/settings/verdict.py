@@ -84,6 +84,7 @@ class BeyondSettings:
         least_window: Samples of a window that can say whether it is louder than noise.
         louder: Standard deviations of χ² in a window, √(2n), beyond which it is louder than noise.
         unexplained: [χ² per degree of freedom] from which on no force explains a recording.
+        idle: Share of what was visited in which a law must be zero to act in a region.
     """
 
     own: Share = 0.1
@@ -97,6 +98,7 @@ class BeyondSettings:
     least_window: Count = 4
     louder: Amount = 4.0
     unexplained: Amount = 1.5
+    idle: Share = 0.05
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     force = None if answer.verdict == "none" else force_over_time(case.base, site)
     return Diagnosis(
         answer.verdict, detection.p_value, case.settings,
-        locate(case.base, best, answer, site, shape, force),
+        locate(case.base, best, answer, site, shape, force, case.candidates),
         given, rejected, before, after, proof, tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates, counts),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
