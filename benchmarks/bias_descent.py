@@ -17,7 +17,7 @@ from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.kan_paper import COLLOCATION, STAGES
 from pikanid.strategies.relaxation import Setup, first_point
-from pikanid.study import slosh
+from pikanid.validation.study import slosh
 
 LOOK = (0, 10, 20, 50, 100, 200, 500, 1000, 2000)  # steps of a stage after which to look
 MOST = LOOK[-1]  # in the last stage, where the protocol stops after STAGES[-1][2]

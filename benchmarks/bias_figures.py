@@ -12,8 +12,8 @@ from bias_grid import GRIDS, SHOWN_GRID, Series, physics_residual, switches
 from pikanid.estimate.plots import COLOURS, MEASURED, new_figure, tidy
 from pikanid.strategies.ipda import PAPER_LAMBDA
 from pikanid.strategies.kan_paper import STAGES
-from pikanid.study import slosh
 from pikanid.uncertainty import cramer_rao
+from pikanid.validation.study import slosh
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,7 +21,7 @@ from pikanid.strategies.grids import Grid, Quadrature, chosen_grid
 from pikanid.strategies.ipda import IPDA, PAPER_DEGREE, PAPER_LAMBDA, PAPER_WARMUP
 from pikanid.strategies.pikan import PIKAN
 from pikanid.strategies.relaxation import RelaxedFit, Setup, relax
-from pikanid.study import slosh
+from pikanid.validation.study import slosh
 
 GRIDS = (10, 20, 40, 80, 160, 320, 640)
 SHOWN_GRID = 80  # of the physics residual

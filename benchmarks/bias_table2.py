@@ -16,7 +16,7 @@ from pikanid.strategies.grids import Grid, Knots, Quadrature, chosen_grid, paper
 from pikanid.strategies.ipda import PAPER_DEGREE, PAPER_LAMBDA, PAPER_WARMUP
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.relaxation import Setup, relax
-from pikanid.study import slosh
+from pikanid.validation.study import slosh
 
 COLUMNS = tuple(s for s in slosh.SCENARIOS if s.noise < 1)  # clean and 0.1°, dense and sparse
 

@@ -18,7 +18,7 @@ import numpy as np
 import pikanid as pk
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.recording import datasets
-from pikanid.study import pendulum
+from pikanid.validation.study import pendulum
 
 MODELS = {
     "pendulum": {

@@ -38,7 +38,7 @@ import sys
 from pathlib import Path
 from pikanid.reporting.study_report import write
 from pikanid.strategies import PDA
-from pikanid.study import run
+from pikanid.validation.study import run
 if __name__ == "__main__":
     PDA.slow = True
     write(run.run(0, ("nls", "pda")), Path(sys.argv[1]))

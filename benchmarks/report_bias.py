@@ -33,8 +33,8 @@ from pikanid.reporting.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.strategies.kan_paper import COLLOCATION, STAGES
 from pikanid.strategies.pikan import PIKAN
-from pikanid.study import slosh
 from pikanid.uncertainty import cramer_rao
+from pikanid.validation.study import slosh
 
 SEEDS = 10
 NAMES = {"l_theta": "l", "d_theta": "d"}

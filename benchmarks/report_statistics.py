@@ -28,8 +28,8 @@ from scipy.stats import chi2
 from pikanid import errors
 from pikanid.reporting.sheet import Sheet
 from pikanid.strategies import IPDA, NLS, PIKAN
-from pikanid.study import slosh
 from pikanid.uncertainty import cramer_rao
+from pikanid.validation.study import slosh
 
 STRATEGIES: dict[str, Any] = {
     "nls": NLS(), "ipda": IPDA(), "pikan": PIKAN(), "pikan-deep": PIKAN(width=(1, 5, 1))}

@@ -14,7 +14,7 @@ from pikanid import errors
 from pikanid.model import systems
 from pikanid.recording import datasets
 from pikanid.reporting import study_report, study_sheets
-from pikanid.study import pendulum, run, slosh
+from pikanid.validation.study import pendulum, run, slosh
 
 DENSE_LOW = slosh.SCENARIOS[1]
 

@@ -29,7 +29,7 @@ def study(
     folder = _folder(out)
     from pikanid.reporting.console import console, working
     from pikanid.reporting.study_report import show, write
-    from pikanid.study.run import count_steps, run
+    from pikanid.validation.study.run import count_steps, run
 
     with working("study", count_steps(), quiet) as step:
         found = run(seeds, step=step)

@@ -11,9 +11,9 @@ import numpy as np
 from pikanid.estimate.plots import BAND, MEASURED, new_figure, stroke, tidy
 from pikanid.recording import excitation
 from pikanid.simulation import simulate
-from pikanid.study import slosh
-from pikanid.study.pendulum import Swing
-from pikanid.study.run import Study
+from pikanid.validation.study import slosh
+from pikanid.validation.study.pendulum import Swing
+from pikanid.validation.study.run import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,8 +12,8 @@ from pikanid.estimate.plots import image
 from pikanid.reporting import study_sheets as sheets
 from pikanid.reporting.study_figures import figures
 from pikanid.storage.outputs import together
-from pikanid.study import pendulum, slosh
-from pikanid.study.run import SEED, Study
+from pikanid.validation.study import pendulum, slosh
+from pikanid.validation.study.run import SEED, Study
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -6,9 +6,9 @@ import numpy as np
 
 from pikanid.reporting.sheet import Sheet
 from pikanid.reporting.tables import verdict
-from pikanid.study.pendulum import Result as Swinging
-from pikanid.study.run import Study
-from pikanid.study.slosh import TRUE, Result
+from pikanid.validation.study.pendulum import Result as Swinging
+from pikanid.validation.study.run import Study
+from pikanid.validation.study.slosh import TRUE, Result
 
 # What the paper's Tables III and IV report, (l_theta [m], d_theta [N s/m]) by sampling and noise.
 PAPER: dict[tuple[str, float], dict[str, tuple[float, float]]] = {

@@ -1,1 +1,1 @@
-"""What checks the kit from outside: concealed effects, and the equivalence of Eq. (5)."""
+"""What checks the kit from outside: the study, concealed effects, the equivalence of Eq. (5)."""

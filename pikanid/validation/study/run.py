@@ -15,7 +15,7 @@ from pikanid import errors
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.storage.workers import begin
 from pikanid.strategies import STRATEGIES, strategy_class
-from pikanid.study import pendulum, slosh
+from pikanid.validation.study import pendulum, slosh
 
 SEED = 0  # definition: of the study's first recordings
 # Only what is quick is repeated: the study is to stay a matter of minutes.
