@@ -9,7 +9,8 @@ import pytest
 from commandline import Run
 
 import pikanid as pk
-from pikanid.commands.options import adjusted, check_outputs, quantity
+from pikanid.commands.options import adjusted, quantity
+from pikanid.commands.outputs import check_outputs, written
 
 
 def test_an_output_never_overwrites_an_input(run: Run, recorded: str, tmp_path: Path) -> None:
@@ -39,3 +40,16 @@ def test_free_then_fix_then_set() -> None:
     model = adjusted(pk.systems.sloshing(), ["m=200g"], ["d_theta"], ["g"])
     assert model.free_names == ("l_theta", "g")
     assert model.parameter("m").value == pytest.approx(0.2)
+
+
+def test_json_goes_to_a_file_or_is_printed_and_has_no_nan(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place, beside = str(tmp_path / "a.json"), str(tmp_path / "a.txt")
+    written({beside: b"x"}, place, {"std": float("nan")})
+    assert (Path(place).read_text(), capsys.readouterr().out) == ('{\n  "std": null\n}\n', "")
+    written({}, "-", {"std": 1.0})
+    assert capsys.readouterr().out == '{\n  "std": 1.0\n}\n'
+    with pytest.raises(pk.errors.BadRecording):
+        written({beside: b"y"}, str(tmp_path / "absent" / "a.json"), {})
+    assert Path(beside).read_bytes() == b"x"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.txt"]

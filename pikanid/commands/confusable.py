@@ -9,14 +9,15 @@ import typer
 from pikanid.commands.options import (
     Duration,
     Excitation,
+    Json,
     ModelName,
     Quiet,
     Rate,
     Sigma,
     Values,
     adjusted,
-    check_outputs,
 )
+from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.commands.simulate import excited, sigmas
 
 EXAMPLES = """Examples:
@@ -37,27 +38,21 @@ def confusable(
         metavar="N", help="how many σ strong effects are made before they are compared")] = 30.0,
     quick: Annotated[bool, typer.Option(
         "--quick", help="first order only: nothing is refitted")] = False,
-    json_: Annotated[str | None, typer.Option(
-        "--json", metavar="FILE", help="write JSON (- for standard output)")] = None,
+    json_: Json = None,
     quiet: Quiet = False,
 ) -> int:
     """Say which effects an experiment could detect, from which size, and which it confuses."""
-    check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [model, excitation])
+    check_outputs({"--json": (json_, [".json"])}, [model, excitation])
     from pikanid.mismatch.design.confusable import confusable as run
     from pikanid.model import systems
     from pikanid.reporting.console import console, working
-    from pikanid.reporting.strict_json import text
-    from pikanid.storage.outputs import atomically
 
     chosen = adjusted(systems.find(model), set_)
     drive = excited(chosen, excitation, duration, rate, [])
     with working("looking", 28, quiet) as step:
         found = run(chosen, drive, sigmas(chosen, sigma) or None, strength=strength,
                     refit=not quick, tell=step)
-    if json_ == "-":
-        print(text(found.to_dict()), end="")
-    elif json_ is not None:
-        atomically(json_, text(found.to_dict()).encode())
-    if not quiet and json_ != "-":
+    written({}, json_, found.to_dict())
+    if not quiet and json_ != STDOUT:
         console().print(str(found), markup=False, soft_wrap=True)
     return 0

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from pikanid.commands.options import Quiet, Sigma, assignments, check_outputs, quantity
+from pikanid.commands.options import Quiet, Sigma, assignments, quantity
+from pikanid.commands.outputs import check_outputs
 from pikanid.commands.simulate import sigmas
 from pikanid.recording.formats import written_endings
 

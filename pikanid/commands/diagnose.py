@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,6 +10,7 @@ import typer
 from pikanid.commands.identify import prepared
 from pikanid.commands.options import (
     Columns,
+    Json,
     ModelName,
     Quiet,
     Sigma,
@@ -17,13 +19,12 @@ from pikanid.commands.options import (
     Values,
     adjusted,
     assignments,
-    check_outputs,
     quantity,
 )
+from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
-    from pikanid.mismatch.report.diagnosis import Diagnosis
     from pikanid.recording import Recording
 
 EXAMPLES = """Examples:
@@ -45,8 +46,7 @@ def diagnose(
     held_out: Annotated[list[str], typer.Option(
         metavar="OTHER", show_default=False,
         help="recording of another experiment, to prove it on")] = [],  # noqa: B006
-    json_: Annotated[str | None, typer.Option(
-        "--json", metavar="FILE", help="write diagnosis.json (- for standard output)")] = None,
+    json_: Json = None,
     report: Annotated[str | None, typer.Option(
         metavar="FILE.html", help="write a page for people")] = None,
     sigma: Sigma = [],  # noqa: B006
@@ -67,7 +67,7 @@ def diagnose(
     quiet: Quiet = False,
 ) -> int:
     """Find out which physics a model leaves out, and prove it on another recording."""
-    check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),
+    check_outputs({"--json": (json_, [".json"]),
                    "--report": (report, [".html"])}, 
                   [*train, *held_out, model, *([settings] if settings else [])])
     from pikanid.mismatch.diagnose import diagnose as run
@@ -93,26 +93,12 @@ def diagnose(
     with working("diagnosing", 8, quiet) as step:
         dx = run(chosen, records, others or None,
                  settings=taken, quiet=stretch, tell=step, workers=workers)
-    _write(dx, train[0], json_, report)
-    if not quiet and json_ != "-":
-        print(dx)
-    return 0
-
-
-def _write(dx: Diagnosis, title: str, json_: str | None, report: str | None) -> None:
-    from pathlib import Path
-
-    from pikanid.reporting import strict_json
-    from pikanid.storage.outputs import together
-
-    files: dict[str, bytes] = {}
-    text = "" if json_ is None else strict_json.text(dx.to_dict())
-    if json_ is not None and json_ != "-":
-        files[json_] = text.encode()
+    files = {}
     if report is not None:
         from pikanid.reporting.diagnosis_page import page
 
-        files[report] = page(dx, Path(title).stem).encode()
-    together(files)
-    if json_ == "-":
-        print(text, end="")
+        files[report] = page(dx, Path(train[0]).stem).encode()
+    written(files, json_, dx.to_dict())
+    if not quiet and json_ != STDOUT:
+        print(dx)
+    return 0

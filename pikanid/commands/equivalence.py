@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pikanid import errors
-from pikanid.commands.options import Quiet, check_outputs
+from pikanid.commands.options import Json, Quiet
+from pikanid.commands.outputs import STDOUT, check_outputs, report_folder, written
+from pikanid.storage.version import __version__
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,9 +26,7 @@ Exit codes: 0 every comparison passed, 2 bad input, 3 at least one did not."""
 
 
 def equivalence(
-    json_: Annotated[str | None, typer.Option(
-        "--json", metavar="FILE", show_default=False,
-        help="write every comparison as JSON (- for standard output)")] = None,
+    json_: Json = None,
     report: Annotated[str | None, typer.Option(
         metavar="FOLDER", show_default=False,
         help="write equivalence.md and its figure")] = None,
@@ -38,8 +36,8 @@ def equivalence(
     quiet: Quiet = False,
 ) -> int:
     """Compare the training loss of a pykan KAN with the objective of iPDA, term by term."""
-    check_outputs({"--json": (None if json_ == "-" else json_, [".json"])}, [])
-    folder = None if report is None else _folder(report)
+    check_outputs({"--json": (json_, [".json"])}, [])
+    folder = None if report is None else report_folder("--report", report)
     from pikanid.approximators.kan import build_kan
     from pikanid.reporting.console import console, working
     from pikanid.validation.equivalence import run_checks
@@ -47,11 +45,12 @@ def equivalence(
     build_kan([1, 1])  # says what is missing where torch or pykan is not installed
     with working("equivalence", count_parts(quick), quiet) as step:
         found = run_checks(quick=quick, seed=seed, progress=step)
-    page = _write(found, folder, json_)
-    if not quiet and json_ != "-":
+    pages = {} if folder is None else {str(p): c for p, c in found.files(folder).items()}
+    written(pages, json_, {**found.to_dict(), "version": __version__})
+    if not quiet and json_ != STDOUT:
         screen = console()
         show(screen, found)
-        for path in [page, json_]:
+        for path in [folder and folder / "equivalence.md", json_]:
             if path is not None:
                 screen.print(f"written: {path}", markup=False, soft_wrap=True)
     return 0 if found.passed else EXIT_DIFFERENT
@@ -94,31 +93,3 @@ def show(screen: Console, report: EquivalenceReport) -> None:
     total, lost = len(report.rows), len(report.failures)
     screen.print(f"All {total} comparisons passed." if report.passed else
                  f"{lost} of {total} comparisons did not pass.", markup=False)
-
-
-def _write(report: EquivalenceReport, folder: Path | None, json_: str | None) -> Path | None:
-    """The page with its figure, and JSON; the path of the page."""
-    from importlib.metadata import version
-
-    from pikanid.reporting.strict_json import text
-    from pikanid.storage.outputs import together
-
-    content = text({**report.to_dict(), "version": version("pikanid")})
-    files = {} if folder is None else report.files(folder)
-    if json_ is not None and json_ != "-":
-        files[Path(json_)] = content.encode()
-    together(files)
-    if json_ == "-":
-        print(content, end="")
-    return None if folder is None else folder / "equivalence.md"
-
-
-def _folder(text: str) -> Path:
-    """The report's folder, made if need be, before any work is done."""
-    folder = Path(text)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as failure:
-        why = getattr(failure, "strerror", "") or "the system refuses"
-        raise errors.BadSetting(errors.output_refused("--report", text, why)) from None
-    return folder

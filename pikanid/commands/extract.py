@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pikanid import errors
-from pikanid.commands.options import check_outputs
+from pikanid.commands.options import Json
+from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
@@ -42,36 +42,28 @@ def extract(
         metavar="NAME", show_default=False, help="the column that the KAN learned")] = None,
     alpha: Annotated[float, typer.Option(
         metavar="P", help="level at which an edge counts as significant")] = 0.01,
-    json_: Annotated[str | None, typer.Option(
-        "--json", metavar="FILE", show_default=False, help="the formula as JSON; - prints it")
-    ] = None,
+    json_: Json = None,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", show_default=False, help="the network drawn: .png, .svg, .pdf")] = None,
 ) -> int:
     """Read a KAN: a formula with standard errors, and how far to trust it."""
     from pikanid.reporting.console import console
-    from pikanid.storage.outputs import together
     from pikanid.symbolic import extract as read
 
     check_outputs({"--plot": (plot, (".png", ".svg", ".pdf")),
-                   "--json": (None if json_ == "-" else json_, (".json",))},
+                   "--json": (json_, (".json",))},
                   [p for p in (source, data) if p])
     network = _load(source)
     names = list(input_ or [])
     x, y = _points(data, names, output) if data else (None, None)
     reading = read(network, x, y, inputs=names or None, alpha=alpha)
-    text = json.dumps(_content(reading), indent=2, allow_nan=False) + "\n"
-    files: dict[str, bytes] = {}
-    if json_ is not None and json_ != "-":
-        files[json_] = text.encode()
+    files = {}
     if plot is not None:
         from pikanid.estimate.plots import image_for
 
         files[plot] = image_for(reading.plot(), plot)
-    together(files)
-    if json_ == "-":
-        print(text, end="")
-    else:
+    written(files, json_, _content(reading))
+    if json_ != STDOUT:
         console().print(str(reading), markup=False, soft_wrap=True)
     return 0 if reading.ok else errors.EXIT_MISFIT
 

@@ -12,6 +12,7 @@ import typer
 from pikanid import errors
 from pikanid.commands.options import (
     Columns,
+    Json,
     ModelName,
     Quiet,
     Sigma,
@@ -20,10 +21,12 @@ from pikanid.commands.options import (
     Values,
     adjusted,
     assignments,
-    check_outputs,
+    by_output,
     quantity,
 )
+from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.recording.formats import readable
+from pikanid.storage.version import __version__
 from pikanid.strategies import STRATEGIES
 
 if TYPE_CHECKING:
@@ -73,8 +76,7 @@ def identify(
     stop: Annotated[float | None, typer.Option("--to", metavar="S", help="end [s]")] = None,
     decimate: Stride = 1,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the starting points")] = 0,
-    json_: Annotated[str | None, typer.Option(
-        "--json", metavar="FILE", help="write the result as JSON (- for standard output)")] = None,
+    json_: Json = None,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", help="draw data, fit and residuals (.png, .svg, .pdf)")] = None,
     save: Annotated[str | None, typer.Option(
@@ -90,7 +92,7 @@ def identify(
         raise errors.BadSetting(errors.save_needs_one_strategy())
     if start is not None and stop is not None and not start < stop:
         raise errors.BadSetting(errors.reversed_window(start, stop))
-    check_outputs({"--json": (None if json_ == "-" else json_, [".json"]),
+    check_outputs({"--json": (json_, [".json"]),
                    "--plot": (plot, [".png", ".svg", ".pdf"]),
                    "--save": (save, [".json", ".json.gz"])}, [*recordings, model])
     from pikanid.model import systems
@@ -136,13 +138,8 @@ def prepared(path: str, model: Model, columns: dict[str, str], units: dict[str, 
 
 def _with_sigma(rec: Recording, model: Model, texts: Sequence[str]) -> Recording:
     """The noise of the outputs: one for all, or one by name."""
-    common = [text for text in texts if "=" not in text]
-    named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
-    if len(common) > 1:
-        raise errors.BadSetting(errors.named_twice("--sigma", "all outputs"))
-    wanted = {**{o: common[0] for o in model.output_names if common}, **named}
     made = {}
-    for name, text in wanted.items():
+    for name, text in by_output(model, texts).items():
         model.output(name)
         own = rec[name].unit
         # A bare number is in the model's unit, in which the results are printed too.
@@ -190,7 +187,7 @@ def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str]
         return errors.PikanidError.exit_code
     seconds = time.perf_counter() - begun
     _write(model, given, estimates, failed, len(names) > 1, seconds, json_, plot, save)
-    if not quiet and json_ != "-":
+    if not quiet and json_ != STDOUT:
         from pikanid.reporting.tables import show_estimates
 
         show_estimates(console(), estimates, failed)
@@ -201,18 +198,12 @@ def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str]
 def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimate],
            failed: dict[str, str], several: bool, seconds: float, json_: str | None,
            plot: str | None, save: str | None) -> None:
-    import pikanid
     from pikanid.reporting import strict_json
-    from pikanid.storage.outputs import together
 
     files: dict[str, bytes] = {}
     labels = [r.name for r in given]
-    if json_ is not None:
-        content = (strict_json.of_several(estimates, failed, model.name, labels,
-                                          pikanid.__version__, seconds)
-                   if several else strict_json.of_one(estimates[0], labels))
-        if json_ != "-":
-            files[json_] = strict_json.text(content).encode()
+    content = (strict_json.of_several(estimates, failed, model.name, labels, __version__, seconds)
+               if several else strict_json.of_one(estimates[0], labels))
     if plot is not None:
         from pikanid.estimate.plots import image_for, plot_strategies
 
@@ -223,6 +214,4 @@ def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimat
         from pikanid.estimate import file as estimate_file
 
         files[save] = estimate_file.content(estimates[0], save)
-    together(files)
-    if json_ == "-":
-        print(strict_json.text(content), end="")
+    written(files, json_, content)

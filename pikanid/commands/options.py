@@ -1,12 +1,10 @@
 """Options that commands share, and what people write behind them: assignments, quantities with
-units, places to write to.
+units.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -41,6 +39,9 @@ Duration = Annotated[float, typer.Option(
     "--duration", metavar="S", help="of a built-in excitation [s]")]
 Rate = Annotated[float, typer.Option(
     "--rate", metavar="HZ", help="sampling rate of a built-in excitation")]
+Json = Annotated[str | None, typer.Option(
+    "--json", metavar="FILE", show_default=False,
+    help="write the result as JSON (- for standard output)")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")]
 
 
@@ -73,6 +74,19 @@ def quantity(text: str, unit: str, where: str, difference: bool = False) -> floa
     from pikanid.formula import quantity as units_quantity
 
     return units_quantity.quantity(text, unit, where, difference)
+
+
+def by_output(model: Model, texts: Sequence[str]) -> dict[str, str]:
+    """The texts of --sigma by output: one for all, or "theta=0.1deg" for one.
+
+    Raises:
+        BadSetting: If two are for all outputs, or for one of them.
+    """
+    common = [text for text in texts if "=" not in text]
+    named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
+    if len(common) > 1:
+        raise errors.BadSetting(errors.named_twice("--sigma", "all outputs"))
+    return {**{o: common[0] for o in model.output_names if common}, **named}
 
 
 def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),
@@ -108,57 +122,3 @@ def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),
     return model.with_values({
         name: quantity(value, model.parameter(name).unit, f"--set {name}")
         for name, value in values.items()})
-
-
-def check_outputs(outputs: Mapping[str, tuple[str | None, Sequence[str]]],
-                  inputs: Sequence[str]) -> None:
-    """Refuse what could not be written in the end, before any work is done.
-
-    Args:
-        outputs: Option -> (path or None, endings that the name may have).
-        inputs: Paths that are read and must survive.
-
-    Raises:
-        BadSetting: Wrong ending, missing or unwritable folder, no regular file, an input, or two
-            options with one path.
-    """
-    taken: dict[str, str] = {}
-    for option, (path, endings) in outputs.items():
-        if path is None:
-            continue
-        _check_place(option, path, endings)
-        real = os.path.realpath(path)
-        if any(os.path.realpath(source) == real or _same(source, path) for source in inputs):
-            raise errors.BadSetting(errors.output_is_input(option, path))
-        if real in taken:
-            raise errors.BadSetting(errors.output_twice(taken[real], option, path))
-        taken[real] = option
-
-
-def _check_place(option: str, path: str, endings: Sequence[str]) -> None:
-    file = Path(path)
-    if not path.lower().endswith(tuple(endings)) or "\0" in path:
-        raise errors.BadSetting(errors.output_ending(option, path, endings))
-    folder = file.parent
-    try:
-        if not folder.is_dir():
-            raise errors.BadSetting(errors.output_folder(option, path, str(folder)))
-        if file.is_dir():
-            raise errors.BadSetting(errors.output_refused(option, path, "it is a folder"))
-        if file.exists() and not file.is_file():
-            raise errors.BadSetting(errors.output_refused(option, path, "it is no regular file"))
-        if len(os.fsencode(file.name)) > 200:
-            raise errors.BadSetting(errors.output_refused(option, path, "its name is too long"))
-    except OSError as failure:
-        why = failure.strerror or "the system refuses"
-        raise errors.BadSetting(errors.output_refused(option, path, why)) from None
-    if not os.access(folder, os.W_OK | os.X_OK):
-        why = f"the folder '{folder}' is not open for writing"
-        raise errors.BadSetting(errors.output_refused(option, path, why))
-
-
-def _same(source: str, path: str) -> bool:
-    try:
-        return os.path.samefile(source, path)
-    except (OSError, ValueError):
-        return False

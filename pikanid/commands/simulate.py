@@ -18,9 +18,10 @@ from pikanid.commands.options import (
     Values,
     adjusted,
     assignments,
-    check_outputs,
+    by_output,
     quantity,
 )
+from pikanid.commands.outputs import check_outputs
 from pikanid.recording.formats import written_endings
 
 if TYPE_CHECKING:
@@ -107,11 +108,7 @@ def excited(model: Model, name: str, duration: float, rate: float,
 
 def sigmas(model: Model, texts: list[str]) -> dict[str, float]:
     """Standard deviation of the noise per output from texts like "0.1deg" or "theta=0.1deg"."""
-    common = [text for text in texts if "=" not in text]
-    named = assignments("--sigma", [text for text in texts if "=" in text], "theta=0.1deg")
-    if len(common) > 1:
-        raise errors.BadSetting(errors.named_twice("--sigma", "all outputs"))
-    wanted = {**{o: common[0] for o in model.output_names if common}, **named}
+    wanted = by_output(model, texts)
     made = {name: quantity(text, model.output(name).unit, f"--sigma {name}", difference=True)
             for name, text in wanted.items()}
     for name, value in made.items():

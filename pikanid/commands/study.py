@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from pikanid import errors
+from pikanid.commands.outputs import report_folder
 
 EXAMPLES = """Examples:
 
@@ -26,7 +25,7 @@ def study(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="write the report only")] = False,
 ) -> int:
     """Compare the strategies on simulated and real data, diagnose the real one; write a report."""
-    folder = _folder(out)
+    folder = report_folder("--out", out)
     from pikanid.reporting.console import console, working
     from pikanid.reporting.study_report import show, write
     from pikanid.validation.study.run import count_steps, run
@@ -41,14 +40,3 @@ def study(
         for path in written:
             screen.print(f"written: {path}", markup=False, soft_wrap=True)
     return 0
-
-
-def _folder(text: str) -> Path:
-    """The report's folder, made if need be, before any work is done."""
-    folder = Path(text)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as failure:
-        why = getattr(failure, "strerror", "") or "the system refuses"
-        raise errors.BadSetting(errors.output_refused("--out", text, why)) from None
-    return folder
