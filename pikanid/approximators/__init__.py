@@ -28,9 +28,8 @@ class Approximator(Protocol):
     def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
         """The ``derivative``-th time derivative at ``t`` (M,), shape (M,)."""
 
-    def jacobian(
-        self, t: Array, coefficients: Array, derivative: int = 0
-    ) -> Array | sparse.csr_array:
+    def jacobian(self, t: Array, coefficients: Array,
+                 derivative: int = 0) -> Array | sparse.csr_array:
         """Derivative of ``values`` with respect to the coefficients, shape (M, n)."""
 
 

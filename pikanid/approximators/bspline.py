@@ -114,9 +114,8 @@ class BSpline:
         return self.basis(t, derivative)
 
 
-def knots_from_breakpoints(
-    breakpoints: Array, degree: int, multiplicity: int | NDArray[np.int64] = 1
-) -> Array:
+def knots_from_breakpoints(breakpoints: Array, degree: int,
+                           multiplicity: int | NDArray[np.int64] = 1) -> Array:
     """Clamped knots over breakpoints (E + 1,), interior ones repeated ``multiplicity`` times.
 
     >>> knots_from_breakpoints(np.array([0.0, 1.0, 2.0]), degree=2, multiplicity=2)

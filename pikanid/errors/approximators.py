@@ -15,10 +15,8 @@ def kan_not_shallow(width: object) -> str:
 
 
 def kan_not_a_curve(width: object) -> str:
-    return (
-        f"A KAN of width {width} is no curve over time: it needs one input, one output and no "
-        "masked edges, as in (1, 5, 1)."
-    )
+    return (f"A KAN of width {width} is no curve over time: it needs one input, one output and no "
+            "masked edges, as in (1, 5, 1).")
 
 
 def kan_order(order: int, highest: int) -> str:
@@ -40,10 +38,8 @@ def kan_device(device: str, detail: str) -> str:
 
 
 def kan_symbolic(layer: int) -> str:
-    return (
-        f"Layer {layer} of the KAN has symbolic edges: only spline edges have coefficients to "
-        "estimate; unfix_symbolic(...) them first."
-    )
+    return (f"Layer {layer} of the KAN has symbolic edges: only spline edges have coefficients to "
+            "estimate; unfix_symbolic(...) them first.")
 
 
 def kan_knots(layer: int) -> str:
@@ -81,10 +77,8 @@ def kan_coefficients(given: object, wanted: object) -> str:
 
 
 def spline_knots(degree: int, count: int) -> str:
-    return (
-        f"A spline of degree {degree} needs degree >= 1 and at least {2 * (degree + 1)} knots, "
-        f"not {count}: ask for more intervals or a lower degree."
-    )
+    return (f"A spline of degree {degree} needs degree >= 1 and at least {2 * (degree + 1)} knots, "
+            f"not {count}: ask for more intervals or a lower degree.")
 
 
 def spline_knots_unsorted() -> str:

@@ -47,10 +47,8 @@ def output_ending(option: str, path: str, endings: Sequence[str]) -> str:
 
 
 def output_folder(option: str, path: str, folder: str) -> str:
-    return (
-        f"{option}: '{short(path, 200)}' cannot be written, because there is no folder "
-        f"'{short(folder, 200)}'."
-    )
+    return (f"{option}: '{short(path, 200)}' cannot be written, because there is no folder "
+            f"'{short(folder, 200)}'.")
 
 
 def output_refused(option: str, path: str, why: str) -> str:
@@ -74,11 +72,9 @@ def nothing_to_simulate(name: str) -> str:
 
 
 def unforeseen(command: str, failure: str, place: str) -> str:
-    return (
-        f"pikanid itself failed while running '{short(command, 400)}': {short(failure, 200)}"
-        f"{place}. What was written before is kept. Please report this line with the files; "
-        "with --debug the same command shows the traceback."
-    )
+    return (f"pikanid itself failed while running '{short(command, 400)}': {short(failure, 200)}"
+            f"{place}. What was written before is kept. Please report this line with the files; "
+            "with --debug the same command shows the traceback.")
 
 
 def out_of_memory() -> str:

@@ -20,7 +20,5 @@ def no_influence(name: str) -> str:
 
 
 def unidentifiable(combination: str, condition: float) -> str:
-    return (
-        f"The data do not determine the combination {combination} (condition {condition:.1g}): "
-        "fix one of these parameters or excite the system differently."
-    )
+    return (f"The data do not determine the combination {combination} (condition {condition:.1g}): "
+            "fix one of these parameters or excite the system differently.")

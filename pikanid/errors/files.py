@@ -88,11 +88,9 @@ def header_twice(where: str, header: str) -> str:
 
 
 def no_time(where: str, known: Iterable[str]) -> str:
-    return (
-        f"'{where}' has no time column among: {listed(known)}. Name it "
-        "(--column t=COLUMN, in Python columns={'t': 'its header'}) or give the sampling rate "
-        "in Hz (--rate, in Python rate=)."
-    )
+    return (f"'{where}' has no time column among: {listed(known)}. Name it "
+            "(--column t=COLUMN, in Python columns={'t': 'its header'}) or give the sampling rate "
+            "in Hz (--rate, in Python rate=).")
 
 
 def time_length(where: str, name: str, n: int, wanted: int) -> str:
@@ -138,10 +136,8 @@ def detail_too_large(given: int, most: int) -> str:
 
 
 def detail_unpacks(most: int) -> str:
-    return (
-        f"it would unpack to more than {most / 2**20:.4g} MiB of memory; unpack it yourself if "
-        "you trust it"
-    )
+    return (f"it would unpack to more than {most / 2**20:.4g} MiB of memory; unpack it yourself if "
+            "you trust it")
 
 
 def detail_memory(most: int) -> str:

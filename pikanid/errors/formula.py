@@ -24,31 +24,23 @@ def formula_syntax(text: str, where: str, detail: str) -> str:
 
 
 def formula_work(text: str, where: str) -> str:
-    return (
-        f"The formula of {where} makes the model too complicated: '{short(text)}'; nest fewer "
-        "functions and write shorter products."
-    )
+    return (f"The formula of {where} makes the model too complicated: '{short(text)}'; nest fewer "
+            "functions and write shorter products.")
 
 
 def formula_forbidden(part: str, where: str) -> str:
-    return (
-        f"'{short(part)}' in the formula of {where} is not allowed: use numbers, names, "
-        "+ - * / **, parentheses and the listed functions."
-    )
+    return (f"'{short(part)}' in the formula of {where} is not allowed: use numbers, names, "
+            "+ - * / **, parentheses and the listed functions.")
 
 
 def unknown_symbol(name: str, where: str, known: Sequence[str], close: Sequence[str]) -> str:
-    return (
-        f"'{name}' in the formula of {where} is neither a state, an input nor a parameter "
-        f"(known: {listed(known)}).{did_you_mean(close)}"
-    )
+    return (f"'{name}' in the formula of {where} is neither a state, an input nor a parameter "
+            f"(known: {listed(known)}).{did_you_mean(close)}")
 
 
 def unknown_function(name: str, where: str, known: Sequence[str], close: Sequence[str]) -> str:
-    return (
-        f"The function '{name}' in the formula of {where} is unknown "
-        f"(known: {listed(known)}).{did_you_mean(close)}"
-    )
+    return (f"The function '{name}' in the formula of {where} is unknown "
+            f"(known: {listed(known)}).{did_you_mean(close)}")
 
 
 def wrong_argument_count(name: str, wanted: int, given: int, where: str) -> str:
@@ -64,41 +56,31 @@ def division_by_zero(text: str, where: str) -> str:
 
 
 def unknown_unit(text: str, where: str = "", close: Sequence[str] = ()) -> str:
-    return (
-        f"The unit '{short(text)}'{f' of {where}' if where else ''} is unknown: write products "
-        "and powers of SI units such as 'm/s^2', 'rad', 'deg/s', 'mV', or '' for none."
-        f"{did_you_mean(close)}"
-    )
+    return (f"The unit '{short(text)}'{f' of {where}' if where else ''} is unknown: write products "
+            "and powers of SI units such as 'm/s^2', 'rad', 'deg/s', 'mV', or '' for none."
+            f"{did_you_mean(close)}")
 
 
 def units_differ(source: str, target: str, where: str = "") -> str:
     hint = " ('g' is gram; standard gravity is 'g_0')" if "g" in (source, target) else ""
-    return (
-        f"{f'{where}: ' if where else ''}'{source or 'dimensionless'}' cannot be converted to "
-        f"'{target or 'dimensionless'}': they measure different things{hint}."
-    )
+    return (f"{f'{where}: ' if where else ''}'{source or 'dimensionless'}' cannot be converted to "
+            f"'{target or 'dimensionless'}': they measure different things{hint}.")
 
 
 def unit_without_size(text: str) -> str:
-    return (
-        f"The unit '{short(text)}' is logarithmic, so that no formula can be written in it: "
-        "convert the signal first."
-    )
+    return (f"The unit '{short(text)}' is logarithmic, so that no formula can be written in it: "
+            "convert the signal first.")
 
 
-def units_meet(
-    where: str, formula: str, found: str, wanted: str, unknown: Sequence[str]
-) -> str:
+def units_meet(where: str, formula: str, found: str, wanted: str, unknown: Sequence[str]) -> str:
     advice = (
         f"declare the unit of {listed(unknown)}"
         if unknown
         else "declare units that fit, and a parameter for every number that has a unit"
     )
-    return (
-        f"{where}: '{short(formula)}' comes out in '{found or 'dimensionless'}' where "
-        f"'{wanted or 'dimensionless'}' is needed, and no factor turns one into the other: "
-        f"{advice}."
-    )
+    return (f"{where}: '{short(formula)}' comes out in '{found or 'dimensionless'}' where "
+            f"'{wanted or 'dimensionless'}' is needed, and no factor turns one into the other: "
+            f"{advice}.")
 
 
 def number_between_units(where: str, number: str) -> str:
@@ -123,10 +105,8 @@ def converted_twice(where: str, number: float, factor: str, value: float) -> str
 
 
 def not_a_formula(where: str, value: object) -> str:
-    return (
-        f"{where} is {value!r}; it must be a formula as text, a finite number, or a SymPy "
-        "expression."
-    )
+    return (f"{where} is {value!r}; it must be a formula as text, a finite number, or a SymPy "
+            "expression.")
 
 
 def not_a_quantity(text: str, where: str) -> str:

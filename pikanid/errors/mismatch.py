@@ -8,17 +8,13 @@ from pikanid.errors.wording import did_you_mean, listed, short
 
 
 def rounded_repeats(where: str, name: str, count: int) -> str:
-    return (
-        f"Recording '{where}': '{name}' is rounded and often does not change; {count} samples "
-        "that repeat their neighbours are left out."
-    )
+    return (f"Recording '{where}': '{name}' is rounded and often does not change; {count} samples "
+            "that repeat their neighbours are left out.")
 
 
 def too_few_to_diagnose(samples: int, parameters: int, needed: int) -> str:
-    return (
-        f"There are {samples} usable samples for {parameters} free parameters, and a diagnosis "
-        f"needs at least {needed}: record more, or fix parameters."
-    )
+    return (f"There are {samples} usable samples for {parameters} free parameters, and a diagnosis "
+            f"needs at least {needed}: record more, or fix parameters.")
 
 
 def too_rough_to_diagnose(model: str) -> str:
@@ -96,10 +92,8 @@ def held_out_same(train: str, name: str) -> str:
 
 
 def unknown_setting(name: str, close: Sequence[str]) -> str:
-    return (
-        f"There is no setting '{name}'.{did_you_mean(close)} pikanid.Settings describes all of "
-        "them."
-    )
+    return (f"There is no setting '{name}'.{did_you_mean(close)} pikanid.Settings describes all of "
+            "them.")
 
 
 def settings_unreadable(path: str, detail: str) -> str:

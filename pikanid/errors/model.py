@@ -31,10 +31,8 @@ def not_in_model(what: str, name: str, known: Sequence[str], close: Sequence[str
 
 
 def foreign_symbols(names: Sequence[str], where: str) -> str:
-    return (
-        f"{where} uses {listed(names)}, unknown to the model: declare it as a parameter "
-        "(pass parameters=[...]) or mend the name."
-    )
+    return (f"{where} uses {listed(names)}, unknown to the model: declare it as a parameter "
+            "(pass parameters=[...]) or mend the name.")
 
 
 def spline_at_start(state: str, spline: str) -> str:
@@ -53,10 +51,8 @@ def no_outputs() -> str:
 
 
 def bad_bounds(name: str, value: float, bounds: Sequence[float]) -> str:
-    return (
-        f"Parameter '{name}': its guess {value:g} must lie inside its bounds "
-        f"[{bounds[0]:g}, {bounds[1]:g}], and the lower bound below the upper one."
-    )
+    return (f"Parameter '{name}': its guess {value:g} must lie inside its bounds "
+            f"[{bounds[0]:g}, {bounds[1]:g}], and the lower bound below the upper one.")
 
 
 def bad_value(what: str, value: object, wanted: str) -> str:
@@ -80,10 +76,8 @@ def unknown_system(name: str, known: Sequence[str], close: Sequence[str]) -> str
 
 
 def path_twice(name: str, what: str) -> str:
-    return (
-        f"Input '{name}' has a {what} already: change the parameter that it names instead of "
-        "adding a second one."
-    )
+    return (f"Input '{name}' has a {what} already: change the parameter that it names instead of "
+            "adding a second one.")
 
 
 def no_recordings() -> str:

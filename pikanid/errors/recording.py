@@ -16,17 +16,13 @@ def channel_twice(name: str, where: str) -> str:
 
 
 def no_recording(kind: str) -> str:
-    return (
-        f"A recording is needed, not a {kind}: give a Recording, the path of its file, or a "
-        "DataFrame with a column or an index of times; a model comes before its recordings."
-    )
+    return (f"A recording is needed, not a {kind}: give a Recording, the path of its file, or a "
+            "DataFrame with a column or an index of times; a model comes before its recordings.")
 
 
 def no_channel_table(kind: str) -> str:
-    return (
-        f"A recording is made of a dictionary: name -> Channel, not of a {kind}; see "
-        "Recording.from_arrays, Recording.from_frame and Recording.read."
-    )
+    return (f"A recording is made of a dictionary: name -> Channel, not of a {kind}; see "
+            "Recording.from_arrays, Recording.from_frame and Recording.read.")
 
 
 def not_of_kind(what: str, kind: str, wanted: str) -> str:
@@ -41,10 +37,8 @@ def split_outside(where: str, at: float, begin: float, end: float) -> str:
 
 
 def outside_the_record(where: str, start: float, stop: float, begin: float, end: float) -> str:
-    return (
-        f"'{where}' has nothing from {start:g} s to {stop:g} s: it runs from {begin:g} s to "
-        f"{end:g} s."
-    )
+    return (f"'{where}' has nothing from {start:g} s to {stop:g} s: it runs from {begin:g} s to "
+            f"{end:g} s.")
 
 
 def no_channels(where: str) -> str:
@@ -103,10 +97,8 @@ def bad_time(where: str, place: str, value: float) -> str:
 
 def time_not_rising(where: str, place: str, now: float, before: float) -> str:
     how = "repeats" if now == before else "goes back from"
-    return (
-        f"'{where}', {place}: the time {now:.9g} s {how} {before:.9g} s; times must rise from "
-        "sample to sample. Sort the rows and remove repeated ones."
-    )
+    return (f"'{where}', {place}: the time {now:.9g} s {how} {before:.9g} s; times must rise from "
+            "sample to sample. Sort the rows and remove repeated ones.")
 
 
 def absurd_value(where: str, place: str, name: str, value: float) -> str:
@@ -117,10 +109,8 @@ def absurd_value(where: str, place: str, name: str, value: float) -> str:
 
 
 def missing_input(where: str, name: str, sample: int, time: float) -> str:
-    return (
-        f"'{where}', sample {sample} (t = {time:g} s): input '{name}' is missing (NaN); only "
-        "outputs may have gaps. Fill it or window the recording."
-    )
+    return (f"'{where}', sample {sample} (t = {time:g} s): input '{name}' is missing (NaN); only "
+            "outputs may have gaps. Fill it or window the recording.")
 
 
 def constant_output(where: str, name: str, value: float) -> str:

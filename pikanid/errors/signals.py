@@ -62,10 +62,8 @@ def bad_grid(duration: float, dt: float) -> str:
 
 
 def pulse_off_grid(start: float, stop: float, dt: float) -> str:
-    return (
-        f"A pulse from {start:g} s to {stop:g} s does not start and stop on the grid of "
-        f"dt = {dt:g} s: choose a dt that divides both."
-    )
+    return (f"A pulse from {start:g} s to {stop:g} s does not start and stop on the grid of "
+            f"dt = {dt:g} s: choose a dt that divides both.")
 
 
 def bad_band(frequencies: Sequence[float], dt: float) -> str:
@@ -76,10 +74,8 @@ def bad_band(frequencies: Sequence[float], dt: float) -> str:
 
 
 def bad_move_bounds(acceleration: float, velocity: float) -> str:
-    return (
-        f"A move needs positive bounds, not acceleration = {acceleration:g} m/s^2 and "
-        f"velocity = {velocity:g} m/s."
-    )
+    return (f"A move needs positive bounds, not acceleration = {acceleration:g} m/s^2 and "
+            f"velocity = {velocity:g} m/s.")
 
 
 def move_too_long(distance: float, seconds: float) -> str:

@@ -8,31 +8,23 @@ from pikanid.errors.wording import listed
 
 
 def not_finite(time: float, values: str) -> str:
-    return (
-        f"The simulation leaves the finite numbers near t = {time:g} s at {values}: "
-        "start from other parameter values, or tighten the bounds."
-    )
+    return (f"The simulation leaves the finite numbers near t = {time:g} s at {values}: "
+            "start from other parameter values, or tighten the bounds.")
 
 
 def too_many_events(time: float) -> str:
-    return (
-        f"The model switches without end near t = {time:g} s (over 1000 events in one step): "
-        "a non-smooth term chatters; check its sign."
-    )
+    return (f"The model switches without end near t = {time:g} s (over 1000 events in one step): "
+            "a non-smooth term chatters; check its sign.")
 
 
 def degree_too_low(degree: int, order: int) -> str:
-    return (
-        f"Splines of degree {degree} have no derivative of order {order} to compare with the "
-        f"model: choose degree >= {order + 1}, or form='state'."
-    )
+    return (f"Splines of degree {degree} have no derivative of order {order} to compare with the "
+            f"model: choose degree >= {order + 1}, or form='state'.")
 
 
 def relaxation_cannot_see(names: Sequence[str], why: str) -> str:
-    return (
-        f"A relaxation cannot estimate {listed(names)} ({why}): fix it, or fit with the "
-        "strategy NLS, which simulates the model."
-    )
+    return (f"A relaxation cannot estimate {listed(names)} ({why}): fix it, or fit with the "
+            "strategy NLS, which simulates the model.")
 
 
 def smoothing_undetermined(names: Sequence[str]) -> str:
@@ -72,10 +64,8 @@ def relaxation_stuck(lam: float, kept: float) -> str:
 
 
 def grid_not_settled(gap: float, intervals: int) -> str:
-    return (
-        f"With {intervals} intervals, the last halving still moved a parameter by {gap:.2g} "
-        "standard errors: the discretisation bias is not negligible. Set more intervals."
-    )
+    return (f"With {intervals} intervals, the last halving still moved a parameter by {gap:.2g} "
+            "standard errors: the discretisation bias is not negligible. Set more intervals.")
 
 
 def estimate_not_simulated() -> str:
@@ -98,17 +88,13 @@ def no_such_device(device: str) -> str:
 
 
 def descent_diverged(steps: int) -> str:
-    return (
-        f"The loss left the finite numbers after {steps} steps: the best iterate until then is "
-        "kept. Lower the learning rate, or tighten the bounds."
-    )
+    return (f"The loss left the finite numbers after {steps} steps: the best iterate until then is "
+            "kept. Lower the learning rate, or tighten the bounds.")
 
 
 def newton_stopped(iterations: int, move: float) -> str:
-    return (
-        f"The fit still moved a parameter by {move:.2g} standard errors when its {iterations} "
-        "iterations were used up: allow more, or another seed."
-    )
+    return (f"The fit still moved a parameter by {move:.2g} standard errors when its {iterations} "
+            "iterations were used up: allow more, or another seed.")
 
 
 def network_smears_switches(count: int, most: int) -> str:
@@ -140,10 +126,8 @@ def curve_misleads(name: str, value: float, reference: float, std: float, residu
 
 
 def bad_start() -> str:
-    return (
-        "The model cannot be simulated from any starting point: give other guesses or narrower "
-        "bounds."
-    )
+    return ("The model cannot be simulated from any starting point: give other guesses or narrower "
+            "bounds.")
 
 
 def fit_diverged(where: str) -> str:

@@ -40,10 +40,8 @@ def candidate_without_argument(text: str, argument: str) -> str:
 
 
 def reading_inputs(given: int, names: Sequence[str]) -> str:
-    return (
-        f"{given} inputs do not fit the names {', '.join(names) or '(none)'}: give one name an "
-        "input, and no formulas where the reading is to be evaluated."
-    )
+    return (f"{given} inputs do not fit the names {', '.join(names) or '(none)'}: give one name an "
+            "input, and no formulas where the reading is to be evaluated.")
 
 
 def network_without_inputs() -> str:
@@ -71,10 +69,8 @@ def not_a_network(path: str) -> str:
 
 
 def extract_columns(names: Sequence[str], known: Sequence[str]) -> str:
-    return (
-        f"The data have no columns {', '.join(names)}; they have {', '.join(known)}. Name the "
-        "inputs with --input and the output with --output."
-    )
+    return (f"The data have no columns {', '.join(names)}; they have {', '.join(known)}. Name the "
+            "inputs with --input and the output with --output.")
 
 
 def nothing_to_push() -> str:

@@ -39,10 +39,8 @@ def conceal_sigma(sigma: float) -> str:
 
 
 def conceal_truth_inside(truth: str, folder: str) -> str:
-    return (
-        f"The truth '{short(truth, 200)}' would lie inside '{short(folder, 200)}', which is to "
-        "be given away: choose a place outside."
-    )
+    return (f"The truth '{short(truth, 200)}' would lie inside '{short(folder, 200)}', which is to "
+            "be given away: choose a place outside.")
 
 
 def conceal_taken(place: str) -> str:
@@ -52,10 +50,8 @@ def conceal_taken(place: str) -> str:
 
 
 def conceal_other_settings(place: str) -> str:
-    return (
-        f"'{short(place, 200)}' belongs to an unfinished set made with other settings: repeat "
-        "those to finish it, or remove it."
-    )
+    return (f"'{short(place, 200)}' belongs to an unfinished set made with other settings: repeat "
+            "those to finish it, or remove it.")
 
 
 

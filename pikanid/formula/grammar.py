@@ -72,9 +72,8 @@ def _tokens(text: str) -> tuple[str, ...]:
     if len(text) > _LONGEST:
         raise errors.BadUnit(errors.unknown_unit(text))
     # A superscript is a power without its sign: m² is m^2.
-    plain = re.sub(
-        "[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+", lambda found: "^" + found[0].translate(_SUPERSCRIPTS), text.strip()
-    )
+    plain = re.sub("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+", lambda found: "^" + found[0].translate(_SUPERSCRIPTS),
+                   text.strip())
     tokens: list[str] = []
     position = 0
     while position < len(plain):
@@ -135,9 +134,8 @@ class _Reader:
         """A number, or a number or fraction in parentheses: 2, -2, 0.5, (1/2)."""
         inside, stop = self.at(position), position + 1
         if inside == "(":
-            stop = next(
-                (k for k in range(position, len(self.tokens)) if self.at(k) == ")"), position
-            )
+            stop = next((k for k in range(position, len(self.tokens)) if self.at(k) == ")"),
+                        position)
             inside, stop = "".join(self.tokens[position + 1 : stop]), stop + 1
         if not _POWER.fullmatch(inside):
             raise self.failure()

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 
 # Already in normal form: these cost no import of pint (0.4 s).
 _PLAIN = frozenset(
-    ["", "1", "s", "m", "rad", "deg", "V", "N", "kg", "m/s", "m/s^2", "rad/s", "rad/s^2"]
-)
+    ["", "1", "s", "m", "rad", "deg", "V", "N", "kg", "m/s", "m/s^2", "rad/s", "rad/s^2"])
 _COHERENT = frozenset([
     "m", "s", "kg", "A", "K", "mol", "cd", "rad", "sr", "Hz", "N", "Pa", "J", "W", "C", "V", "F",
     "ohm", "Ω", "S", "Wb", "T", "H", "lm", "lx", "Bq", "Gy"])  # fmt: skip
@@ -209,10 +208,8 @@ def measure(text: str) -> Measure:
         raise errors.BadUnit(errors.unit_without_size(text))
     kind = {str(name): Fraction(float(power.real)).limit_denominator(1000)
             for name, power in unit.dimensionality.items() if power}
-    return Measure(
-        tuple(found.items()), tuple(sorted(kind.items())), one,
-        normal if normal in _OFFSET else "",
-    )
+    return Measure(tuple(found.items()), tuple(sorted(kind.items())), one,
+                   normal if normal in _OFFSET else "")
 
 
 @lru_cache(maxsize=512)
@@ -261,9 +258,8 @@ def _unit(normal: str, delta: bool = False) -> pint.Unit:
 def _fitting(source: str, target: str, a: pint.Unit, b: pint.Unit) -> tuple[pint.Unit, pint.Unit]:
     # pint takes 1 Hz for 1 rad/s; whether a cycle or a radian is meant makes a factor of 2 pi.
     cycles = any(
-        "Hz" in x and "rad" in y and "Hz" not in y and not re.search("rad|deg|turn", x)
-        for x, y in ((source, target), (target, source))
-    )
+        "Hz" in x and "rad" in y and "Hz" not in y and not re.search("rad|deg|turn", x) for x,
+        y in ((source, target), (target, source)))
     if cycles or not a.is_compatible_with(b):
         raise errors.BadUnit(errors.units_differ(source, target))
     return a, b

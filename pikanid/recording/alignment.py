@@ -16,9 +16,8 @@ from pikanid.recording.channel import Array, Channel
 from pikanid.recording.recording import Recording
 
 
-def energy_delay(
-    recording: Recording, signal: str, motion: Sequence[Sequence[str]], step: float | None = None
-) -> float:
+def energy_delay(recording: Recording, signal: str, motion: Sequence[Sequence[str]],
+                 step: float | None = None) -> float:
     """How far a signal lags behind the motion that causes it [s], by the energies of both.
 
     The delay is where the cross-correlation ∫ E(t) y²(t + τ) dt of the motion's energy E with that

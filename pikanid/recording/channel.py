@@ -64,14 +64,12 @@ class Channel:
             if not isinstance(given, str | None):
                 kind = type(given).__name__
                 raise errors.BadUnit(
-                    errors.not_of_kind(f"The unit of channel '{self.name}'", kind, "text")
-                )
+                    errors.not_of_kind(f"The unit of channel '{self.name}'", kind, "text"))
             object.__setattr__(self, "unit", (self.unit or "").strip())
             units.check(self.unit, f"channel '{self.name}'")
         if len(self.time) != len(self.values):
             raise errors.BadRecording(
-                errors.lengths_differ(self.name, len(self.time), len(self.values))
-            )
+                errors.lengths_differ(self.name, len(self.time), len(self.values)))
         if self.hold is not None and self.hold not in get_args(Hold):
             raise errors.BadSetting(errors.unknown_hold(self.name, self.hold))
         if self.sigma is not None:
@@ -84,8 +82,7 @@ class Channel:
         array = _numbers(sigma, self.name, "sigma")
         if array.shape not in ((), self.values.shape):
             raise errors.BadRecording(
-                errors.lengths_differ(self.name, len(self.values), array.size, "sigmas")
-            )
+                errors.lengths_differ(self.name, len(self.values), array.size, "sigmas"))
         # A sigma may be missing only where its sample is missing.
         used = array if array.ndim == 0 else array[np.isfinite(self.values)]
         if not np.all(np.isfinite(used) & (used > 0)):
@@ -99,8 +96,7 @@ class Channel:
         if not isinstance(other, Channel):
             return NotImplemented
         return all(
-            _same(getattr(self, field.name), getattr(other, field.name)) for field in fields(self)
-        )
+            _same(getattr(self, field.name), getattr(other, field.name)) for field in fields(self))
 
     __hash__ = None  # type: ignore[assignment]  # equal by content, which no hash should walk
 
@@ -173,8 +169,7 @@ def check_times(channel: Channel, where: str) -> None:
     if back.size:
         k = int(back[0]) + 1
         raise errors.BadRecording(
-            errors.time_not_rising(where, f"sample {k + 1}", time[k], time[k - 1])
-        )
+            errors.time_not_rising(where, f"sample {k + 1}", time[k], time[k - 1]))
 
 
 def check_values(channel: Channel, where: str, missing_allowed: bool) -> None:
@@ -188,8 +183,7 @@ def check_values(channel: Channel, where: str, missing_allowed: bool) -> None:
     gaps = np.flatnonzero(np.isnan(values))
     if gaps.size and not missing_allowed:
         raise errors.BadRecording(
-            errors.missing_input(where, channel.name, gaps[0] + 1, channel.time[gaps[0]])
-        )
+            errors.missing_input(where, channel.name, gaps[0] + 1, channel.time[gaps[0]]))
     if len(values) - gaps.size < 2:
         raise errors.BadRecording(errors.too_short(where, channel.name, len(values) - gaps.size))
 
@@ -212,15 +206,8 @@ def summary(ch: Channel) -> tuple[str, ...]:
     gaps = len(ch) - finite.size
     rate = f"every {ch.interval:.6g} s" if ch.uniform else "uneven times"
     sigma = "" if ch.sigma is None else f"sigma {np.median(ch.sigma):.3g}"
-    return (
-        ch.name,
-        f"[{ch.unit}]" if ch.unit else "",
-        f"{len(ch)} samples, {rate}",
-        span,
-        f"{gaps} missing" if gaps else "",
-        f"hold {ch.hold}" if ch.hold else "",
-        sigma,
-    )
+    return (ch.name, f"[{ch.unit}]" if ch.unit else "", f"{len(ch)} samples, {rate}", span,
+            f"{gaps} missing" if gaps else "", f"hold {ch.hold}" if ch.hold else "", sigma)
 
 
 def _numbers(values: ArrayLike, name: str, what: str) -> Array:

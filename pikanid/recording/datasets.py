@@ -54,9 +54,7 @@ SLOSH_MOTIONS = tuple(origins.SLOSH_CHECKSUMS)
 _COMMANDED = 0.02  # numerical: [s] window of derivatives: a commanded pose has no noise
 
 
-def single_pendulum(
-    part: Literal["train", "held_out", "all"] = "train",
-) -> tuple[Recording, ...]:
+def single_pendulum(part: Literal["train", "held_out", "all"] = "train") -> tuple[Recording, ...]:
     """The free swing of one arm of a pendulum rig, in six pieces of 9.2 s that follow each other.
 
     Channels: ``theta`` [rad], measured from hanging, and ``theta_dot`` [rad/s], the authors'
@@ -82,8 +80,7 @@ def single_pendulum(
                     arrays[f"Time_{kind}.{k}"].ravel(),
                     {"theta": theta - np.pi, "theta_dot": theta_dot},
                     {"theta": "rad", "theta_dot": "rad/s"},
-                    name=f"single pendulum, {'training' if kind == 'id' else 'held out'} {k}",
-                )
+                    name=f"single pendulum, {'training' if kind == 'id' else 'held out'} {k}")
             )
     return tuple(pieces)
 
@@ -99,12 +96,9 @@ def single_pendulum_free_swing() -> Recording:
     """
     origin = origins.FREE_SWING
     arrays = mat.arrays(_content(origin), origin.name)
-    return Recording.from_arrays(
-        arrays["Theta1.time"].ravel(),
-        {"theta": arrays["Theta1.signals.values"].ravel() - np.pi},
-        {"theta": "rad"},
-        name="single pendulum, free swing",
-    )
+    return Recording.from_arrays(arrays["Theta1.time"].ravel(),
+                                 {"theta": arrays["Theta1.signals.values"].ravel() - np.pi},
+                                 {"theta": "rad"}, name="single pendulum, free swing")
 
 
 def silverbox(
@@ -130,9 +124,7 @@ def silverbox(
     return Recording.from_arrays(
         np.arange(stop - start) / _SILVERBOX_RATE,
         {"u": arrays["V1"].ravel()[start:stop], "y": arrays["V2"].ravel()[start:stop]},
-        {"u": "V", "y": "V"},
-        name=f"Silverbox, {part.replace('_', ' ')}",
-    )
+        {"u": "V", "y": "V"}, name=f"Silverbox, {part.replace('_', ' ')}")
 
 
 def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:
@@ -157,9 +149,8 @@ def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:
     rows, _ = spreadsheet.cells(_content(origin), origin.name, name)
     table = np.array(rows[1:], dtype=float)
     t, h, v = table[table[:, 0] == drop, 1:4].T
-    return Recording.from_arrays(
-        t, {"h": h, "v": v}, {"h": "m", "v": "m/s"}, name=f"{name}, drop {drop}"
-    )
+    return Recording.from_arrays(t, {"h": h, "v": v}, {"h": "m", "v": "m/s"},
+                                 name=f"{name}, drop {drop}")
 
 
 def slosh_lar(name: str = "LE_2D_0m_5s_900deg") -> Recording:
@@ -184,13 +175,9 @@ def slosh_lar(name: str = "LE_2D_0m_5s_900deg") -> Recording:
     names = ("x", "y", "z", "qx", "qy", "qz", "qw")
     arrays = mat.arrays(_content(heights), heights.name)
     h = Channel("h", arrays["slosh_times"].ravel(), arrays["slosh_heights"].ravel(), "mm")
-    carried = Recording.from_arrays(
-        t,
-        dict(zip(names, pose, strict=True)),
-        {key: "m" for key in names[:3]},
-        hold={key: "first" for key in names},
-        name=name,
-    )
+    carried = Recording.from_arrays(t, dict(zip(names, pose, strict=True)),
+                                    {key: "m" for key in names[:3]},
+                                    hold={key: "first" for key in names}, name=name)
     note = "The heights lag behind the motion by an unknown 6 to 20 s: estimate the delay."
     return replace(carried.with_channels(h), notes=(note,))
 
@@ -240,18 +227,12 @@ def _downloaded(origin: Origin) -> Path:
     cache = Path(pooch.os_cache("pikanid")) / Path(origin.local).parent
     try:
         return Path(
-            pooch.retrieve(
-                origin.url,
-                known_hash=f"sha256:{origin.sha256}",
-                fname=origin.name,
-                path=cache,
-                downloader=pooch.HTTPDownloader(timeout=(5, 60)),
-            )
+            pooch.retrieve(origin.url, known_hash=f"sha256:{origin.sha256}", fname=origin.name,
+                           path=cache, downloader=pooch.HTTPDownloader(timeout=(5, 60)))
         )
     except (RequestException, OSError, ValueError):
         raise errors.DatasetUnavailable(
-            errors.dataset_missing(origin.local, origin.url, FOLDER)
-        ) from None
+            errors.dataset_missing(origin.local, origin.url, FOLDER)) from None
 
 
 def _checked(path: Path, origin: Origin) -> bytes:

@@ -24,13 +24,8 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 _DEGREE = 4  # numerical: of the polynomials: unbiased up to the 4th derivative of the motion
 
 
-def derivative(
-    channel: Channel,
-    order: int = 2,
-    method: Method = "spline",
-    window: float | None = None,
-    smoothing: float | None = None,
-) -> Channel:
+def derivative(channel: Channel, order: int = 2, method: Method = "spline",
+               window: float | None = None, smoothing: float | None = None) -> Channel:
     """The `order`-th time derivative of a recorded signal, at its own sample times.
 
     Args:
@@ -104,13 +99,8 @@ def _local_polynomials(channel: Channel, order: int, window: float | None) -> tu
     return np.asarray(values, dtype=float), float(np.sqrt(np.sum(np.asarray(taps) ** 2)))
 
 
-def with_acceleration(
-    recording: Recording,
-    channels: Mapping[str, str],
-    method: Method = "spline",
-    window: float | None = None,
-    smoothing: float | None = None,
-) -> Recording:
+def with_acceleration(recording: Recording, channels: Mapping[str, str], method: Method = "spline",
+                      window: float | None = None, smoothing: float | None = None) -> Recording:
     """A recording with accelerations derived from its positions.
 
     Args:
@@ -130,8 +120,7 @@ def with_acceleration(
         made = replace(derivative(recording[old], 2, method, window, smoothing), name=new)
         recording = replace(
             recording.with_channels(made),
-            notes=(*recording.notes, f"Acceleration '{new}' is derived from '{old}' by {how}."),
-        )
+            notes=(*recording.notes, f"Acceleration '{new}' is derived from '{old}' by {how}."))
     return recording
 
 
@@ -160,16 +149,12 @@ def to_body(vectors: Array, quaternions: Array) -> Array:
     if wrong.size:
         raise errors.BadRecording(errors.bad_quaternion(int(wrong[0]) + 1))
     return np.asarray(Rotation.from_quat(quaternions).inv().apply(vectors), dtype=float).reshape(
-        len(quaternions), 3
-    )
+        len(quaternions), 3)
 
 
-def gravity_along_body(
-    recording: Recording,
-    quaternion: Sequence[str] = QUATERNION,
-    names: Sequence[str] = ("g_x", "g_y", "g_z"),
-    g: float = GRAVITY,
-) -> Recording:
+def gravity_along_body(recording: Recording, quaternion: Sequence[str] = QUATERNION,
+                       names: Sequence[str] = ("g_x", "g_y", "g_z"),
+                       g: float = GRAVITY) -> Recording:
     """A recording with the gravity vector in body axes, from the attitude of a tilted pose.
 
     Upright, (g_x, g_y, g_z) = (0, 0, -g).
@@ -189,15 +174,11 @@ def gravity_along_body(
     return _with_vector(recording, time, to_body(np.array([0.0, 0.0, -g]), q), names)
 
 
-def acceleration_along_body(
-    recording: Recording,
-    position: Sequence[str] = ("x", "y", "z"),
-    quaternion: Sequence[str] = QUATERNION,
-    names: Sequence[str] = ("u_x", "u_y", "u_z"),
-    method: Method = "spline",
-    window: float | None = None,
-    smoothing: float | None = None,
-) -> Recording:
+def acceleration_along_body(recording: Recording, position: Sequence[str] = ("x", "y", "z"),
+                            quaternion: Sequence[str] = QUATERNION,
+                            names: Sequence[str] = ("u_x", "u_y", "u_z"), method: Method = "spline",
+                            window: float | None = None,
+                            smoothing: float | None = None) -> Recording:
     """A recording with the acceleration of a pose's origin, in the axes of the moving body.
 
     Together with `gravity_along_body` this is what drives a liquid in a tilted container: a - g
@@ -214,13 +195,8 @@ def acceleration_along_body(
     """
     time, q = _stacked(recording, quaternion)
     fixed = [
-        derivative(
-            recording[key].converted("m") if recording[key].unit else recording[key],
-            2,
-            method,
-            window,
-            smoothing,
-        )
+        derivative(recording[key].converted("m") if recording[key].unit else recording[key], 2,
+                   method, window, smoothing)
         for key in position
     ]
     if any(not np.array_equal(ch.time, time) for ch in fixed):
@@ -229,11 +205,8 @@ def acceleration_along_body(
     return _with_vector(recording, time, turned, names)
 
 
-def attitude_angles(
-    recording: Recording,
-    quaternion: Sequence[str] = QUATERNION,
-    names: Sequence[str] = ("tilt_x", "tilt_y", "heading"),
-) -> Recording:
+def attitude_angles(recording: Recording, quaternion: Sequence[str] = QUATERNION,
+                    names: Sequence[str] = ("tilt_x", "tilt_y", "heading")) -> Recording:
     """A recording with the angles by which a body's axis leans, and by which it has turned [rad].
 
     With the body's axis u in fixed axes: tilt_x = atan2(-u_y, u_z) about the fixed x axis, tilt_y =
@@ -266,9 +239,8 @@ def _stacked(recording: Recording, names: Sequence[str]) -> tuple[Array, Array]:
     return parts[0].time, np.column_stack([ch.values for ch in parts])
 
 
-def _with_vector(
-    recording: Recording, time: Array, vectors: Array, names: Sequence[str]
-) -> Recording:
+def _with_vector(recording: Recording, time: Array, vectors: Array,
+                 names: Sequence[str]) -> Recording:
     return recording.with_channels(
         *(Channel(name, time, vectors[:, k], "m/s^2", hold="first") for k, name in enumerate(names))
     )

@@ -61,8 +61,7 @@ class Operations(ABC):
         cut = {key: resampling.window(ch, a, b) for key, ch in self.channels.items()}
         if not any(map(len, cut.values())):
             raise errors.BadRecording(
-                errors.outside_the_record(self.name, a, b, self.start, self.stop)
-            )
+                errors.outside_the_record(self.name, a, b, self.start, self.stop))
         return self._with(cut)
 
     def split(self, at: float) -> tuple[Self, Self]:
@@ -151,8 +150,7 @@ class Operations(ABC):
         for ch in channels:
             if not isinstance(ch, Channel):
                 raise errors.BadRecording(
-                    errors.not_of_kind("What is added", type(ch).__name__, "a Channel")
-                )
+                    errors.not_of_kind("What is added", type(ch).__name__, "a Channel"))
         return self._with({**self.channels, **{ch.name: ch for ch in channels}})
 
     def without(self, *names: str) -> Self:
@@ -166,9 +164,8 @@ class Operations(ABC):
             self[key]
         return self._with({key: ch for key, ch in self.channels.items() if key not in names})
 
-    def with_sigma(
-        self, sigma: Mapping[str, Any] | None = None, /, **more: ArrayLike | None
-    ) -> Self:
+    def with_sigma(self, sigma: Mapping[str, Any] | None = None, /,
+                   **more: ArrayLike | None) -> Self:
         """With noise standard deviations; None takes one away.
 
         Numbers are in the channels' own units, texts may carry one: ``"0.1deg"``.

@@ -44,33 +44,21 @@ class Origin:
 
 
 SINGLE_PENDULUM = Origin(
-    "dynamicslab/MultiArm-Pendulum",
-    "e99a7e13fe2adc8fc647321a156b6cb59a48a698",
+    "dynamicslab/MultiArm-Pendulum", "e99a7e13fe2adc8fc647321a156b6cb59a48a698",
     "ParameterEstimation/SinglePendulum/SinglePendulumDataForParameterEstimation.mat",
     "single_pendulum_uw/SinglePendulumDataForParameterEstimation.mat",
-    "f3b8cdda4a6e86405ec37ff32b98be76fd37806a609cba7870628c1e40377a98",
-)
-FREE_SWING = Origin(
-    SINGLE_PENDULUM.repository,
-    SINGLE_PENDULUM.commit,
-    "Datas/SinglePendulum/SingleDataFreeSwing_1_Dt_0_0001.mat",
-    "single_pendulum_uw/SingleDataFreeSwing_1_Dt_0_0001.mat",
-    "5e6272350a91fb9fb99b6949bc49e3e63e21af977cc1f777310f5d8e9b0fc7e7",
-)
-SILVERBOX = Origin(
-    "biaslab/nsi-silverbox",
-    "728f07e4539d4f7da76a4778b52a756260b488ac",
-    "data/Silverbox/SNLS80mV.mat",
-    "silverbox/SNLS80mV.mat",
-    "5c7413a52255af0cb4e2f93fb6903beb92b08965ba1e6ad0a6ffedfed8477ed4",
-)
-FALLING_BALLS = Origin(
-    "briandesilva/discovery-of-physics-from-data",
-    "b79c34317f049c9b47aaf2cc4c54c5ec7219f3d7",
-    "data/Ball_drops_data.xls",
-    "falling_balls/Ball_drops_data.xls",
-    "942b2d68abfff3828ca323de491435d4ec27c3a22e62cee0cbdf52c2e8d1c0ed",
-)
+    "f3b8cdda4a6e86405ec37ff32b98be76fd37806a609cba7870628c1e40377a98")
+FREE_SWING = Origin(SINGLE_PENDULUM.repository, SINGLE_PENDULUM.commit,
+                    "Datas/SinglePendulum/SingleDataFreeSwing_1_Dt_0_0001.mat",
+                    "single_pendulum_uw/SingleDataFreeSwing_1_Dt_0_0001.mat",
+                    "5e6272350a91fb9fb99b6949bc49e3e63e21af977cc1f777310f5d8e9b0fc7e7")
+SILVERBOX = Origin("biaslab/nsi-silverbox", "728f07e4539d4f7da76a4778b52a756260b488ac",
+                   "data/Silverbox/SNLS80mV.mat", "silverbox/SNLS80mV.mat",
+                   "5c7413a52255af0cb4e2f93fb6903beb92b08965ba1e6ad0a6ffedfed8477ed4")
+FALLING_BALLS = Origin("briandesilva/discovery-of-physics-from-data",
+                       "b79c34317f049c9b47aaf2cc4c54c5ec7219f3d7", "data/Ball_drops_data.xls",
+                       "falling_balls/Ball_drops_data.xls",
+                       "942b2d68abfff3828ca323de491435d4ec27c3a22e62cee0cbdf52c2e8d1c0ed")
 
 BALLS = (
     "Baseball",
@@ -165,20 +153,10 @@ def slosh(name: str) -> tuple[Origin, Origin]:
     repository, commit, folder = _SLOSH
     motion, heights = SLOSH_CHECKSUMS[name]
     return (
-        Origin(
-            repository,
-            commit,
-            f"{folder}/csv/{name}.csv",
-            f"slosh_lar/motions/{name}.csv",
-            motion,
-        ),
-        Origin(
-            repository,
-            commit,
-            f"{folder}/full_slosh/{name}.mat",
-            f"slosh_lar/full_slosh/{name}.mat",
-            heights,
-        ),
+        Origin(repository, commit, f"{folder}/csv/{name}.csv", f"slosh_lar/motions/{name}.csv",
+               motion),
+        Origin(repository, commit, f"{folder}/full_slosh/{name}.mat",
+               f"slosh_lar/full_slosh/{name}.mat", heights),
     )
 
 

@@ -60,15 +60,10 @@ class Recording(Leaving):
         object.__setattr__(self, "notes", tuple(self.notes))
 
     @classmethod
-    def from_arrays(
-        cls,
-        t: ArrayLike,
-        values: Mapping[str, ArrayLike],
-        units: Mapping[str, str] | None = None,
-        sigma: Mapping[str, ArrayLike] | None = None,
-        hold: Mapping[str, Hold] | None = None,
-        name: str = "recording",
-    ) -> Recording:
+    def from_arrays(cls, t: ArrayLike, values: Mapping[str, ArrayLike],
+                    units: Mapping[str, str] | None = None,
+                    sigma: Mapping[str, ArrayLike] | None = None,
+                    hold: Mapping[str, Hold] | None = None, name: str = "recording") -> Recording:
         """A recording of arrays that share one time base.
 
         Args:
@@ -107,14 +102,10 @@ class Recording(Leaving):
         return cls(made, name)
 
     @classmethod
-    def from_frame(
-        cls,
-        frame: pd.DataFrame,
-        columns: Mapping[str, str | int] | None = None,
-        units: Mapping[str, str] | None = None,
-        sigma: Mapping[str, ArrayLike] | None = None,
-        name: str = "recording",
-    ) -> Recording:
+    def from_frame(cls, frame: pd.DataFrame, columns: Mapping[str, str | int] | None = None,
+                   units: Mapping[str, str] | None = None,
+                   sigma: Mapping[str, ArrayLike] | None = None,
+                   name: str = "recording") -> Recording:
         """A recording of a DataFrame; its times are a column or an index called t or time.
 
         Headers may carry units, as those of a file: ``"theta [deg]"``, ``"t [h]"``.  Dates count
@@ -145,18 +136,11 @@ class Recording(Leaving):
         return rec.with_sigma(sigma) if sigma else rec
 
     @classmethod
-    def read(
-        cls,
-        path: str | os.PathLike[str],
-        columns: Mapping[str, str | int] | None = None,
-        rate: float | None = None,
-        sheet: str | int | None = None,
-        units: Mapping[str, str] | None = None,
-        sigma: Mapping[str, ArrayLike] | None = None,
-        delimiter: str | None = None,
-        decimal: str | None = None,
-        name: str | None = None,
-    ) -> Recording:
+    def read(cls, path: str | os.PathLike[str], columns: Mapping[str, str | int] | None = None,
+             rate: float | None = None, sheet: str | int | None = None,
+             units: Mapping[str, str] | None = None, sigma: Mapping[str, ArrayLike] | None = None,
+             delimiter: str | None = None, decimal: str | None = None,
+             name: str | None = None) -> Recording:
         """Read a file of a format in `pikanid.recording.formats`: CSV, Excel, Parquet, ...
 
         Args:
@@ -185,12 +169,8 @@ class Recording(Leaving):
         from pikanid.recording import reading
 
         found = reading.read(path, columns, rate, sheet, units, delimiter, decimal)
-        rec = cls(
-            {ch.name: ch for ch in found.channels},
-            name or found.stem,
-            found.notes,
-            found.unreadable,
-        )
+        rec = cls({ch.name: ch for ch in found.channels}, name or found.stem, found.notes,
+                  found.unreadable)
         return rec.with_sigma(sigma) if sigma else rec
 
     @classmethod
@@ -213,12 +193,9 @@ class Recording(Leaving):
                 if key in together:
                     raise errors.BadRecording(errors.channel_twice(key, rec.name))
                 together[key] = ch
-        return cls(
-            together,
-            name or (recordings[0].name if recordings else "recording"),
-            tuple(note for rec in recordings for note in rec.notes),
-            {key: why for rec in recordings for key, why in rec.unreadable.items()},
-        )
+        return cls(together, name or (recordings[0].name if recordings else "recording"),
+                   tuple(note for rec in recordings for note in rec.notes),
+                   {key: why for rec in recordings for key, why in rec.unreadable.items()})
 
     # --- looking ---------------------------------------------------------------------------------
 

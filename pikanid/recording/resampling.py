@@ -16,9 +16,8 @@ from pikanid import errors
 from pikanid.recording.channel import ROUNDING, Array, Channel, Hold
 
 
-def held(
-    time: ArrayLike, values: ArrayLike, at: ArrayLike, hold: Hold = "zero", side: str = "right"
-) -> Array:
+def held(time: ArrayLike, values: ArrayLike, at: ArrayLike, hold: Hold = "zero",
+         side: str = "right") -> Array:
     """A sampled signal between its samples.
 
     Args:
@@ -118,12 +117,8 @@ def filtered_stride(channel: Channel, n: int, where: str) -> Channel:
 
 def _pick(channel: Channel, mask: np.ndarray) -> Channel:
     sigma = channel.sigma
-    return replace(
-        channel,
-        time=channel.time[mask],
-        values=channel.values[mask],
-        sigma=sigma[mask] if isinstance(sigma, np.ndarray) else sigma,
-    )
+    return replace(channel, time=channel.time[mask], values=channel.values[mask],
+                   sigma=sigma[mask] if isinstance(sigma, np.ndarray) else sigma)
 
 
 def _with_sample(kept: Channel, at: float, whole: Channel) -> Channel:
@@ -132,9 +127,5 @@ def _with_sample(kept: Channel, at: float, whole: Channel) -> Channel:
     sigma = kept.sigma
     if isinstance(sigma, np.ndarray):
         sigma = np.insert(sigma, place, held(whole.time, np.asarray(whole.sigma), at))
-    return replace(
-        kept,
-        time=np.insert(kept.time, place, at),
-        values=np.insert(kept.values, place, value),
-        sigma=sigma,
-    )
+    return replace(kept, time=np.insert(kept.time, place, at),
+                   values=np.insert(kept.values, place, value), sigma=sigma)

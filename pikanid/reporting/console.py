@@ -32,15 +32,9 @@ def console(stream: TextIO | None = None) -> Console:
 
     file = sys.stdout if stream is None else stream
     lively = file.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-    return Console(
-        file=file,
-        color_system="auto" if lively else None,
-        force_terminal=None if lively else False,
-        no_color=not lively,
-        width=None if file.isatty() else PIPE_WIDTH,
-        highlight=False,
-        emoji=False,
-    )
+    return Console(file=file, color_system="auto" if lively else None,
+                   force_terminal=None if lively else False, no_color=not lively,
+                   width=None if file.isatty() else PIPE_WIDTH, highlight=False, emoji=False)
 
 
 def sentence(text: str) -> str:

@@ -25,17 +25,9 @@ def blank_kan(plan: KanPlan, kind: type, device: str = "cpu") -> Any:
     with undisturbed():
         # One interval is enough to construct: pykan's own start is a dense least-squares solve
         # in the default dtype, and both are replaced right below.
-        kan = kind(
-            width=[list(layer) for layer in plan.width],
-            grid=1,
-            k=plan.k,
-            mult_arity=arity,
-            base_fun=plan.base,
-            sp_trainable=False,
-            sb_trainable=plan.base != "zero",
-            auto_save=False,
-            device=device,
-        ).double()
+        kan = kind(width=[list(layer) for layer in plan.width], grid=1, k=plan.k, mult_arity=arity,
+                   base_fun=plan.base, sp_trainable=False, sb_trainable=plan.base != "zero",
+                   auto_save=False, device=device).double()
     for layer in range(plan.depth):
         edges, knots = kan.act_fun[layer], plan.knots[layer]
         edges.num = plan.intervals(layer)
@@ -57,8 +49,6 @@ def plan_of(kan: Any) -> KanPlan:
     arity = kan.mult_arity
     return KanPlan(
         width=tuple((int(sums), int(products)) for sums, products in kan.width),
-        k=int(kan.act_fun[0].k),
-        base=kan.base_fun_name,
+        k=int(kan.act_fun[0].k), base=kan.base_fun_name,
         arity=int(arity) if kan.mult_homo else tuple(tuple(map(int, row)) for row in arity),
-        knots=tuple(read(edges.grid) for edges in kan.act_fun),
-    )
+        knots=tuple(read(edges.grid) for edges in kan.act_fun))

@@ -38,19 +38,11 @@ _GUARDED = (
 )
 
 
-def build_kan(
-    width: Sequence[int | Sequence[int]],
-    grid: int | Sequence[int] = 5,
-    k: int = 3,
-    grid_range: Sequence[float] | Sequence[Sequence[float]] = (-1.0, 1.0),
-    *,
-    base: Base = "zero",
-    mult_arity: int | Sequence[Sequence[int]] = 2,
-    seed: int = 0,
-    noise: float = 0.3,
-    start: Literal["noise", "waves"] = "noise",
-    device: str = "cpu",
-) -> Any:
+def build_kan(width: Sequence[int | Sequence[int]], grid: int | Sequence[int] = 5, k: int = 3,
+              grid_range: Sequence[float] | Sequence[Sequence[float]] = (-1.0, 1.0), *,
+              base: Base = "zero", mult_arity: int | Sequence[Sequence[int]] = 2, seed: int = 0,
+              noise: float = 0.3, start: Literal["noise", "waves"] = "noise",
+              device: str = "cpu") -> Any:
     """A pykan `MultKAN` in float64 on uniform knots, made without side effects.
 
     Args:
@@ -112,9 +104,8 @@ def _default_batch(plan: KanPlan, device: str) -> Any:
     return tensor(low + (high - low) * unit, device)
 
 
-def _waves(
-    plan: KanPlan, layer: int, shape: tuple[int, ...], generator: np.random.Generator
-) -> Array:
+def _waves(plan: KanPlan, layer: int, shape: tuple[int, ...],
+           generator: np.random.Generator) -> Array:
     """Coefficients of slow cosines that together fill half of the next layer's grid."""
     inputs, outputs, size = shape
     target = plan.knots[layer + 1][0, plan.k : -plan.k or None]
@@ -123,8 +114,7 @@ def _waves(
     turns = generator.uniform(0.25, 1.0, (inputs, outputs, 1))
     phase = generator.uniform(0.0, 2.0 * np.pi, (inputs, outputs, 1))
     wave = middle / inputs + 0.5 * half / np.sqrt(inputs) * np.cos(
-        2 * np.pi * turns * place + phase
-    )
+        2 * np.pi * turns * place + phase)
     return wave * np.sqrt(inputs)  # scale_sp is 1/sqrt(inputs)
 
 

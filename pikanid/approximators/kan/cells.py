@@ -41,9 +41,8 @@ def cell_polynomials(degree: int, derivatives: int) -> Array:
     return np.ascontiguousarray(table.transpose(2, 0, 1))
 
 
-def local_bases(
-    x: Array, start: Array, step: Array, intervals: int, degree: int, derivatives: int
-) -> tuple[Index, Array]:
+def local_bases(x: Array, start: Array, step: Array, intervals: int, degree: int,
+                derivatives: int) -> tuple[Index, Array]:
     """First active function (M, n) and active values (M, n, derivatives + 1, degree + 1).
 
     Args:
@@ -71,8 +70,7 @@ def local_bases(
         np.multiply(powers[..., power - 1], u, out=powers[..., power])
     table = cell_polynomials(degree, derivatives)
     values = (powers.reshape(-1, degree + 1) @ table.reshape(degree + 1, -1)).reshape(
-        *x.shape, derivatives + 1, degree + 1
-    )
+        *x.shape, derivatives + 1, degree + 1)
     values *= (step[:, None] ** -np.arange(derivatives + 1.0))[:, :, None]
     if inside.all():
         return cell, values

@@ -45,9 +45,8 @@ class KanCurve:
     (62, (2, 62))
     """
 
-    def __init__(
-        self, kan: Any, kinks: Sequence[float | Kink] = (), orders: Sequence[int] | None = None
-    ) -> None:
+    def __init__(self, kan: Any, kinks: Sequence[float | Kink] = (),
+                 orders: Sequence[int] | None = None) -> None:
         self.network = DeepKAN(kan)
         plan = self.network.plan
         full = all(bool(edges.mask.all()) for edges in kan.act_fun)

@@ -74,16 +74,8 @@ class DeepKAN:
             if base is not None:
                 write(edges.scale_base, base)
 
-    def evaluate(
-        self,
-        x: Array,
-        coefficients: Array,
-        *,
-        first: Array | None = None,
-        second: Array | None = None,
-        order: int = 2,
-        jacobian: bool = False,
-    ) -> KanJet:
+    def evaluate(self, x: Array, coefficients: Array, *, first: Array | None = None,
+                 second: Array | None = None, order: int = 2, jacobian: bool = False) -> KanJet:
         """Outputs and their derivatives along a path through the inputs.
 
         Args:
@@ -160,9 +152,7 @@ class DeepKAN:
             _, jet = self._forward(layer, jet, coef, base, slopes=False)
         return tuple(places)
 
-    def _swept(
-        self, jet: Array, coefficients: Array, *, slopes: bool
-    ) -> tuple[list[Sweep], Array]:
+    def _swept(self, jet: Array, coefficients: Array, *, slopes: bool) -> tuple[list[Sweep], Array]:
         """The forward sweep through all layers."""
         sweeps = []
         for layer, (coef, base) in zip(self._layers, self._split(coefficients), strict=True):
@@ -183,9 +173,8 @@ class DeepKAN:
             adjoint = matrix_product(adjoint, sweep.slope.swapaxes(-1, -2))
         return adjoint
 
-    def _forward(
-        self, layer: Layer, jet: Array, coef: Array, base: Array | None, *, slopes: bool
-    ) -> tuple[Sweep, Array]:
+    def _forward(self, layer: Layer, jet: Array, coef: Array, base: Array | None, *,
+                 slopes: bool) -> tuple[Sweep, Array]:
         order, k = jet.shape[0] - 1, self.plan.k
         first, bases = local_bases(jet[0], *layer.knots, layer.intervals, k, order + slopes)
         rows = np.arange(coef.shape[0])[:, None]
@@ -225,10 +214,8 @@ class DeepKAN:
         rows = np.arange(inputs)[None, :, None]
         for d, part in enumerate(edge_parts(adjoint, sweep)):
             block[d][points, :, rows, :, window] = part * layer.scale[:, None, None]
-        self._fill_base(
-            table[..., start + inputs * outputs * size :][..., : inputs * outputs],
-            layer, adjoint, sweep,
-        )
+        self._fill_base(table[..., start + inputs * outputs * size :][..., : inputs * outputs],
+                        layer, adjoint, sweep)
 
     def _fill_base(self, rest: Array, layer: Layer, adjoint: Array, sweep: Sweep) -> None:
         """The columns of one layer's scale_base, if there are any."""

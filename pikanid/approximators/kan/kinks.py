@@ -44,9 +44,8 @@ class KinkTable:
             near = knots[right : end + k + 1]
             self.beside[number, k : k + end - right] = power_blossom(near, k, time, order)
 
-    def entries(
-        self, t: Array, first: Index, rows: Array, derivative: int
-    ) -> tuple[Index, Index, Array]:
+    def entries(self, t: Array, first: Index, rows: Array,
+                derivative: int) -> tuple[Index, Index, Array]:
         """Where kinks are not zero: time (P,), kink (P,) and value (P,).
 
         ``first`` and ``rows`` are the active splines' (M,) and (M, k + 1) of `spline_rows`.

@@ -55,12 +55,6 @@ def read_layer(kan: Any, plan: KanPlan, number: int) -> Layer:
     for factors in plan.factors(number + 1):
         groups.append(tuple(range(at, at + factors)))
         at += factors
-    return Layer(
-        (start, step),
-        intervals,
-        mask * read(edges.scale_sp),
-        mask,
-        (read(kan.subnode_scale[number]), read(kan.subnode_bias[number])),
-        (read(kan.node_scale[number]), read(kan.node_bias[number])),
-        tuple(groups),
-    )
+    return Layer((start, step), intervals, mask * read(edges.scale_sp), mask,
+                 (read(kan.subnode_scale[number]), read(kan.subnode_bias[number])),
+                 (read(kan.node_scale[number]), read(kan.node_bias[number])), tuple(groups))

@@ -71,14 +71,9 @@ def uniform_extended_knots(start: float, stop: float, intervals: int, k: int) ->
     return np.concatenate([before, inner, after])
 
 
-def plan_kan(
-    width: Sequence[int | Sequence[int]],
-    grid: int | Sequence[int],
-    k: int,
-    grid_range: Sequence[float] | Sequence[Sequence[float]],
-    base: Base,
-    mult_arity: int | Sequence[Sequence[int]],
-) -> KanPlan:
+def plan_kan(width: Sequence[int | Sequence[int]], grid: int | Sequence[int], k: int,
+             grid_range: Sequence[float] | Sequence[Sequence[float]], base: Base,
+             mult_arity: int | Sequence[Sequence[int]]) -> KanPlan:
     """Check the arguments of `build_kan` and lay uniform knots.
 
     Raises:
@@ -98,12 +93,9 @@ def plan_kan(
     ranges = np.array(np.broadcast_to(np.asarray(grid_range, dtype=float), (depth, 2)))
     if not np.all(np.isfinite(ranges)) or np.any(ranges[:, 0] >= ranges[:, 1]):
         raise errors.BadSetting(
-            errors.bad_value("grid_range", grid_range, "(start, stop) with start < stop")
-        )
-    knots = tuple(
-        np.tile(uniform_extended_knots(a, b, int(g), int(k)), (sum(layer), 1))
-        for layer, g, (a, b) in zip(layers, grids, ranges, strict=False)
-    )
+            errors.bad_value("grid_range", grid_range, "(start, stop) with start < stop"))
+    knots = tuple(np.tile(uniform_extended_knots(a, b, int(g), int(k)), (sum(layer), 1)) for layer,
+                  g, (a, b) in zip(layers, grids, ranges, strict=False))
     return KanPlan(layers, int(k), base, _arity(mult_arity, layers), knots)
 
 
@@ -123,6 +115,5 @@ def _arity(given: int | Sequence[Sequence[int]], layers: tuple[tuple[int, int], 
     fits = [len(factors) for factors in arity] == [products for _, products in layers]
     if not fits or any(f < 2 for factors in arity for f in factors):
         raise errors.BadSetting(
-            errors.bad_value("mult_arity", given, "a number >= 2 for every product node")
-        )
+            errors.bad_value("mult_arity", given, "a number >= 2 for every product node"))
     return arity

@@ -39,19 +39,12 @@ def scores(kan: Any, x: Array | None = None) -> Scores:
         kan(batch.reshape(len(batch), -1))
         kan.attribute()
         kan.save_act = saving
-    return Scores(
-        tuple(read(score) for score in kan.node_scores),
-        tuple(read(score) for score in kan.edge_scores),
-    )
+    return Scores(tuple(read(score) for score in kan.node_scores),
+                  tuple(read(score) for score in kan.edge_scores))
 
 
-def prune(
-    kan: Any,
-    x: Array | None = None,
-    *,
-    node_threshold: float = 1e-2,
-    edge_threshold: float = 3e-2,
-) -> Any:
+def prune(kan: Any, x: Array | None = None, *, node_threshold: float = 1e-2,
+          edge_threshold: float = 3e-2) -> Any:
     """A new model without hidden nodes, then with masks on edges, that score below a threshold.
 
     The best node of a hidden layer always stays; the model given is left as it is.
@@ -96,34 +89,19 @@ def _subset(state: KanState, kept: list[NDArray[np.int64]]) -> KanState:
         arity.append(tuple(plan.factors(number)[p] for p in products))
         used = [nodes[nodes < sums], *(np.arange(starts[p], starts[p + 1]) for p in products)]
         subnodes.append(np.concatenate(used).astype(np.int64))
-    layers = tuple(
-        _cut(layer, nodes, sub, after)
-        for layer, (nodes, after), sub in zip(
-            state.layers, pairwise(kept), subnodes[1:], strict=True
-        )
-    )
+    layers = tuple(_cut(layer, nodes, sub, after) for layer, (nodes, after),
+                   sub in zip(state.layers, pairwise(kept), subnodes[1:], strict=True))
     factors = state.arity if isinstance(state.arity, int) else tuple(arity)
     return replace(state, width=tuple(width), arity=factors, layers=layers)
 
 
-def _cut(
-    layer: LayerState,
-    inputs: NDArray[np.int64],
-    subnodes: NDArray[np.int64],
-    nodes: NDArray[np.int64],
-) -> LayerState:
+def _cut(layer: LayerState, inputs: NDArray[np.int64], subnodes: NDArray[np.int64],
+         nodes: NDArray[np.int64]) -> LayerState:
     edges, crossed = np.ix_(inputs, subnodes), np.ix_(subnodes, inputs)
     return LayerState(
-        grid=layer.grid[inputs],
-        coef=layer.coef[edges],
-        scale_base=layer.scale_base[edges],
-        scale_sp=layer.scale_sp[edges],
-        mask=layer.mask[edges],
-        node_scale=layer.node_scale[nodes],
-        node_bias=layer.node_bias[nodes],
-        subnode_scale=layer.subnode_scale[subnodes],
-        subnode_bias=layer.subnode_bias[subnodes],
-        symbolic_mask=layer.symbolic_mask[crossed],
+        grid=layer.grid[inputs], coef=layer.coef[edges], scale_base=layer.scale_base[edges],
+        scale_sp=layer.scale_sp[edges], mask=layer.mask[edges], node_scale=layer.node_scale[nodes],
+        node_bias=layer.node_bias[nodes], subnode_scale=layer.subnode_scale[subnodes],
+        subnode_bias=layer.subnode_bias[subnodes], symbolic_mask=layer.symbolic_mask[crossed],
         symbolic_affine=layer.symbolic_affine[crossed],
-        symbols=tuple(tuple(layer.symbols[j][i] for i in inputs) for j in subnodes),
-    )
+        symbols=tuple(tuple(layer.symbols[j][i] for i in inputs) for j in subnodes))

@@ -65,8 +65,7 @@ def refine(kan: Any, grid: int | Sequence[int]) -> Refinement:
             matrix, contained = change_of_knots(old, new, state.k)
             points = np.linspace(new[state.k], new[-state.k - 1], 4 * (old.size + new.size))
             change = _curve(points, new, coef @ matrix.T, state.k) - _curve(
-                points, old, coef, state.k
-            )
+                points, old, coef, state.k)
             worst, exact = max(worst, float(np.abs(change).max())), exact and contained
             coefs.append(coef @ matrix.T)
             knots.append(new)
@@ -167,9 +166,8 @@ def _least_squares(old: Array, new: Array, k: int) -> Array:
     half = 0.5 * np.diff(knots)[:, None]
     points = (knots[:-1, None] + half * (nodes + 1.0)).ravel()
     root = np.sqrt(half * weights).ravel()[:, None]
-    found, *_ = np.linalg.lstsq(
-        root * _design(points, new, k), root * _design(points, old, k), rcond=None
-    )
+    found, *_ = np.linalg.lstsq(root * _design(points, new, k), root * _design(points, old, k),
+                                rcond=None)
     return np.asarray(found, dtype=float)
 
 

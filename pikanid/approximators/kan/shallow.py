@@ -50,9 +50,8 @@ class ShallowKAN:
     (19, (2, 19))
     """
 
-    def __init__(
-        self, kan: Any, kinks: Sequence[float | Kink] = (), orders: Sequence[int] | None = None
-    ) -> None:
+    def __init__(self, kan: Any, kinks: Sequence[float | Kink] = (),
+                 orders: Sequence[int] | None = None) -> None:
         plan = plan_of(kan)
         if plan.depth != 1 or plan.width[0] != (1, 0) or plan.width[1][1]:
             raise errors.BadSetting(errors.kan_not_shallow([list(layer) for layer in plan.width]))
@@ -100,10 +99,8 @@ class ShallowKAN:
     @property
     def kinks(self) -> tuple[Kink, ...]:
         """The enrichments with their present jumps."""
-        return tuple(
-            Kink(time, order, jump.copy(), self.knots, self.degree)
-            for (time, order), jump in zip(self._kinks, self._jumps, strict=True)
-        )
+        return tuple(Kink(time, order, jump.copy(), self.knots, self.degree) for (time, order),
+                     jump in zip(self._kinks, self._jumps, strict=True))
 
     @property
     def kink_columns(self) -> tuple[int, ...]:
@@ -217,17 +214,14 @@ class ShallowKAN:
         slack = 1e-9 * (self.stop - self.start)
         if t.size and (t.min() < self.start - slack or t.max() > self.stop + slack):
             raise errors.BadSetting(
-                errors.kan_outside(float(t.min()), float(t.max()), self.start, self.stop)
-            )
+                errors.kan_outside(float(t.min()), float(t.max()), self.start, self.stop))
         return np.clip(t, self.start, self.stop)
 
-    def _wanted(
-        self, kinks: Sequence[float | Kink], orders: Sequence[int]
-    ) -> list[tuple[float, int]]:
+    def _wanted(self, kinks: Sequence[float | Kink],
+                orders: Sequence[int]) -> list[tuple[float, int]]:
         if any(not 1 <= order <= self.degree for order in orders):
             raise errors.BadSetting(
-                errors.bad_value("the order of a kink", orders, f"1 to {self.degree}")
-            )
+                errors.bad_value("the order of a kink", orders, f"1 to {self.degree}"))
         places: set[tuple[float, int]] = set()
         for kink in kinks:
             if isinstance(kink, Kink):

@@ -65,10 +65,8 @@ def to_state(kan: Any) -> KanState:
     """
     plan = plan_of(kan)
     layers = tuple(
-        LayerState(
-            **{name: read(place) for name, place in _places(kan, number).items()},
-            symbols=tuple(tuple(row) for row in kan.symbolic_fun[number].funs_name),
-        )
+        LayerState(**{name: read(place) for name, place in _places(kan, number).items()},
+                   symbols=tuple(tuple(row) for row in kan.symbolic_fun[number].funs_name))
         for number in range(plan.depth)
     )
     seen = np.empty((0, plan.nodes(0))) if kan.cache_data is None else read(kan.cache_data)
@@ -89,8 +87,7 @@ def restored(state: KanState, kind: type, device: str = "cpu") -> Any:
             values = getattr(layer, name)
             if values.shape != tuple(place.shape) or not np.all(np.isfinite(values)):
                 raise errors.BadSetting(
-                    errors.kan_coefficients(f"{name} {values.shape}", tuple(place.shape))
-                )
+                    errors.kan_coefficients(f"{name} {values.shape}", tuple(place.shape)))
             write(place, values)
         symbolic = kan.symbolic_fun[number]
         for j, row in enumerate(layer.symbols):

@@ -112,13 +112,11 @@ class NextExperiment:
                 f"{self.gain:.3g} times smaller on average than otherwise.")
 
 
-def next_experiment(
-    hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
-    sigma: Sigma = None, candidates: Sequence[Recording] | None = None,
-    bounds: Bounds | None = None, duration: float = 20.0, dt: float = 0.01,
-    limits: Mapping[str, float] | None = None, seed: int = 0, workers: int = 1,
-    settings: Settings = DEFAULTS,
-) -> NextExperiment:
+def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
+                    sigma: Sigma = None, candidates: Sequence[Recording] | None = None,
+                    bounds: Bounds | None = None, duration: float = 20.0, dt: float = 0.01,
+                    limits: Mapping[str, float] | None = None, seed: int = 0, workers: int = 1,
+                    settings: Settings = DEFAULTS) -> NextExperiment:
     """The feasible profile that best separates hypotheses.
 
     Args:
@@ -177,12 +175,10 @@ def next_experiment(
     return _chosen(watch, "separate", worst, refit, known, past, offered, limits, settings)
 
 
-def d_optimal(
-    model: Model, recorded: Sequence[Recording] | Recording = (), sigma: Sigma = None,
-    candidates: Sequence[Recording] | None = None, bounds: Bounds | None = None,
-    duration: float = 20.0, dt: float = 0.01, limits: Mapping[str, float] | None = None,
-    seed: int = 0, settings: Settings = DEFAULTS,
-) -> NextExperiment:
+def d_optimal(model: Model, recorded: Sequence[Recording] | Recording = (), sigma: Sigma = None,
+              candidates: Sequence[Recording] | None = None, bounds: Bounds | None = None,
+              duration: float = 20.0, dt: float = 0.01, limits: Mapping[str, float] | None = None,
+              seed: int = 0, settings: Settings = DEFAULTS) -> NextExperiment:
     """The feasible profile from which a model's free parameters are learnt best.
 
     Arguments and errors as for `next_experiment`.
@@ -211,11 +207,10 @@ def d_optimal(
                    settings)
 
 
-def _chosen(
-    watch: Watch, purpose: Literal["separate", "parameters"], quick: Score,
-    full: Score, known: Mapping[str, list[WhitenedResponse]], past: Sequence[Recording],
-    candidates: Sequence[Recording], limits: Mapping[str, float] | None, settings: Settings,
-) -> NextExperiment:
+def _chosen(watch: Watch, purpose: Literal["separate", "parameters"], quick: Score, full: Score,
+            known: Mapping[str, list[WhitenedResponse]], past: Sequence[Recording],
+            candidates: Sequence[Recording], limits: Mapping[str, float] | None,
+            settings: Settings) -> NextExperiment:
     """The best candidate, ready to run: all are ranked by `quick`, the first of them by `full`."""
     tried = []
     for candidate in candidates:

@@ -12,15 +12,8 @@ from pikanid.recording.excitation.sampling import grid, inputs
 from pikanid.recording.recording import Recording
 
 
-def move(
-    distance: float = 0.1,
-    duration: float = 5.0,
-    dt: float = 0.01,
-    start: float = 0.2,
-    acceleration: float = 1.0,
-    velocity: float = 0.5,
-    channel: str = "u_x",
-) -> Recording:
+def move(distance: float = 0.1, duration: float = 5.0, dt: float = 0.01, start: float = 0.2,
+         acceleration: float = 1.0, velocity: float = 0.5, channel: str = "u_x") -> Recording:
     """One planar-motor move from rest to rest with bounded acceleration and velocity.
 
     Ramp and cruise times are rounded up to the grid and the acceleration is lowered to match, so
@@ -48,16 +41,9 @@ def move(
     return inputs(t, {channel: u}, "m/s^2", "move")
 
 
-def planar_moves(
-    count: int = 6,
-    duration: float = 20.0,
-    dt: float = 0.01,
-    stroke: float = 0.4,
-    acceleration: float = 1.0,
-    velocity: float = 0.5,
-    seed: int = 0,
-    channels: Sequence[str] = ("u_x",),
-) -> Recording:
+def planar_moves(count: int = 6, duration: float = 20.0, dt: float = 0.01, stroke: float = 0.4,
+                 acceleration: float = 1.0, velocity: float = 0.5, seed: int = 0,
+                 channels: Sequence[str] = ("u_x",)) -> Recording:
     """Random planar-motor moves that keep to bounds of stroke, velocity and acceleration.
 
     Args:
@@ -107,9 +93,8 @@ def _steps(distance: float, dt: float, acceleration: float, velocity: float) -> 
     return ramp, cruise
 
 
-def _add_move(
-    u: Array, first: int, distance: float, dt: float, acceleration: float, velocity: float
-) -> None:
+def _add_move(u: Array, first: int, distance: float, dt: float, acceleration: float,
+              velocity: float) -> None:
     ramp, cruise = _steps(distance, dt, acceleration, velocity)
     last = first + 2 * ramp + cruise
     if first < 0 or last > len(u):

@@ -31,6 +31,5 @@ def grid(duration: float, dt: float) -> Array:
 
 def inputs(t: Array, values: dict[str, Array], unit: str, name: str) -> Recording:
     """A recording of values (N,) by channel at times t (N,), each held until the next sample."""
-    return Recording.from_arrays(
-        t, values, {key: unit for key in values}, hold={key: "zero" for key in values}, name=name
-    )
+    return Recording.from_arrays(t, values, {key: unit for key in values},
+                                 hold={key: "zero" for key in values}, name=name)

@@ -15,15 +15,8 @@ LOW, HIGH = 0.5, 5.0  # definition: [Hz] unless told: what a hand-sized pendulum
 LINES = tuple(0.5 * k for k in range(1, 11))  # definition: [Hz] unless told: the same band
 
 
-def chirp(
-    low: float = LOW,
-    high: float = HIGH,
-    duration: float = 20.0,
-    dt: float = 0.01,
-    amplitude: float = 1.0,
-    channel: str = "u_x",
-    unit: str = "m/s^2",
-) -> Recording:
+def chirp(low: float = LOW, high: float = HIGH, duration: float = 20.0, dt: float = 0.01,
+          amplitude: float = 1.0, channel: str = "u_x", unit: str = "m/s^2") -> Recording:
     """A sine whose frequency rises exponentially from `low` to `high` [Hz].
 
     Each octave gets the same time: phase 2π·low·T/ln(r)·(r^{t/T} - 1) with r = high/low.
@@ -41,15 +34,9 @@ def chirp(
     return inputs(t, {channel: amplitude * np.sin(phase)}, unit, "chirp")
 
 
-def multisine(
-    frequencies: ArrayLike = LINES,
-    duration: float = 20.0,
-    dt: float = 0.01,
-    amplitude: float = 1.0,
-    seed: int | None = None,
-    channel: str = "u_x",
-    unit: str = "m/s^2",
-) -> Recording:
+def multisine(frequencies: ArrayLike = LINES, duration: float = 20.0, dt: float = 0.01,
+              amplitude: float = 1.0, seed: int | None = None, channel: str = "u_x",
+              unit: str = "m/s^2") -> Recording:
     """A sum of equal sines, scaled to a peak of `amplitude`.
 
     Args:

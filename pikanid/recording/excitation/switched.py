@@ -16,14 +16,8 @@ Pulse = tuple[float, float, float]
 TABLE_II: tuple[Pulse, ...] = ((0.2, 0.6, 1.0), (1.2, 1.6, -1.0))  # definition: of the paper
 
 
-def pulses(
-    pulses: Sequence[Pulse],
-    duration: float,
-    dt: float = 0.01,
-    channel: str = "u_x",
-    unit: str = "m/s^2",
-    name: str = "pulses",
-) -> Recording:
+def pulses(pulses: Sequence[Pulse], duration: float, dt: float = 0.01, channel: str = "u_x",
+           unit: str = "m/s^2", name: str = "pulses") -> Recording:
     """Rectangular pulses: (start, stop, value) holds for t in [start, stop).
 
     Args:
@@ -52,9 +46,8 @@ def pulses(
     return inputs(t, {channel: u}, unit, name)
 
 
-def two_pulse(
-    duration: float = 5.0, dt: float = 0.01, amplitude: float = 1.0, channel: str = "u_x"
-) -> Recording:
+def two_pulse(duration: float = 5.0, dt: float = 0.01, amplitude: float = 1.0,
+              channel: str = "u_x") -> Recording:
     """The input profile of the simulation study (Table II): one push, one pull, then free swing.
 
     Args:
@@ -74,12 +67,8 @@ def two_pulse(
     return pulses(scaled, duration, dt, channel, name="two-pulse")
 
 
-def free_decay(
-    duration: float = 10.0,
-    dt: float = 0.01,
-    channels: Sequence[str] = ("u_x",),
-    unit: str = "m/s^2",
-) -> Recording:
+def free_decay(duration: float = 10.0, dt: float = 0.01, channels: Sequence[str] = ("u_x",),
+               unit: str = "m/s^2") -> Recording:
     """No excitation at all: the response to the initial state alone.
 
     >>> free_decay(0.02)["u_x"].values.tolist()

@@ -30,15 +30,10 @@ class Found:
     stem: str
 
 
-def read(
-    path: str | os.PathLike[str],
-    columns: Mapping[str, str | int] | None = None,
-    rate: float | None = None,
-    sheet: str | int | None = None,
-    units: Mapping[str, str] | None = None,
-    delimiter: str | None = None,
-    decimal: str | None = None,
-) -> Found:
+def read(path: str | os.PathLike[str], columns: Mapping[str, str | int] | None = None,
+         rate: float | None = None, sheet: str | int | None = None,
+         units: Mapping[str, str] | None = None, delimiter: str | None = None,
+         decimal: str | None = None) -> Found:
     """Read a file; the arguments are those of `Recording.read`.
 
     Raises:

@@ -22,10 +22,8 @@ def columns(arrays: Mapping[str, np.ndarray]) -> tuple[Column, ...]:
     vectors: dict[str, np.ndarray] = {}
     for path, array in arrays.items():
         vectors.update(_vectors(path, np.asarray(array)))
-    return tuple(
-        Column(path, values, time=_time_of(path, len(values), vectors))
-        for path, values in vectors.items()
-    )
+    return tuple(Column(path, values, time=_time_of(path, len(values), vectors)) for path,
+                 values in vectors.items())
 
 
 def _vectors(path: str, array: np.ndarray) -> dict[str, np.ndarray]:

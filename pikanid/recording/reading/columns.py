@@ -83,8 +83,7 @@ def channels(table: Table, request: Request, where: str) -> Result:
         raise errors.BadRecording(soft[0] if soft else errors.no_channels(where))
     for key in set(request.units) - {"t", "time"} - {ch.name for ch in made}:
         raise errors.BadRecording(
-            errors.missing_channel(where, key, [channel.name for channel in made])
-        )
+            errors.missing_channel(where, key, [channel.name for channel in made]))
     notes = tuple(f"Column '{key}' is left out: {why}" for key, why in unreadable.items())
     return Result(tuple(made), notes, unreadable)
 
@@ -101,9 +100,8 @@ def _defect(table: Table, where: str, found: Named) -> str:
     return ""
 
 
-def _channel(
-    key: str, found: Named, time: Array, request: Request, available: list[Named]
-) -> Channel:
+def _channel(key: str, found: Named, time: Array, request: Request,
+             available: list[Named]) -> Channel:
     column, n = found.column, len(time)
     own = [other for other in available if other.name == OWN_SIGMA + found.name]
     unit = request.units.get(key)

@@ -149,9 +149,8 @@ def _tidy(lines: list[str], delimiter: str) -> list[str]:
     return [" ".join(line.split()) for line in lines] if delimiter == " " else lines
 
 
-def _split(
-    lines: list[str], numbers: list[int], delimiter: str, where: str
-) -> tuple[list[list[str]], list[int]]:
+def _split(lines: list[str], numbers: list[int], delimiter: str,
+           where: str) -> tuple[list[list[str]], list[int]]:
     reader = csv.reader(_tidy(lines, delimiter), delimiter=delimiter)
     rows, shown = [], []
     last = 0
@@ -165,9 +164,8 @@ def _split(
     return rows, shown
 
 
-def _squared(
-    rows: list[list[str]], numbers: list[int], where: str
-) -> tuple[list[list[str]], list[int]]:
+def _squared(rows: list[list[str]], numbers: list[int],
+             where: str) -> tuple[list[list[str]], list[int]]:
     """Rows of the header's width; delimiters at the end of lines and empty rows fall away."""
     width = len(rows[0])
     while width > 1 and not rows[0][width - 1].strip():

@@ -14,8 +14,7 @@ from pikanid.recording.reading.table import Column
 
 # "theta [deg]" or "theta (deg)"; the unit itself may hold one pair of parentheses.
 _HEADER = re.compile(
-    r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>(?:[^()]|\([^()]*\))*)\))"
-)
+    r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>(?:[^()]|\([^()]*\))*)\))")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +41,8 @@ def named(columns: Iterable[Column], where: str) -> list[Named]:
             raise errors.BadRecording(errors.header_twice(where, header))
     bare = Counter(name for name, *_ in split)
     return [
-        Named(
-            name if bare[name] == 1 else column.header,
-            unit if column.unit is None else _normal(column.unit),
-            column,
-        )
+        Named(name if bare[name] == 1 else column.header,
+              unit if column.unit is None else _normal(column.unit), column)
         for name, unit, column in split
     ]
 

@@ -58,16 +58,10 @@ def _column(where: str, field: Any, data: Any, rows: range) -> Column:
     number = pa.types.is_floating(field.type) or pa.types.is_integer(field.type)
     cells = data.to_numpy().astype(float) if number else data.to_pylist()
     column = Column(field.name, cells) if number else from_cells(where, field.name, cells, rows)
-    return Column(
-        column.header,
-        column.values,
-        column.defect,
-        column.text,
-        unit=meta.get("unit", column.unit),
-        sigma=float(meta["sigma"]) if "sigma" in meta else None,
-        hold=meta.get("hold"),
-        is_clock=column.is_clock,
-    )
+    return Column(column.header, column.values, column.defect, column.text,
+                  unit=meta.get("unit", column.unit),
+                  sigma=float(meta["sigma"]) if "sigma" in meta else None, hold=meta.get("hold"),
+                  is_clock=column.is_clock)
 
 
 def content(channels: Mapping[str, Channel], ending: str) -> bytes:

@@ -32,9 +32,8 @@ def read(content: bytes, where: str, options: Options) -> Table:
     return from_rows(where, rows, numbers)
 
 
-def cells(
-    content: bytes, where: str, sheet: str | int | None
-) -> tuple[list[list[object]], list[int]]:
+def cells(content: bytes, where: str,
+          sheet: str | int | None) -> tuple[list[list[object]], list[int]]:
     """The rows of a sheet that are not empty, cut to their common width, and their numbers."""
     found = by_content(content)
     new = found is not None and ".xlsx" in found.endings

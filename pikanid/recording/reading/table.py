@@ -78,9 +78,8 @@ class Table:
         return f"sample {k + 1}" if self.rows is None else f"row {self.rows[k]}"
 
 
-def from_rows(
-    where: str, rows: Sequence[Sequence[object]], numbers: list[int], decimal: str = "."
-) -> Table:
+def from_rows(where: str, rows: Sequence[Sequence[object]], numbers: list[int],
+              decimal: str = ".") -> Table:
     """A table from rows of cells, the first of which is the header unless it is all numbers.
 
     Args:
@@ -99,10 +98,8 @@ def from_rows(
         raise errors.BadRecording(errors.no_rows(where))
     if not headed:
         headers = [str(k + 1) for k in range(len(rows[0]))]
-    columns = tuple(
-        from_cells(where, header, cells, shown, decimal)
-        for header, cells in zip(headers, zip(*body, strict=True), strict=True)
-    )
+    columns = tuple(from_cells(where, header, cells, shown, decimal) for header,
+                    cells in zip(headers, zip(*body, strict=True), strict=True))
     return Table(columns, shown)
 
 
@@ -115,9 +112,8 @@ def heads(row: Sequence[object], decimal: str) -> bool:
     return not all(_number(cell, decimal) is not None for cell in row)
 
 
-def from_cells(
-    where: str, header: str, cells: Sequence[object], rows: Sequence[int], decimal: str = "."
-) -> Column:
+def from_cells(where: str, header: str, cells: Sequence[object], rows: Sequence[int],
+               decimal: str = ".") -> Column:
     """One column of numbers from cells of text, numbers, dates or None.
 
     A column of dates becomes seconds since its first one.

@@ -19,9 +19,8 @@ _STEPS = 20  # definition: iterates that are compared
 _SHALLOW = "shallow KAN = Eq. (5)"
 
 
-def run_checks(
-    *, quick: bool = False, seed: int = 0, progress: Callable[[str], None] | None = None
-) -> EquivalenceReport:
+def run_checks(*, quick: bool = False, seed: int = 0,
+               progress: Callable[[str], None] | None = None) -> EquivalenceReport:
     """Every check of the equivalence.
 
     Args:
@@ -70,23 +69,11 @@ def settings(seed: int = 0, *, quick: bool = False) -> Iterator[Setting]:
             for degree in range(2 if form == "state" else 3, 6):
                 turn = (number // len(grids) + 1) % len(grids)
                 for place, ((grid, horizon, weight), (n, m, even)) in enumerate(
-                    zip(grids, points, strict=True)
-                ):
+                    zip(grids, points, strict=True)):
                     kinks = (0.2, 0.6, 1.2, 1.6) if degree > 3 and grid == 40 else ()
                     if not quick or place == turn:
-                        yield Setting(
-                            system,
-                            form,
-                            degree,
-                            grid,
-                            horizon,
-                            weight,
-                            samples=n,
-                            collocation=m,
-                            even=even,
-                            kinks=kinks,
-                            seed=seed + number,
-                        )
+                        yield Setting(system, form, degree, grid, horizon, weight, samples=n,
+                                      collocation=m, even=even, kinks=kinks, seed=seed + number)
                     number += 1
 
 
@@ -96,9 +83,8 @@ def optimised(seed: int = 0) -> Iterator[Setting]:
     yield Setting("duffing", "second-order", 4, 12, 5.0, 1e-1, even=False, seed=seed)
     yield Setting("sloshing", "state", 4, 30, 5.0, 1e-3, seed=seed)
     yield Setting("sloshing", "second-order", 5, 30, 5.0, 1e-5, seed=seed)
-    yield Setting(
-        "sloshing", "second-order", 5, 30, 5.0, 1e-4, kinks=(0.2, 0.6, 1.2, 1.6), seed=seed
-    )
+    yield Setting("sloshing", "second-order", 5, 30, 5.0, 1e-4, kinks=(0.2, 0.6, 1.2, 1.6),
+                  seed=seed)
     # λ and grid of the paper's last stage: here the minimiser has l beyond all bounds.
     yield Setting("sloshing", "second-order", 3, 40, 5.0, 1.0, 151, 151, seed=seed)
 

@@ -71,21 +71,10 @@ def uniqueness(seed: int = 0) -> tuple[Check, ...]:
         rows += [
             Check("uniqueness", text, "missing rank of B", missing, 0.0),
             Check("uniqueness", text, "condition of B", float(np.linalg.cond(basis)), 1e5),
-            Check(
-                "uniqueness",
-                text,
-                "c back from Bc",
-                difference(np.asarray(found, float), coefficients),
-                1e-10,
-            ),
-            Check(
-                "w_b ≠ 0: hardly unique",
-                text,
-                "condition of [B, SiLU]",
-                float(np.linalg.cond(joined)),
-                1e5,
-                must_differ=True,
-            ),
+            Check("uniqueness", text, "c back from Bc",
+                  difference(np.asarray(found, float), coefficients), 1e-10),
+            Check("w_b ≠ 0: hardly unique", text, "condition of [B, SiLU]",
+                  float(np.linalg.cond(joined)), 1e5, must_differ=True),
         ]
     return tuple(rows)
 
@@ -105,13 +94,8 @@ def _control(name: str, setting: Setting, network: float, ipda: float) -> Check:
 
 
 def _base_function(setting: Setting) -> Check:
-    kan = build_kan(
-        [1, 1],
-        grid=setting.grid,
-        k=setting.degree,
-        grid_range=(0.0, setting.horizon),
-        base="silu",
-    )
+    kan = build_kan([1, 1], grid=setting.grid, k=setting.degree, grid_range=(0.0, setting.horizon),
+                    base="silu")
     kan.act_fun[0].scale_base.data.fill_(0.1)
     unknowns = setting.unknowns()
     network = NetworkLoss(setting, kan)
@@ -141,15 +125,9 @@ def _unmatched_collocation(setting: Setting) -> Check:
 
 def _deeper(setting: Setting) -> Check:
     """How far curves of a [1, 2, 1] KAN lie from the spline space of its input layer."""
-    kan = build_kan(
-        [1, 2, 1],
-        grid=setting.grid,
-        k=setting.degree,
-        grid_range=[(0.0, setting.horizon), (-1.0, 1.0)],
-        seed=setting.seed,
-        noise=5.0,
-        start="waves",
-    )
+    kan = build_kan([1, 2, 1], grid=setting.grid, k=setting.degree,
+                    grid_range=[(0.0, setting.horizon), (-1.0, 1.0)], seed=setting.seed, noise=5.0,
+                    start="waves")
     t = np.linspace(0.0, setting.horizon, 2001)
     with torch.no_grad():
         curve: Array = kan(torch.tensor(t[:, None])).numpy()[:, 0]

@@ -35,14 +35,9 @@ def tangent_step(seed: int = 0, *, quick: bool = False) -> tuple[Check, ...]:
         for width in _WIDTHS[s::2] if quick else _WIDTHS:
             setting = Setting(system, "second-order", 4, 8, weight=1e-2, samples=41, seed=seed)
             kan = build_kan(
-                width,
-                grid=setting.grid,
-                k=setting.degree,
-                grid_range=[(0.0, setting.horizon), *([(-2.0, 2.0)] * (len(width) - 2))],
-                seed=seed,
-                noise=4.0,
-                start="waves",
-            )
+                width, grid=setting.grid, k=setting.degree,
+                grid_range=[(0.0, setting.horizon), *([(-2.0, 2.0)] * (len(width) - 2))], seed=seed,
+                noise=4.0, start="waves")
             parameters = np.array(setting.model.truth) * 1.1
             r_a, j_a = _network(setting, kan, parameters)
             r_b, j_b = _ipda(setting, DeepKAN(kan), parameters)
@@ -104,6 +99,5 @@ def _ipda(setting: Setting, deep: DeepKAN, parameters: Array) -> tuple[Array, Ar
     none = np.zeros((setting.samples, parameters.size))
     residuals = np.concatenate([setting.data - now.values[0][:, 0], root * (a - force)])
     jacobian = np.vstack(
-        [np.hstack([-now.jacobians[0][:, 0], none]), root * np.hstack([linear, -by_p])]
-    )
+        [np.hstack([-now.jacobians[0][:, 0], none]), root * np.hstack([linear, -by_p])])
     return residuals, jacobian

@@ -37,24 +37,14 @@ def delivered_curve(seed: int = 0) -> tuple[Check, ...]:
         curve = shallow.values(t, coefficients)
         scale = np.abs(curve).max()
         rows.append(
-            Check(
-                "KAN handed over = reported curve",
-                text,
-                "curve",
-                float(np.abs(shallow.forward(t) - curve).max() / scale),
-                _CURVE,
-            )
+            Check("KAN handed over = reported curve", text, "curve",
+                  float(np.abs(shallow.forward(t) - curve).max() / scale), _CURVE)
         )
         slopes = _autograd(setting, shallow)
         wanted = shallow.values(t, coefficients, 1)
         rows.append(
-            Check(
-                "KAN handed over = reported curve",
-                text,
-                "time derivative",
-                float(np.abs(slopes - wanted).max() / np.abs(wanted).max()),
-                _CURVE,
-            )
+            Check("KAN handed over = reported curve", text, "time derivative",
+                  float(np.abs(slopes - wanted).max() / np.abs(wanted).max()), _CURVE)
         )
     return tuple(rows)
 

@@ -27,12 +27,10 @@ def design(setting: Setting, knots: Array) -> Matrices:
     data = BSpline.design_matrix(setting.data_times, knots, setting.degree).toarray()
     values = BSpline.design_matrix(tau, knots, setting.degree).toarray()
     every = BSpline(knots, np.eye(knots.size - setting.degree - 1), setting.degree)
-    return Matrices(
-        np.hstack([data, _kinks(setting, setting.data_times, 0)]),
-        np.hstack([values, _kinks(setting, tau, 0)]),
-        np.hstack([every.derivative(1)(tau), _kinks(setting, tau, 1)]),
-        np.hstack([every.derivative(2)(tau), _kinks(setting, tau, 2)]),
-    )
+    return Matrices(np.hstack([data, _kinks(setting, setting.data_times, 0)]),
+                    np.hstack([values, _kinks(setting, tau, 0)]),
+                    np.hstack([every.derivative(1)(tau), _kinks(setting, tau, 1)]),
+                    np.hstack([every.derivative(2)(tau), _kinks(setting, tau, 2)]))
 
 
 class IpdaObjective:

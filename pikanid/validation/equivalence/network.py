@@ -24,12 +24,8 @@ class NetworkLoss:
 
     def __init__(self, setting: Setting, kan: Any | None = None) -> None:
         self.setting = setting
-        self.kan = kan or build_kan(
-            [1, setting.outputs],
-            grid=setting.grid,
-            k=setting.degree,
-            grid_range=(0.0, setting.horizon),
-        )
+        self.kan = kan or build_kan([1, setting.outputs], grid=setting.grid, k=setting.degree,
+                                    grid_range=(0.0, setting.horizon))
         self._data = torch.tensor(setting.data)
         self._excitation = torch.tensor(setting.model.excitation(setting.collocation_times))
 
@@ -81,11 +77,7 @@ class NetworkLoss:
         place = torch.tensor(unknowns, requires_grad=True)
         residuals = self.residuals(place)
         (jacobian,) = torch.autograd.grad(
-            residuals,
-            place,
-            torch.eye(len(residuals), dtype=torch.float64),
-            is_grads_batched=True,
-        )
+            residuals, place, torch.eye(len(residuals), dtype=torch.float64), is_grads_batched=True)
         return residuals.detach().numpy().copy(), jacobian.numpy().copy()
 
 

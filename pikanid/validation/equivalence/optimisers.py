@@ -66,14 +66,9 @@ def levenberg_marquardt(residuals: Residuals, start: Array, steps: int) -> Path:
 def lbfgs(loss: Loss, start: Array, steps: int) -> Path:
     """SciPy's L-BFGS-B, which PIKAN trainings use in one form or another."""
     iterates = [start.copy()]
-    result = minimize(
-        loss,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        callback=lambda x: iterates.append(x.copy()),
-        options={"maxiter": steps, "ftol": 0.0, "gtol": 0.0},
-    )
+    result = minimize(loss, start, jac=True, method="L-BFGS-B",
+                      callback=lambda x: iterates.append(x.copy()),
+                      options={"maxiter": steps, "ftol": 0.0, "gtol": 0.0})
     return Path(np.array(iterates), bool(result.status == 0))
 
 

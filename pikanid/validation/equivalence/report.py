@@ -89,21 +89,15 @@ class EquivalenceReport:
             verdict,
             "## What must agree",
             "Largest relative difference over all settings.",
-            _table(
-                ("check", "quantity", "settings", "largest difference", "tolerance", "passed"),
-                _summary(equal),
-            ),
+            _table(("check", "quantity", "settings", "largest difference", "tolerance", "passed"),
+                   _summary(equal)),
             "## What must differ",
             "Negative controls: the comparison sees what it should.",
-            _table(
-                ("control", "setting", "quantity", "difference", "at least", "passed"),
-                [_row(row) for row in controls],
-            ),
+            _table(("control", "setting", "quantity", "difference", "at least", "passed"),
+                   [_row(row) for row in controls]),
             "## Every comparison",
-            _table(
-                ("check", "setting", "quantity", "difference", "tolerance", "passed"),
-                [_row(row) for row in equal],
-            ),
+            _table(("check", "setting", "quantity", "difference", "tolerance", "passed"),
+                   [_row(row) for row in equal]),
         ]
         return "\n\n".join(parts) + "\n"
 
@@ -118,8 +112,7 @@ class EquivalenceReport:
         picture = io.BytesIO()
         self.plot().savefig(picture, format="png", dpi=110)
         text = self.to_markdown().replace(
-            "## What must differ", "![differences](equivalence.png)\n\n## What must differ", 1
-        )
+            "## What must differ", "![differences](equivalence.png)\n\n## What must differ", 1)
         return {
             Path(folder) / "equivalence.png": picture.getvalue(),
             Path(folder) / "equivalence.md": text.encode(),
@@ -168,14 +161,8 @@ def _summary(rows: Iterable[Check]) -> list[tuple[str, ...]]:
 
 
 def _row(row: Check) -> tuple[str, ...]:
-    return (
-        row.check,
-        row.setting,
-        row.quantity,
-        f"{row.difference:.1e}",
-        f"{row.tolerance:.0e}",
-        _tick(row.passed),
-    )
+    return (row.check, row.setting, row.quantity, f"{row.difference:.1e}", f"{row.tolerance:.0e}",
+            _tick(row.passed))
 
 
 def _tick(passed: bool) -> str:

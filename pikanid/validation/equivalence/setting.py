@@ -98,10 +98,8 @@ class Setting:
         """One line for tables."""
         grids = "even" if self.even else "random"
         enriched = f", {len(self.kinks)} kinks" if self.kinks else ""
-        return (
-            f"{self.system}, {self.form}, k={self.degree}, G={self.grid}, T={self.horizon:g}, "
-            f"λ={self.weight:g}, N={self.samples}, M={self.collocation} {grids}{enriched}"
-        )
+        return (f"{self.system}, {self.form}, k={self.degree}, G={self.grid}, T={self.horizon:g}, "
+                f"λ={self.weight:g}, N={self.samples}, M={self.collocation} {grids}{enriched}")
 
     def _times(self, number: int, even: bool, stream: int) -> Array:
         if even:
@@ -125,15 +123,8 @@ def motion(system: str, horizon: float, t: Array) -> Array:
     state, found = np.array(model.start), np.empty(t.size)
     for left, right in pairwise(ends):
         # The excitation is right-continuous: stay a hair before the end of the piece.
-        path = solve_ivp(
-            rhs,
-            (left, np.nextafter(right, left)),
-            state,
-            method="DOP853",
-            rtol=1e-10,
-            atol=1e-12,
-            dense_output=True,
-        )
+        path = solve_ivp(rhs, (left, np.nextafter(right, left)), state, method="DOP853", rtol=1e-10,
+                         atol=1e-12, dense_output=True)
         here = (t >= left) & (t <= right)
         if path.sol is None:
             raise errors.SimulationFailed(errors.not_finite(left, str(state)))

@@ -84,22 +84,8 @@ def _cosine(t: Array) -> Array:
 
 
 SYSTEMS = {
-    "sloshing": System(
-        _slosh,
-        _slosh_slopes,
-        _slosh_torch,
-        _pulses,
-        (0.2, 0.6, 1.2, 1.6),
-        (0.045, 0.15),
-        (0.0, 0.0),
-    ),
-    "duffing": System(
-        _duffing,
-        _duffing_slopes,
-        _duffing_torch,
-        _cosine,
-        (),
-        (0.3, 1.0, 0.7),
-        (0.5, 0.0),
-    ),
+    "sloshing": System(_slosh, _slosh_slopes, _slosh_torch, _pulses, (0.2, 0.6, 1.2, 1.6),
+                       (0.045, 0.15), (0.0, 0.0)),
+    "duffing": System(_duffing, _duffing_slopes, _duffing_torch, _cosine, (), (0.3, 1.0, 0.7),
+                      (0.5, 0.0)),
 }  # definition: that both forms are compared on
