@@ -82,7 +82,7 @@ def test_no_estimate_of_noise_is_below_that_of_rounding() -> None:
     still = noise.estimate(channel, (0.0, 3.5))
     assert still.sigma == pytest.approx(floor) and still.rho == 0.0
     recording = pk.Recording({"motor": channel})
-    assert first_level(recording, "motor", (0.0, 3.5), DEFAULTS.quiet).sigma == pytest.approx(floor)
+    assert first_level(recording, "motor", (0.0, 3.5), DEFAULTS).sigma == pytest.approx(floor)
     left = np.where(TIMES < 4, 0.0, floor * np.random.default_rng(0).standard_normal(600))
     level = NoiseModel(floor, 0.0, 0.1, 0.01, "")
     assert refined(level, channel, TIMES, left, 3.0, None, DEFAULTS).sigma >= 0.999 * floor

@@ -57,7 +57,7 @@ def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
     hit = np.arange(20, 1000, 50)
     y[hit] += 6 * SIGMA
     whole = Recording.from_arrays(t, {"y": y}, {"y": "rad"})
-    before, _ = without_outliers(whole, "y", DEFAULTS.noise)
+    before, _ = without_outliers(whole, "y", DEFAULTS)
     seen = np.isfinite(before["y"].values)
     residual = (0, "y", t[seen], (y - motion)[seen])
     records, count = without_lone(Records((before,), ({},), DEFAULTS), [residual])
