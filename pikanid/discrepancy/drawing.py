@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
@@ -11,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pikanid.discrepancy.edge import Edge
-from pikanid.estimate.plots import new_figure
+from pikanid.estimate.plots import embedded, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,10 +49,7 @@ def page(edges: Sequence[Edge], title: str, sentence: str, figure: Figure) -> st
         f"<tr><td>{escape(e.argument)}</td><td>{e.range[0]:.4g} ... {e.range[1]:.4g}</td>"
         f"<td>{np.max(np.abs(e.values)):.3g} {escape(e.unit)}</td><td>{e.p_value:.2g}</td>"
         f"<td>{'yes' if e.significant else 'no'}</td></tr>" for e in edges)
-    image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=90)
-    data = base64.b64encode(image.getvalue()).decode()
     return (f"<b>{escape(title)}</b><table><tr><th>edge</th><th>visited range</th>"
             f"<th>largest</th><th>p</th><th>significant</th></tr>{rows}</table>"
             f"<p>{escape(sentence)}</p>"
-            f'<img alt="edges with bands" src="data:image/png;base64,{data}">')
+            f"{embedded(figure, 'edges with bands', 90)}")

@@ -6,6 +6,7 @@ figures and matplotlib's settings alone.
 
 from __future__ import annotations
 
+import base64
 import io
 import os
 from collections.abc import Mapping, Sequence
@@ -179,12 +180,18 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     return _shown()(figsize=(width, height), layout=layout, dpi=dpi)
 
 
-def image(figure: Figure, ending: str = ".png") -> bytes:
+def image(figure: Figure, ending: str = ".png", dpi: float = DPI) -> bytes:
     """A figure as the content of an image file, without the date."""
     buffer = io.BytesIO()
     dates = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}[ending]
-    figure.savefig(buffer, format=ending[1:], dpi=DPI, metadata=dates)
+    figure.savefig(buffer, format=ending[1:], dpi=dpi, metadata=dates)
     return buffer.getvalue()
+
+
+def embedded(figure: Figure, shows: str, dpi: float) -> str:
+    """A figure as a piece of HTML that needs no other file."""
+    data = base64.b64encode(image(figure, dpi=dpi)).decode()
+    return f'<img alt="{shows}" src="data:image/png;base64,{data}">'
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from html import escape
 from typing import TYPE_CHECKING
 
 from pikanid.estimate.estimate import rounded
+from pikanid.estimate.plots import embedded
 
 if TYPE_CHECKING:
     from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -132,11 +131,7 @@ def _parameters(dx: Diagnosis) -> str:
 
 
 def _figure(dx: Diagnosis) -> str:
-    image = io.BytesIO()
-    dx.plot().savefig(image, format="png", dpi=110)
-    data = base64.b64encode(image.getvalue()).decode()
-    return ('<h2>Proof</h2><img alt="residuals before and after" '
-            f'src="data:image/png;base64,{data}">')
+    return f"<h2>Proof</h2>{embedded(dx.plot(), 'residuals before and after', 110)}"
 
 
 def _proof(dx: Diagnosis) -> str:

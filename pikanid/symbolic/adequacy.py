@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 from scipy.stats import f as fisher
 
-from pikanid.approximators.bspline import BSpline
+from pikanid.approximators.bspline import BSpline, knots_from_breakpoints
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import FormFit
 from pikanid.symbolic.numeric import Array
@@ -41,7 +41,7 @@ class Smoother:
             inner = np.quantile(curve.x, np.linspace(0.0, 1.0, pieces + 1))
             if np.any(np.diff(inner) <= 0.0):
                 inner = np.linspace(curve.low, curve.high, pieces + 1)
-            knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+            knots = knots_from_breakpoints(inner, 3)
             columns = curve.whiten(BSpline(3, knots).basis(curve.x).toarray().T)
             u, s, _ = np.linalg.svd(curve.project(columns).T, full_matrices=False)
             bases.append(np.asarray(u[:, s > 1e-9 * s[0]]))

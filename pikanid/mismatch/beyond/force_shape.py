@@ -20,6 +20,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.stats import chi2
 
+from pikanid.approximators.bspline import uniform_knots
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.remainder import residual_tests
@@ -130,8 +131,8 @@ class _Spline:
             np.clip(values, low, high), self._knots(), DEGREE).toarray()
 
     def _knots(self) -> np.ndarray:
-        inner = np.linspace(self.visits.min(), self.visits.max(), INTERVALS + 1)
-        return np.concatenate([[inner[0]] * DEGREE, inner, [inner[-1]] * DEGREE])
+        low, high = float(self.visits.min()), float(self.visits.max())
+        return uniform_knots(low, high, intervals=INTERVALS, degree=DEGREE)
 
     def sites(self) -> np.ndarray:
         """Coefficients (n,) of the identity (Greville's abscissae)."""

@@ -27,6 +27,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import solve_triangular
 
+from pikanid.approximators.bspline import uniform_knots
 from pikanid.mismatch.beyond.penalised import Penalised, critical_value
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.site import Site
@@ -116,8 +117,7 @@ def force_over_time(base: Hypothesis, site: Site) -> ForceOverTime | None:
     intervals = _intervals(stop - start, period, rows, settings)
     if intervals < settings.budget.force_knots[0]:
         return None
-    edges = np.linspace(start, stop, intervals + 1)
-    knots = np.concatenate([[start] * DEGREE, edges, [stop] * DEGREE])
+    knots = uniform_knots(start, stop, intervals=intervals, degree=DEGREE)
     together = -(-rows // settings.budget.rows_tested)
     fitted: Penalised | None = None
     force = np.zeros(len(knots) - DEGREE - 1)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
+from pikanid.approximators.bspline import knots_from_breakpoints
 from pikanid.formula import units
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
 from pikanid.mismatch.catalogue.candidate import Candidate
@@ -139,7 +140,7 @@ class FreeCurve:
     def extended(self, nominal: Model, site: Site, found: Hypothesis) -> Model:
         """The nominal model, at the estimates, with the edge as a B-spline."""
         inner = (self.inner + 1) / 2 * (self.high - self.low) + self.low
-        knots = np.concatenate([[self.low] * (DEGREE + 1), inner, [self.high] * (DEGREE + 1)])
+        knots = knots_from_breakpoints(np.array([self.low, *inner, self.high]), DEGREE)
         x = np.linspace(self.low, self.high, GRID)
         values = self.matrix(x) @ np.array([found.values[n] for n in self.names])
         coefficients = np.linalg.lstsq(
