@@ -52,14 +52,14 @@ UNREAD = frozenset({
 # takes time and says nothing about the verdict
 SKIPPED: tuple[tuple[Any, str, Any], ...] = (
     (reporting, "advice", ""), (reporting, "force_over_time", None), (api, "patch", None),
-    (reporting, "smallest", {}))
+    (reporting, "smallest", {}), (reporting, "local_force", None))
 LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "says where, how large or what next once the verdict stands": (
         "band", "beyond.own", "beyond.line", "beyond.inside", "beyond.knots_a_period",
         "beyond.resolved", "beyond.rows_a_knot", "beyond.louder", "beyond.unexplained",
-        "beyond.idle", "verdict.sensitive", "uncertainty.far", "uncertainty.far_from_zero",
-        "uncertainty.condition", "budget.force_passes", "budget.force_knots", "budget.slow_knots",
-        "budget.windows", "beyond.least_window"),
+        "beyond.idle", "beyond.clean", "verdict.sensitive", "uncertainty.far",
+        "uncertainty.far_from_zero", "uncertainty.condition", "budget.force_passes",
+        "budget.force_knots", "budget.slow_knots", "budget.windows", "beyond.least_window"),
     "plans experiments, diagnoses none": (
         "confusion", "signs", "budget.planned_refits", "budget.planned_sizes", "budget.finalists",
         "budget.compared", "budget.profile", "budget.profile_rate", "reached", "budget.smaller"),

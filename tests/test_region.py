@@ -187,3 +187,17 @@ def test_a_diagnosis_says_where_a_wall_is() -> None:
     assert (beyond["state"], beyond["unit"]) == ("theta", "rad")
     assert beyond["from"] == pytest.approx(WALL, rel=0.02)
     assert (where["channel"], where["channels"]) == ("dynamics", ["dynamics"])
+
+
+@pytest.mark.slow
+def test_a_diagnosis_says_where_a_drag_of_no_catalogue_acts() -> None:
+    model = pk.systems.sloshing()
+    truth = model.with_term("theta_dot", "-12*max(theta_dot - 0.8, 0)")
+    seen = [pk.simulate(truth, pk.excitation.planar_moves(10, 20.0, seed=seed), sigma=SIGMA,
+                        seed=seed) for seed in (1, 2)]
+    where = pk.diagnose(model, *seen, workers=1).to_dict()["where"]
+    beyond = where["region"][-1]
+    assert beyond["state"] == "theta_dot" and beyond["from"] == pytest.approx(0.8, rel=0.05)
+    # its formula, a force beyond a dead zone, may begin again where the motion hardly ever was
+    rest = where["region"][:-1]
+    assert sum(r["to"] - r["from"] for r in rest) < 0.1 * (beyond["to"] - beyond["from"])

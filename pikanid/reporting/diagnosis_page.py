@@ -55,6 +55,10 @@ def _where(dx: Diagnosis) -> str:
     channel = " and ".join(f"the {c}" for c in dx.where.channels) or (
         "undecided between input, sensor and dynamics")
     region = f" It acts at {', '.join(map(str, dx.where.region))}." if dx.where.region else ""
+    if dx.where.parameters:
+        region += " With a free force there: " + ", ".join(
+            f"{n} = {rounded(v.value, v.std)} {v.unit}".rstrip()
+            for n, v in dx.where.parameters.items()) + "."
     depends = f"; depends on {', '.join(dx.where.depends_on)}" if dx.where.depends_on else ""
     return (f"<h2>Where</h2><p>Channel: {escape(channel)}{escape(depends)}.{escape(region)} "
             f"In time: {escape(spans)}.{_force(dx) if dx.where.time else ''}</p>")

@@ -65,7 +65,8 @@ class Diagnosis(DiagnosisData):
                       "time": [list(span) for span in self.where.time],
                       "static_law": self.where.static_law,
                       "region": [{"state": r.state, "from": r.low, "to": r.high, "unit": r.unit}
-                                 for r in self.where.region]},
+                                 for r in self.where.region],
+                      "parameters": {n: _entry(v) for n, v in self.where.parameters.items()}},
             "hypotheses": [{
                 "effects": [{"ids": list(e.ids), "name": e.name, "expression": e.expression,
                              "parameters": {n: _entry(v) for n, v in e.parameters.items()}}

@@ -64,6 +64,8 @@ class Where:
         static_law: Whether a static law of the states can do it; None where that is not known.
         region: Part of a state or an input in which it acts; empty where it acts always, or no
             region can be told.
+        parameters: Of the model, with the region left to a force without a name: from clean motion;
+            empty where the region is that of a law that is given.
     """
 
     channels: tuple[Channel, ...]
@@ -72,6 +74,7 @@ class Where:
     time: tuple[tuple[float, float], ...]
     static_law: bool | None
     region: tuple[Interval, ...] = ()
+    parameters: Mapping[str, Value] = field(default_factory=dict)
 
     @property
     def channel(self) -> Literal["dynamics", "input", "sensor", "several", "undecided"]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
+from pikanid.mismatch.beyond.local_force import Local
 from pikanid.mismatch.beyond.region import Course, course, regions_of_laws
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.site import Site
@@ -19,7 +20,7 @@ from pikanid.mismatch.detect.residual_tests import unit_columns
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.report.findings import Where
+from pikanid.mismatch.report.findings import Where, values_of
 from pikanid.mismatch.report.part import Value
 from pikanid.mismatch.settings.settings import Settings
 
@@ -44,7 +45,7 @@ def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site
 
 def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
            shape: ForceShape | None, force: ForceOverTime | None,
-           candidates: Sequence[Candidate] = ()) -> Where:
+           candidates: Sequence[Candidate] = (), local: Local | None = None) -> Where:
     """The place of a mismatch, as far as the answer and the nominal residual tell.
 
     Where all laws of a sure answer act in a part of the recording only, that is its place in time.
@@ -52,7 +53,8 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
     recording resolves, where the residual is louder than noise.
 
     Without an answer the shape of the missing force says what it depends on, and whether a static
-    law can be all that is missing.
+    law can be all that is missing.  `local` is a force without a name that acts
+    in a region, if there is one.
     """
     settings = base.whitened.settings
     # what the new terms are made of
@@ -64,18 +66,30 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
         static = all(e.static for e in best.effects)
     elif shape is not None:
         states, static = shape.depends_on(settings), shape.static_law
-    courses = [course(best, base.model, e) for e in _sure(answer)]
-    region = regions_of_laws(courses, site, settings)
+    fit = best if answer.part is not None or not answer.given else _simplest(answer)
+    courses = [course(fit, base.model, e) for e in _sure(answer)]
+    region = local.intervals if local else regions_of_laws(courses, site, settings)
     channels = _channels(answer, site, candidates) or _channel_of_shape(
         answer, site, shape, settings)
-    return Where(channels, site.v, states, _seconds(base, answer, courses, force), static, region)
+    windows = local.course.windows(_period(site)) if local else _seconds(
+        base, answer, courses, force)
+    values = values_of(base.model.parameters, local.hypothesis.values, local.hypothesis.std,
+                       local.overdispersion) if local else {}
+    return Where(channels, site.v, states, windows, static, region, values)
 
 
 def _sure(answer: Answer) -> tuple[Candidate, ...]:
     """Effects whose law is sure: all that are given, or what is there beside a remainder."""
     if answer.part is not None:
         return tuple(p.effect for p in answer.part.present if p.names)
-    return answer.given[0].effects if answer.verdict in ("named", "set") else ()
+    if answer.verdict not in ("named", "set"):
+        return ()
+    return _simplest(answer).effects
+
+
+def _simplest(answer: Answer) -> Hypothesis:
+    """Of several that cannot be told apart: what more parameters add is not sure."""
+    return min(answer.given, key=lambda h: len(h.minimum.theta))
 
 
 def _seconds(base: Hypothesis, answer: Answer, courses: Sequence[Course | None],
@@ -84,11 +98,14 @@ def _seconds(base: Hypothesis, answer: Answer, courses: Sequence[Course | None],
     if answer.verdict in ("named", "set") and len(local) == len(courses) > 0:
         whole = replace(local[0], acts=np.any([one.acts for one in local], axis=0))
         if whole.acts.mean() <= 1 - base.whitened.settings.beyond.idle:
-            site = answer.given[0].effects[0].site
-            return whole.windows(2 * np.pi / site.rate if site.rate else 0.0)
+            return whole.windows(_period(answer.given[0].effects[0].site))
     if force is not None and force.resolved:
         return force.windows
     return loud_windows(base) if answer.verdict != "none" else ()
+
+
+def _period(site: Site) -> float:
+    return 2 * np.pi / site.rate if site.rate else 0.0
 
 
 def _channels(answer: Answer, site: Site, candidates: Sequence[Candidate]) -> tuple[Channel, ...]:

@@ -15,6 +15,10 @@ def lines_of(dx: DiagnosisData) -> list[str]:
         region = ", ".join(map(str, dx.where.region))
         lines.append(f"Where: {place}" + (f"; at {region}" if region else "")
                      + (f"; in time at {spans}" if spans else ""))
+        if dx.where.parameters:
+            lines.append("  with a free force there: " + ", ".join(
+                f"{name} = {rounded(v.value, v.std)} {v.unit}".rstrip()
+                for name, v in dx.where.parameters.items()))
     lines += [f"Surely: {part.sentence()}" for part in dx.present]
     lines += dx.remainder.lines() if dx.remainder is not None else []
     for h in dx.hypotheses:

@@ -85,6 +85,7 @@ class BeyondSettings:
         louder: Standard deviations of χ² in a window, √(2n), beyond which it is louder than noise.
         unexplained: [χ² per degree of freedom] from which on no force explains a recording.
         idle: Share of what was visited in which a law must be zero to act in a region.
+        clean: The same of a force that has no name.
     """
 
     own: Share = 0.1
@@ -99,6 +100,7 @@ class BeyondSettings:
     louder: Amount = 4.0
     unexplained: Amount = 1.5
     idle: Share = 0.05
+    clean: Share = 0.25
 
 
 @dataclass(frozen=True)

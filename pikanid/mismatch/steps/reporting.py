@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import force_over_time
+from pikanid.mismatch.beyond.local_force import local_force
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import Detection
@@ -46,9 +47,12 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
             "anything.")
     levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, site)
+    local = local_force(
+        case.base, case.model, shape, site, answer.given[0] if answer.given else None) if (
+            shape is not None and answer.verdict not in ("named", "set")) else None
     return Diagnosis(
         answer.verdict, detection.p_value, case.settings,
-        locate(case.base, best, answer, site, shape, force, case.candidates),
+        locate(case.base, best, answer, site, shape, force, case.candidates, local),
         given, rejected, before, after, proof, tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates, counts),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
