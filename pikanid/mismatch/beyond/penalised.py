@@ -7,6 +7,8 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.optimize import brentq
 from scipy.stats import norm
 
+from pikanid.mismatch.detect.residual_tests import orthonormal
+
 # of the force, in knot intervals: it follows an oscillation, or does not
 MEMORIES = (2.0, 50.0)  # numerical: the likelihood takes one of two, and is flat between them
 DECADES = 10  # numerical: of the penalty's weight, from almost no force downwards
@@ -29,9 +31,7 @@ class Penalised:
     """
 
     def __init__(self, D: np.ndarray, J: np.ndarray, target: np.ndarray, before: Penalised | None):
-        norms = np.linalg.norm(J, axis=0)
-        u, s, _ = np.linalg.svd(J[:, norms > 0] / norms[norms > 0], full_matrices=False)
-        q = u[:, s > 1e-9 * s[0]] if len(s) else u
+        q = orthonormal(J)
         target = target - q @ (q.T @ target)
         inside, whole = q.T @ D, D.T @ D
         self.information = whole - inside.T @ inside

@@ -44,13 +44,18 @@ class Detection:
     power: float
 
 
+def orthonormal(J: np.ndarray) -> np.ndarray:
+    """Orthonormal columns (N, k) that span what the columns of J (N, n) do."""
+    norms = np.linalg.norm(J, axis=0)
+    u, s, _ = np.linalg.svd(J[:, norms > 0] / norms[norms > 0], full_matrices=False)
+    return np.asarray(u[:, s > 1e-9 * s[0]] if len(s) else u)
+
+
 def project(J: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Rows (N,) or (N, k) without what the columns of J (N, n) span."""
     if J.shape[1] == 0:
         return rows
-    norms = np.linalg.norm(J, axis=0)
-    u, s, _ = np.linalg.svd(J[:, norms > 0] / norms[norms > 0], full_matrices=False)
-    q = u[:, s > 1e-9 * s[0]] if len(s) else u
+    q = orthonormal(J)
     return rows - q @ (q.T @ rows)
 
 
