@@ -10,7 +10,6 @@ from __future__ import annotations
 import difflib
 import math
 import os
-import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -26,7 +25,7 @@ from pikanid.model.lookup import Lookup
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
 from pikanid.storage.entries import Entry
-from pikanid.storage.limits import MOST_MODEL, file_bytes
+from pikanid.storage.limits import toml_content
 from pikanid.storage.outputs import atomically
 
 M = TypeVar("M", bound=Operations)
@@ -49,13 +48,7 @@ def load(path: str | os.PathLike[str], kind: Callable[..., M]) -> M:
     def wrong(detail: str) -> errors.BadModel:
         return errors.BadModel(errors.unreadable("model file", str(path), detail))
 
-    try:
-        content = tomllib.loads(file_bytes(path, wrong, MOST_MODEL).decode("utf-8"))
-    except UnicodeDecodeError:
-        raise wrong("it is not text") from None
-    except (ValueError, RecursionError) as problem:  # also an integer of thousands of digits
-        raise wrong(str(problem) or "it is nested too deep") from None
-    return from_dict(content, str(path), kind)
+    return from_dict(toml_content(path, wrong), str(path), kind)
 
 
 def save(model: Lookup, path: str | os.PathLike[str]) -> None:

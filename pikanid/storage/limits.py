@@ -95,6 +95,22 @@ def gunzipped(content: bytes, wrong: Wrong, most: int | None = None) -> bytes:
     return b"".join(parts)
 
 
+def toml_content(path: str | os.PathLike[str], wrong: Wrong) -> dict[str, Any]:
+    """The content of a TOML file.
+
+    Raises:
+        PikanidError: If it is missing, too large, or no TOML.
+    """
+    import tomllib
+
+    try:
+        return tomllib.loads(file_bytes(path, wrong, MOST_MODEL).decode("utf-8"))
+    except UnicodeDecodeError:
+        raise wrong("it is not text") from None
+    except (ValueError, RecursionError) as problem:  # also an integer of thousands of digits
+        raise wrong(str(problem) or "it is nested too deep") from None
+
+
 def json_content(path: str | os.PathLike[str], wrong: Wrong) -> Any:
     """The content of a JSON file, gzipped or not.
 

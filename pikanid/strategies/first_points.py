@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -38,22 +40,22 @@ def from_simulation(functional: Functional) -> Point | None:
     return Point(tuple(coefficients), theta)
 
 
-def transfer(old: Functional, new: Functional, point: Point) -> Point:
-    """The same trajectories on a finer grid: interpolation at the Greville points of its knots.
-
-    Exact, because the spaces are nested.
+def transfer(old: Functional, new: Functional, point: Point,
+             refitted: Callable[[Any, Any, Array], Array]) -> Point:
+    """The same trajectories on a finer grid; `refitted` gives the coefficients of a finer curve,
+    from the coarser one and its own.
     """
     coefficients = []
     for r, (before, after) in enumerate(zip(old.parts, new.parts, strict=True)):
-        pieces = []
-        for i, fine in enumerate(after.approximators):
-            coarse = before.approximators[i]
-            assert isinstance(coarse, BSpline) and isinstance(fine, BSpline)
-            own = point.coefficients[r][before.physics.tops[i].part]
-            sites = fine.greville
-            pieces.append(_interpolated(fine, sites, coarse.values(sites, own)))
+        pieces = [refitted(fine, coarse, point.coefficients[r][top.part]) for fine, coarse, top in
+                  zip(after.approximators, before.approximators, before.physics.tops, strict=True)]
         coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
     return Point(tuple(coefficients), point.theta)
+
+
+def through_greville(fine: BSpline, coarse: BSpline, own: Array) -> Array:
+    """Interpolation at the Greville points of the finer knots: exact, as the spaces are nested."""
+    return _interpolated(fine, fine.greville, coarse.values(fine.greville, own))
 
 
 def _interpolated(spline: BSpline, t: Array, values: Array) -> Array:

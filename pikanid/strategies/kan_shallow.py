@@ -10,11 +10,13 @@ from scipy.linalg import LinAlgError
 from scipy.sparse.linalg import spsolve
 
 from pikanid import errors
+from pikanid.approximators import Array
 from pikanid.approximators.kan import ShallowKAN
 from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import BandedSystem, Outcome, Point
 from pikanid.optimise.schedules import Continuation, Fixed, Stage, moved
 from pikanid.strategies.data_noise import noise_level, standard_errors
+from pikanid.strategies.first_points import transfer
 from pikanid.strategies.grids import fastest_rate
 from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.relaxation import (
@@ -75,7 +77,7 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, cells: float | None, max_grid: i
             break
         grid = grid.refined()
         finer = setup.functional(grid)
-        point = _carried(functional, finer, outcome.at.point)
+        point = transfer(functional, finer, outcome.at.point, _by_least_squares)
         start, functional = max(1.0, found[-1].lam / FACTOR), finer
     notes = list(remarks) if gap <= settled or not refine else []
     if refine and gap > settled:
@@ -103,21 +105,12 @@ def unfitted(setup: Setup, grid: KanGrid, functional: Functional, point: Point, 
                       grid, lam, tuple(stages), cost, np.nan, np.nan, False, (note,))
 
 
-def _carried(old: Functional, new: Functional, point: Point) -> Point:
-    """The same curves on a finer grid, by least squares at six points a basis function.
+def _by_least_squares(fine: ShallowKAN, coarse: ShallowKAN, own: Array) -> Array:
+    """Coefficients of the same curve, by least squares at six points a basis function.
 
     The finer space holds the coarser one up to kinks that a knot replaces.
     """
-    coefficients = []
-    for r, (before, after) in enumerate(zip(old.parts, new.parts, strict=True)):
-        pieces = []
-        for i, fine in enumerate(after.approximators):
-            coarse = before.approximators[i]
-            assert isinstance(fine, ShallowKAN) and isinstance(coarse, ShallowKAN)
-            t = np.linspace(fine.start, fine.stop, 6 * fine.n_basis)
-            basis = fine.basis(t)
-            values = coarse.basis(t) @ point.coefficients[r][before.physics.tops[i].part]
-            normal = basis.T @ basis + 1e-12 * sparse.eye_array(fine.n_basis)
-            pieces.append(spsolve(normal.tocsc(), basis.T @ values))
-        coefficients.append(new.complete(r, np.concatenate(pieces), point.theta))
-    return Point(tuple(coefficients), point.theta)
+    t = np.linspace(fine.start, fine.stop, 6 * fine.n_basis)
+    basis = fine.basis(t)
+    normal = basis.T @ basis + 1e-12 * sparse.eye_array(fine.n_basis)
+    return np.asarray(spsolve(normal.tocsc(), basis.T @ (coarse.basis(t) @ own)))

@@ -30,7 +30,7 @@ from pikanid.problem.chains import Chains
 from pikanid.problem.problem import Problem
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.data_noise import noise_level, row_noise, standard_errors
-from pikanid.strategies.first_points import from_simulation, transfer
+from pikanid.strategies.first_points import from_simulation, through_greville, transfer
 from pikanid.strategies.grids import Discretisation, Grid
 from pikanid.strategies.locks import follows_physics
 from pikanid.strategies.settings import RELAXATION, RelaxationSettings
@@ -156,8 +156,8 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
         del system, outcome  # most of the memory, and not needed any more
         finer = setup.functional(grid, coarse).with_scale(coarse.scale)
         system = BandedSystem(finer)
-        outcome = gauss_newton(system, transfer(coarse, finer, before), lam, system.lower,
-                               system.upper)
+        outcome = gauss_newton(system, transfer(coarse, finer, before, through_greville), lam,
+                               system.lower, system.upper)
         stages.append(_stage(system, lam, outcome, standard_errors(system, outcome)))
         gap = moved(before.theta, outcome.at.point.theta, stages[-1].std, RELATIVE)
         if gap > settings.misled or not outcome.converged:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy as sp
 
+from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.formula import units
 from pikanid.formula.expressions import symbol
@@ -128,6 +129,16 @@ def reading_of_laws(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Seq
         None if estimate is None else estimate.rmse, float(np.sqrt(size)), float(p_value),
         {place: laws.fits[place].form.name if place in laws.fits else edge.name
          for place, edge in named.items()}, estimate=estimate, settings=settings)
+
+
+def reading_unrefitted(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Sequence[str],
+                       ranges: Sequence[tuple[float, float]], contributions: Sequence[Contribution],
+                       stuck: Sequence[str], settings: SymbolicSettings) -> Reading:
+    """The answer of edges alone; those that may be `stuck` are not to be trusted."""
+    share = np.array([float(np.prod([e.probability for e in named.values()]))])
+    found = reading_of_laws(laws, named, arguments, ranges, contributions, share, [laws.label],
+                            laws.covariance, settings=settings)
+    return replace(found, caution=errors.edge_sticks(stuck) if stuck else "")
 
 
 def _apart(curve: Curve, values: np.ndarray) -> np.ndarray:

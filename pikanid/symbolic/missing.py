@@ -23,7 +23,7 @@ from pikanid.recording import Recording
 from pikanid.symbolic.composed import Place
 from pikanid.symbolic.curve import Curve
 from pikanid.symbolic.fitting import FormFit
-from pikanid.symbolic.laws import Laws, chosen, reading_of_laws, sum_of_laws
+from pikanid.symbolic.laws import Laws, chosen, reading_of_laws, reading_unrefitted, sum_of_laws
 from pikanid.symbolic.library import NOTHING, Form
 from pikanid.symbolic.named import NamedEdge
 from pikanid.symbolic.naming import name_curve, priors
@@ -52,13 +52,9 @@ def read_discrepancy(found: Discrepancy, library: Sequence[Form],
                for k, e in enumerate(found.edges)]
     if not named or recordings is None:
         laws = sum_of_laws(found.nominal.model, arguments, chosen(named), ranges, found.unit)
-        share = np.array([float(np.prod([e.probability for e in named.values()]))])
         stuck = [found.edges[k].argument for _, k, _ in named
                  if sticks(found.edges[k], settings)]
-        return replace(
-            reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
-                            laws.covariance, settings=settings),
-            caution=errors.edge_sticks(stuck) if stuck else "")
+        return reading_unrefitted(laws, named, arguments, ranges, weights, stuck, settings)
     tried = _tried(found, named, recordings, priors(library, settings), settings)
     share = probabilities([score for score, _, _ in tried])
     _, laws, estimate = tried[0]

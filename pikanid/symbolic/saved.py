@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import sympy as sp
@@ -13,7 +12,7 @@ from pikanid.discrepancy.edges import MARGIN, EdgePlan
 from pikanid.estimate import Estimate
 from pikanid.formula.expressions import symbol, to_text
 from pikanid.symbolic.curve import Curve
-from pikanid.symbolic.laws import chosen, reading_of_laws, sum_of_laws
+from pikanid.symbolic.laws import chosen, reading_unrefitted, sum_of_laws
 from pikanid.symbolic.library import Form
 from pikanid.symbolic.naming import name_curve
 from pikanid.symbolic.reading import Reading
@@ -55,12 +54,8 @@ def read_estimate(estimate: Estimate, library: Sequence[Form],
     arguments = [p.argument for p in plans]
     ranges = [e.range for e in named.values()]
     laws = sum_of_laws(estimate.model, arguments, chosen(named), ranges)
-    share = np.array([float(np.prod([e.probability for e in named.values()]))])
     stuck = [p.argument for p in plans if p.step and _rests(estimate, p.argument, settings)]
-    return replace(
-        reading_of_laws(laws, named, arguments, ranges, weights, share, [laws.label],
-                        laws.covariance, settings=settings),
-        caution=errors.edge_sticks(stuck) if stuck else "")
+    return reading_unrefitted(laws, named, arguments, ranges, weights, stuck, settings)
 
 
 def _rests(estimate: Estimate, argument: str, settings: SymbolicSettings) -> bool:

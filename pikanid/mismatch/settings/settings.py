@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -19,7 +18,7 @@ from pikanid.mismatch.settings.verdict import BeyondSettings, PartSettings, Verd
 from pikanid.noise.settings import QuietSettings, RoundingSettings
 from pikanid.objective.settings import AdequacySettings
 from pikanid.settings import Amount, Count, Rate, Share, changed, check, items, told
-from pikanid.storage.limits import MOST_MODEL, file_bytes
+from pikanid.storage.limits import toml_content
 from pikanid.symbolic.settings import FormulaSettings
 from pikanid.uncertainty.settings import UncertaintySettings
 
@@ -209,13 +208,7 @@ class Settings:
         def wrong(detail: str) -> errors.BadSetting:
             return errors.BadSetting(errors.settings_unreadable(str(path), detail))
 
-        try:
-            content = tomllib.loads(file_bytes(path, wrong, MOST_MODEL).decode("utf-8"))
-        except UnicodeDecodeError:
-            raise wrong("it is not text") from None
-        except (ValueError, RecursionError) as problem:
-            raise wrong(str(problem) or "it is nested too deep") from None
-        return Settings.from_dict(content)
+        return Settings.from_dict(toml_content(path, wrong))
 
     def __str__(self) -> str:
         return told(self)
