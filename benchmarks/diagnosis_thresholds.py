@@ -150,7 +150,7 @@ def diagnosed(train: pk.Recording, other: pk.Recording, settings: Settings, memo
         except PikanidError as failure:
             return {"verdict": f"failed: {failure}", "mismatch": False, "hypotheses": []}
     return {"verdict": dx.verdict, "mismatch": dx.mismatch, "hypotheses": [
-        {"effects": [{"ids": list(e.ids)} for e in h.effects], "relative_weight": h.relative_weight}
+        {"effects": [{"ids": list(e.ids)} for e in h.effects], "probability": h.probability}
         for h in dx.hypotheses]}
 
 

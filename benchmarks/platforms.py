@@ -174,7 +174,7 @@ def _names(answer: dict[str, Any]) -> list[str]:
 def _numbers(answer: dict[str, Any]) -> Iterator[tuple[str, tuple[float, float]]]:
     """Place -> number and its tolerance."""
     for name, h in zip(_names(answer), answer["hypotheses"], strict=True):
-        yield f"relative weight of {name}", (h["probability"], PROBABILITY)
+        yield f"probability of {name}", (h["probability"], PROBABILITY)
         for effect in h["effects"]:
             for constant, v in effect["parameters"].items():
                 yield f"{constant} of {name}", _estimate(v)

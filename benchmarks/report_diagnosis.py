@@ -40,21 +40,24 @@ LONGEST = 5  # diagnoses of a set that are timed again by themselves
 
 @dataclass(frozen=True)
 class Set:
-    """An open set: its name, excitation, noise [rad], seed and mix (default where None)."""
+    """An open set: its name, excitation, noise [rad], seed, mix (default where None), and how many
+    times as many cases as are asked for it has.
+    """
 
     name: str
     excitation: str
     sigma: float
     seed: int
     mix: Mapping[str, float] | None = None
+    times: float = 1.0
 
 
 SETS = (
     Set("rich", "rich", 0.1 * DEGREE, 20431),
     Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20432),
     Set("rich_1deg", "rich", 1.0 * DEGREE, 20433),
-    Set("remainder", "mixed", 0.1 * DEGREE, 20434, {"remainder": 1.0}),
-    Set("unforeseen", "mixed", 0.1 * DEGREE, 20435, {"unforeseen": 1.0}),
+    Set("remainder", "mixed", 0.1 * DEGREE, 20434, {"remainder": 1.0}, 1.5),
+    Set("unforeseen", "mixed", 0.1 * DEGREE, 20435, {"unforeseen": 1.0}, 1.5),
 )
 
 
@@ -115,15 +118,15 @@ def _together(scores: list[Score], folder: Path) -> str:
         # neighbours in turn above and below
         axis.annotate(f"{share.count}/{share.n}", (p, t), textcoords="offset points",
                       xytext=(5, 5 - 15 * (k % 2)), fontsize=8)
-    axis.set(xlabel="relative weight stated of the first hypothesis", ylabel="share that was true",
+    axis.set(xlabel="probability stated of the first hypothesis", ylabel="share that was true",
              xlim=(0, 1.2), ylim=(-0.05, 1.12))
     axis.legend(loc="upper left", fontsize=8)
     save_figure(figure, folder / "figures" / "diagnosis_reliability.png")
     lines = [f"\n## All {len(scores)} cases together\n", "| what | share |", "| --- | --- |"]
     lines += [f"| {name.replace('_', ' ')} | {share} |" for name, share in tally(scores).items()]
-    lines += ["", "| relative weight stated | true |", "| --- | --- |"]
+    lines += ["", "| probability stated | true |", "| --- | --- |"]
     lines += [f"| {p:.2f} | {share} |" for p, share in rows]
-    return "\n".join([*lines, "", "![stated weight against truth]"
+    return "\n".join([*lines, "", "![stated probability against truth]"
                       "(figures/diagnosis_reliability.png)"]) + "\n"
 
 
@@ -174,7 +177,8 @@ def _diagnosed(one: Set, work: Path, cases: int, workers: int
     from pikanid.validation.concealed.deck import DEFAULT_MIX
 
     folder = work / one.name
-    settings = Settings(cases, one.excitation, one.sigma, dict(one.mix or DEFAULT_MIX))
+    settings = Settings(round(one.times * cases), one.excitation, one.sigma,
+                        dict(one.mix or DEFAULT_MIX))
     made = generate(folder / "recordings", folder / "truth.json", settings, seed=one.seed,
                     workers=workers)
     truth = json.loads(made.truth.read_text())
@@ -243,7 +247,7 @@ def _section(one: Set, found: list[tuple[Score, dict[str, Any]]]) -> str:
                      f"{Share(sum(s.outcome == 'wrong' for s in own), len(own))} |")
     rows = reliability(scores)
     if rows:
-        lines += ["", "| relative weight stated | true |", "| --- | --- |"]
+        lines += ["", "| probability stated | true |", "| --- | --- |"]
         lines += [f"| {stated:.2f} | {share} |" for stated, share in rows]
     wrong = [f"{s.case} ({s.reason}, nominal {s.nominal:.0f} sigma)" for s in scores
              if s.outcome == "wrong"]

@@ -134,7 +134,7 @@ def test_forms_are_those_of_the_library() -> None:
 @pytest.mark.parametrize("identifier", [
     "coulomb_friction", "quadratic_drag", "power_drag", "stribeck_friction"])
 def test_resistance_is_the_force_against_the_motion(identifier: str) -> None:
-    (law,) = (c for c in made(systems.sloshing()) if c.ids[0] == identifier)
+    (law,) = (c for c in made(systems.sloshing()) if c.key == identifier)
     size, *more = law.parameters
     at = {p.name: 0.7 for p in more}
     speed = np.array([0.1, 0.6, 2.3])
@@ -196,15 +196,3 @@ def test_a_stiffness_of_its_own_is_an_explanation_beside_another_only() -> None:
     stiffness = by_key["linear_stiffness"]
     assert not stiffness.suits() and not stiffness.suits([by_key["coulomb_friction"]])
     assert stiffness.suits([by_key["wall_impact"]]) and not stiffness.known
-
-
-def test_resistance_of_any_power_holds_damping_by_amplitude() -> None:
-    by_key = {c.key: c for c in made(systems.sloshing())}
-    wide, narrow = by_key["power_damping"], by_key["amplitude_damping"]
-    q, v, c = symbol("theta"), symbol("theta_dot"), 0.7
-    forces = [law.applied(systems.sloshing()).equations["theta_dot"] -
-              systems.sloshing().equations["theta_dot"] for law in (wide, narrow)]
-    start = {symbol(n): value for n, value in wide.covers["amplitude_damping"].items()}
-    for at in ({q: 0.3, v: -0.9}, {q: -0.2, v: 0.4}):
-        one = forces[0].subs({symbol("c_qn"): c, **start, **at})
-        assert float(one) == pytest.approx(float(forces[1].subs({symbol("c2"): c, **at})))

@@ -22,9 +22,9 @@ from pikanid.model.systems import sloshing
 from pikanid.reporting.diagnosis_page import _where
 
 
-def explanation(name: str, expression: str, relative_weight: float = 0.5) -> Explanation:
+def explanation(name: str, expression: str, probability: float = 0.5) -> Explanation:
     effect = NamedEffect((name.replace(" ", "_"),), name, expression, {})
-    return Explanation((effect,), relative_weight, sloshing(), 0.0, None, None)
+    return Explanation((effect,), probability, sloshing(), 0.0, None, None)
 
 
 def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:

@@ -51,7 +51,7 @@ def told(train: Recording, later: Recording | None) -> Diagnosis | None:
         return None
     assert page(dx, "odd").endswith("</html>\n") and str(dx)
     assert strict_json.text(dx.to_dict())
-    chances = [h.relative_weight for h in dx.hypotheses]
+    chances = [h.probability for h in dx.hypotheses]
     assert chances == sorted(chances, reverse=True)
     return dx
 

@@ -283,16 +283,24 @@ def test_a_law_outside_the_catalogue_that_would_do_as_well_stands_beside_the_nam
     given = answered(fits)
     assert given.verdict == "set" and [sorted(h.key) for h in given.given] == [["a"], ["outside"]]
     assert answered([BASE, hypothesis(1000.0, A), hypothesis(1007.0, GUARD)]).verdict == "named"
-    # a little better is no evidence, where there are two to choose from
-    tie = answered([BASE, hypothesis(1000.0, A), hypothesis(998.5, GUARD)])
+    # as much better as is no evidence, where both are given
+    tie = answered([BASE, hypothesis(1000.0, A), hypothesis(995.0, GUARD)])
     assert tie.verdict == "set" and len(tie.given) == 2
     assert answered([BASE, hypothesis(1000.0, A), hypothesis(1001.0, B),
                      hypothesis(998.5, GUARD)]).verdict == "unconfirmed"
     # one that does better keeps the name from being sure
-    better = answered([BASE, hypothesis(1000.0, A), hypothesis(994.0, GUARD)])
+    better = answered([BASE, hypothesis(1000.0, A), hypothesis(993.0, GUARD)])
     assert better.verdict == "unconfirmed" and "outside" in better.doubt
     # where only the law outside the catalogue is left, nothing has a name
     assert answered(fits, refused=("a",)).verdict == "unnamed"
+
+
+def test_a_form_next_to_the_name_is_given_where_it_is_likely_enough() -> None:
+    """It is one of many: what it is handicapped by is the prior odds against it."""
+    near = replace(effect("square", known=False), next_to="a")
+    for chi2, verdict in ((1001.0, "set"), (1003.0, "named"), (995.0, "set"),
+                          (993.0, "unconfirmed")):
+        assert answered([BASE, hypothesis(1000.0, A), hypothesis(chi2, near)]).verdict == verdict
 
 
 def test_twins_beside_a_law_outside_the_catalogue_are_one_hypothesis() -> None:

@@ -117,7 +117,7 @@ def _explanation(h: Explanation) -> str:
         for e in h.effects for n, v in e.parameters.items())
     formulas = "".join(f"<li>{escape(e.name)} ({escape(' or '.join(e.ids))}): "
                        f"<code>{escape(e.expression)}</code></li>" for e in h.effects)
-    return (f"<p><b>{escape(h.title)}</b>, relative weight {h.relative_weight:.2f}</p>"
+    return (f"<p><b>{escape(h.title)}</b>, probability {h.probability:.3f}</p>"
             f"<ul>{formulas}</ul>"
             f"<table>{rows}</table>")
 

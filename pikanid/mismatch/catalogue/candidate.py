@@ -18,6 +18,8 @@ Family = Literal["dry friction", "drag", "restoring force", "constant force", "t
 Array = np.ndarray
 Resistance = Callable[..., Array]  # (speed (N,), each parameter but the size) -> (N,)
 Parts = Callable[[Sequence[float]], Sequence[Mapping[str, Sequence[float]]]]
+# (values by name, states (L,) by name) -> values by name, from each of which a fit begins
+Begin = Callable[[Mapping[str, float], Mapping[str, Array]], Sequence[Mapping[str, float]]]
 SYMBOLIC = "symbolic:"  # before the formula, in the id of a law that no catalogue holds
 
 
@@ -61,6 +63,15 @@ class TangentDirection:
 
 
 @dataclass(frozen=True)
+class Powers:
+    """A force |q|^q |v|^v, against the motion or, if it `restores`, towards the rest."""
+
+    q: int
+    v: int
+    restores: bool = False
+
+
+@dataclass(frozen=True)
 class Limit:
     """The law that an effect turns into as a length among its parameters goes to zero."""
 
@@ -95,6 +106,9 @@ class Candidate:
         static: Whether it is a force that the state at the same instant determines.
         resistance: The force against the motion at size 1, where it is no more than that.
         exponent: Of the speed, where that force is a power of it: a number, or the parameter.
+        powers: Of the states, where it is a product of powers.
+        next_to: Key of the entry whose form is the next one to its own.
+        starts: Where fits in its place begin, from its values and the motion (L,) by state.
         limit: What it cannot be told from where it is narrow.
         form: Name in the library of `pikanid.symbolic` of its force over `argument`.
         argument: State that `form` is a function of; empty for a constant.
@@ -128,6 +142,9 @@ class Candidate:
     static: bool = False
     resistance: Resistance | None = None
     exponent: float | Parameter | None = None
+    powers: Powers | None = None
+    next_to: str = ""
+    starts: Begin | None = None
     limit: Limit | None = None
     form: str = ""
     argument: str = ""
@@ -140,6 +157,11 @@ class Candidate:
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these."""
         return not self.beside or any(i in self.beside for e in others for i in e.ids)
+
+    @property
+    def refines(self) -> bool:
+        """Whether it is the law of an entry of the same name with its shape left open."""
+        return self.ids[0] + self.site.suffix in self.covers
 
     @property
     def key(self) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
+from pikanid.mismatch.catalogue.neighbouring_forms import neighbouring_forms
 from pikanid.mismatch.catalogue.second_mode import second_mode
 from pikanid.mismatch.catalogue.site import Site
 
@@ -45,7 +46,6 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.even_stiffness, ("restoring force",)),
     (decoys.quintic_stiffness, ("restoring force",)),
     (decoys.linear_stiffness, ("restoring force",)),
-    (decoys.power_damping, ("drag",)),
     # half of the difference between forth and back is a constant force
     (decoys.one_way_friction, ("dry friction", "constant force")),
     (decoys.stribeck_friction, ("dry friction",)),
@@ -67,7 +67,7 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
     >>> from pikanid.mismatch.catalogue.site import sites
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
-    >>> sum(c.known and c.suits() for c in found), found[0].key
+    >>> sum(c.known and c.suits() and not c.refines for c in found), found[0].key
     (29, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
@@ -79,4 +79,6 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
                 for candidate in make(site):
                     if candidate.channel != "sensor" or first[site.output.name] == site.q:
                         made.setdefault(candidate.key, replace(candidate, families=families))
+    for entry in [*made.values()]:
+        made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
     return tuple(made.values())

@@ -76,20 +76,6 @@ def linear_stiffness(site: Site) -> list[Candidate]:
         "even_stiffness"))]
 
 
-def power_damping(site: Site) -> list[Candidate]:
-    """-c q² |v|ⁿ sgn v: resistance that grows with the amplitude; for small n it is dry friction
-    whose load does.
-    """
-    if not site.rate:
-        return []
-    c = Parameter(site.name("c_qn"), 0.0, f"1/(s^2*({site.unit}))", (0.0, INF))
-    n = Parameter(site.name("n_q"), 1.0, "", (0.05, 4.0))
-    text = f"-{c.name}*{site.q}**2*signed_power({site.v}, {n.name})"
-    return [Candidate(("power_damping",), "resistance that grows with amplitude", text, "dynamics",
-                      site, (c, n), _with_term(site.v, text), lambda view: [], known=False,
-                      covers={"amplitude_damping" + site.suffix: {n.name: 1.0}}, exponent=n)]
-
-
 def one_way_friction(site: Site) -> list[Candidate]:
     """Dry friction in one direction only."""
     found = []

@@ -10,13 +10,14 @@ import numpy as np
 import sympy as sp
 
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
+from pikanid.mismatch.catalogue.candidate import Candidate, Powers, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 INF = float("inf")
 SIDE, BOTH = "negative side", "both sides"
+SIDES = {"": (1,), SIDE: (-1,), BOTH: (1, -1)}  # definition: of the walls of each variant
 
 
 def term(site: Site, identifier: str, name: str, expression: str, size: Parameter,
@@ -39,7 +40,8 @@ def cubic_stiffness(site: Site) -> list[Candidate]:
     k = Parameter(site.name("k3"), 0.0, f"1/(s^2*({site.unit})^2)")
     law = term(site, "cubic_stiffness", "cubic stiffness", f"-{k.name}*{site.q}**3", k,
                lambda w: -w.x[site.q] ** 3, one_sided=False)
-    return [replace(law, static=True, form="cubic", argument=site.q)]
+    return [replace(law, static=True, form="cubic", argument=site.q,
+                    powers=Powers(3, 0, restores=True))]
 
 
 def static_bias(site: Site) -> list[Candidate]:
@@ -101,9 +103,9 @@ def wall_impact(site: Site) -> list[Candidate]:
     w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
     k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
 
-    def one(sides: Sequence[int], variant: str, name: str = "impact on a wall") -> Candidate:
-        text = " + ".join(f"{'-' if side > 0 else ''}{k.name}*max({'-' if side < 0 else ''}{site.q}"
-                          f" - {w.name}, 0)" for side in sides)
+    def one(variant: str, name: str = "impact on a wall") -> Candidate:
+        sides = SIDES[variant]
+        text = wall_force(site, w.name, k.name, variant)
 
         def directions(view: View) -> list[TangentDirection]:
             tops = [float((side * view.x[site.q]).max(initial=0.0)) for side in sides]
@@ -119,7 +121,15 @@ def wall_impact(site: Site) -> list[Candidate]:
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))
 
-    return [one((1,), ""), one((-1,), SIDE), one((1, -1), BOTH, "impact on walls on both sides")]
+    return [one(""), one(SIDE), one(BOTH, "impact on walls on both sides")]
+
+
+def wall_force(site: Site, distance: str, stiffness: str, variant: str, power: int = 1) -> str:
+    """The formula of walls that push back with a power of how deep they give way."""
+    raised = f"**{power}" if power > 1 else ""
+    return " + ".join(
+        f"{'-' if side > 0 else ''}{stiffness}*max({'-' if side < 0 else ''}{site.q}"
+        f" - {distance}, 0){raised}" for side in SIDES[variant])
 
 
 def disturbance(site: Site) -> list[Candidate]:

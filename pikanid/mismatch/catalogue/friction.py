@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.candidate import Candidate, Limit, TangentDirection, View
+from pikanid.mismatch.catalogue.candidate import (
+    Candidate,
+    Limit,
+    Powers,
+    TangentDirection,
+    View,
+)
 from pikanid.mismatch.catalogue.forces import INF, term
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -15,6 +21,8 @@ from pikanid.model.parts import Parameter, State
 
 # of the size of dry friction, about which a motion comes to rest elsewhere
 STICKING = (0.6, 0.8, 1.25, 1.6)  # numerical: where fits begin
+# of the usual speed, over which a reversal is rounded where a fit begins, and at least
+ROUNDED, SHARP = 0.05, 0.001  # numerical: narrower than between two samples, it is sharp
 
 
 def sense(view: View, v: str) -> np.ndarray:
@@ -25,12 +33,24 @@ def sense(view: View, v: str) -> np.ndarray:
 
 
 def coulomb_friction(site: Site) -> list[Candidate]:
-    """Dry friction: the same force at every speed, against the motion."""
+    """Dry friction: the same force at every speed, against the motion; where a contact creeps, as
+    -c tanh(v/w), rounded over speeds of w (S. Andersson, A. Söderberg and S. Björklund, Tribol.
+    Int. 40, 2007).
+    """
     c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
     law = term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
-               lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING)
-    return [replace(law, static=True, resistance=np.ones_like, exponent=0.0, form="sign",
-                    argument=site.v)]
+               lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING, twin="coulomb")
+    sharp = replace(law, static=True, resistance=np.ones_like, exponent=0.0, form="sign",
+                    argument=site.v, powers=Powers(0, 0))
+    usual = site.half_range * (site.rate or 1.0)
+    width = Parameter(site.name("w_c"), max(ROUNDED * usual, 1e-6), f"{site.unit}/s",
+                      (max(SHARP * usual, 1e-9), INF))
+    text = f"-{c.name}*tanh({site.v}/{width.name})"
+    rounded = Candidate(
+        sharp.ids, "Coulomb friction with a rounded reversal", text, "dynamics", site, (c, width),
+        lambda m: m.with_term(site.v, text), lambda view: [], "rounded", sharp.twin,
+        covers={sharp.key: {}}, static=True, resistance=lambda v, w: np.asarray(np.tanh(v / w)))
+    return [sharp, rounded]
 
 
 def quadratic_drag(site: Site) -> list[Candidate]:
@@ -39,7 +59,7 @@ def quadratic_drag(site: Site) -> list[Candidate]:
     law = term(site, "quadratic_drag", "quadratic drag", f"-{q.name}*abs({site.v})*{site.v}", q,
                lambda w: -np.abs(w.x[site.v]) * w.x[site.v], one_sided=True)
     return [replace(law, static=True, resistance=np.square, exponent=2.0, form="signed square",
-                    argument=site.v)]
+                    argument=site.v, powers=Powers(0, 2))]
 
 
 def power_drag(site: Site) -> list[Candidate]:
@@ -73,7 +93,7 @@ def amplitude_damping(site: Site) -> list[Candidate]:
     law = term(site, "amplitude_damping", "damping that grows with amplitude",
                f"-{c.name}*{site.q}**2*{site.v}", c,
                lambda w: -w.x[site.q] ** 2 * w.x[site.v], one_sided=True)
-    return [replace(law, static=True)]
+    return [replace(law, static=True, powers=Powers(2, 1))]
 
 
 def hysteresis(site: Site) -> list[Candidate]:

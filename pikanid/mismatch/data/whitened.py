@@ -168,6 +168,11 @@ class Whitened:
         return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
                 for r, s in enumerate(self.simulators)]
 
+    def motion(self, theta: np.ndarray) -> dict[str, np.ndarray]:
+        """States (L,) by name, the recordings' one after the other."""
+        states = np.concatenate([r.states for r in self.responses(theta, states=True)])
+        return dict(zip(self.problem.model.state_names, states.T, strict=True))
+
     @property
     def cost(self) -> float:
         """Of a simulation with derivatives: states times steps."""

@@ -156,7 +156,7 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
         raise errors.BadSetting(errors.bad_value("strength", strength, f"above {separated:g}"))
     nothing = recorded(a_model(model), one_recording(excitation), sigma, settings)
     catalogue = tuple(c for c in catalogue_of(sites(model, nothing.recordings))
-                      if c.known and c.fits and c.suits())
+                      if c.known and c.fits and c.suits() and not c.refines)
     base = fitted(model, (), nothing, [{}], len(catalogue))
     if base is None:
         raise errors.SimulationFailed(errors.too_rough_to_plan(model.name, excitation.name))

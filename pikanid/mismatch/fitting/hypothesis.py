@@ -64,6 +64,11 @@ class Hypothesis:
         return all(e.known for e in self.effects)
 
     @property
+    def next_form(self) -> bool:
+        """Whether an effect is of the form next to an entry's, one of many that might act."""
+        return any(e.next_to for e in self.effects)
+
+    @property
     def symbolic(self) -> bool:
         """Whether an effect is a formula that was read, not an entry of the catalogue."""
         return any(e.ids[0].startswith(SYMBOLIC) for e in self.effects)

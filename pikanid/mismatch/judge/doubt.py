@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -22,7 +22,8 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
     Each effect has to be strong.  What is weak can be a facet of anything: laws that no catalogue
     holds leave nothing beside it that a test would find.  The held-out recording has to be one that
     could have refuted it.  And it has to speak for each of several: one is easily found that takes
-    up what the others leave, whatever that is.
+    up what the others leave, whatever that is.  What happens once, of which it cannot speak, takes
+    up anything: there, what lasts must not do most of that as well.
 
     Args:
         h: To prove.
@@ -64,7 +65,19 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             if len(h.effects) > 1 and not e.absent and not speaks(
                     h, o, predict, asks.needed * scale):
                 return f"the held-out recording does not need {e.name}"
+            if e.absent and rest and (other := _lasting(rest, o, fits.values())) and smaller(
+                    asks.once * (o.minimum.chi2 - h.minimum.chi2),
+                    o.minimum.chi2 - other.minimum.chi2):
+                return f"a lasting effect would take up most of what {e.name} does"
     return ""
+
+
+def _lasting(rest: frozenset[str], fewer: Hypothesis, fits: Iterable[Hypothesis]
+             ) -> Hypothesis | None:
+    """The closest hypothesis with one more effect than `rest`, which `fewer` holds, that lasts."""
+    return min((o for o in fits if rest < o.key and len(o.effects) == len(fewer.effects) + 1
+                and not any(e.absent for e in o.effects if e.key not in rest)),
+               key=lambda o: o.minimum.chi2, default=None)
 
 
 def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float = 0.0) -> bool:

@@ -30,8 +30,9 @@ class Answer:
     """Verdict, hypotheses given (most probable first) and the closest ones not given.
 
     `twins` lists, for a hypothesis given, the effects that stand for each other in it; `reasons`
-    why others are not given, and `doubt` what keeps the first one from being confirmed.  `part` is
-    what is surely there although something is left.
+    why others are not given, and `doubt` what keeps the first one from being confirmed.  `rivals`
+    are laws outside the catalogue that explain all as well, but are not likely enough to be given.
+    `part` is what is surely there although something is left.
     """
 
     verdict: Verdict
@@ -40,6 +41,7 @@ class Answer:
     twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = field(default_factory=dict)
     reasons: dict[frozenset[str], str] = field(default_factory=dict)
     doubt: str = ""
+    rivals: tuple[Hypothesis, ...] = ()
     part: Part | None = None
 
 
@@ -129,16 +131,16 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     # laws outside the catalogue that would do as well are for the reader to know
     lowest = min(map(total, known))
     open_to, more = merged_twins(
-        [h for h in outside if below(total(h) - _handicap(h, asks), lowest + within)], tried,
-        asks)
+        [h for h in outside if below(
+            total(h) - (0.0 if h.next_form else _handicap(h, asks)), lowest + within)], tried, asks)
     merged, twins = merged + open_to, {**twins, **more}
     doubt = why_not(known[0], ranked, predict, scale, settings) if proves else ""
     if doubt and not outside:
         # what it holds may be sure by itself, whatever may be there besides
         simplest = min((h for h in known if h.key <= known[0].key), key=lambda h: len(h.effects))
         doubt = why_not(simplest, ranked, predict, scale, settings) and doubt
-    # beside one name, such a law may explain it by a factor e better: that is no evidence
-    margin = asks.side_by_side if len(merged) == 2 else 0.0
+    # beside one name such a law may explain it as much better as is no evidence: it is given, too
+    margin = within if len(merged) == 2 else 0.0
     if proves and not known[0].symbolic and any(
             below(total(h) - _handicap(h, asks), lowest - margin) for h in outside):
         doubt = "a law outside the catalogue explains it better"
@@ -148,7 +150,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
                         else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
     return Answer(verdict, _most_probable_first(merged, predict, scale, asks), tuple(others), twins,
-                  {**spare, **reasons}, doubt)
+                  {**spare, **reasons}, doubt,
+                  tuple(h for h in outside if not any(h is o for o in merged)))
 
 
 def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,

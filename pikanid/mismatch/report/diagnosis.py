@@ -71,7 +71,7 @@ class Diagnosis(DiagnosisData):
                 "effects": [{"ids": list(e.ids), "name": e.name, "expression": e.expression,
                              "parameters": {n: _entry(v) for n, v in e.parameters.items()}}
                             for e in h.effects],
-                "probability": h.relative_weight} for h in self.hypotheses],
+                "probability": h.probability} for h in self.hypotheses],
             "parameters": {"before": _parameters(self.before), "after": _parameters(self.after)},
             "held_out": None if self.held_out is None else self.held_out.to_dict(),
             "undetectable_below": {

@@ -27,17 +27,18 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
     if not pool:
         return (), ()
 
-    scores = np.array([criterion(h, predict(h), scale, asks) for h in answer.given] or [0.0])
+    scores = np.array([criterion(h, predict(h), scale, asks)
+                       for h in (*answer.given, *answer.rivals)] or [0.0])
     weights = np.exp(-0.5 * (scores - scores.min()))
-    weights = weights / weights.sum()
+    weights *= (1 - asks.unforeseen) / weights.sum()
 
-    def one(h: Hypothesis, relative_weight: float, why: str) -> Explanation:
+    def one(h: Hypothesis, probability: float, why: str) -> Explanation:
         table = answer.twins.get(h.key, {})
         effects = tuple(NamedEffect(
             table.get(e.key, e.names), e.name, e.expression,
             values_of(e.parameters, h.values, h.std, overdispersion), e.channel) for e in h.effects)
         p = predict(h) if h in answer.given else None
-        return Explanation(effects, relative_weight, h.model.with_values(
+        return Explanation(effects, probability, h.model.with_values(
             {n: v for n, v in h.values.items()}), h.score(scale),
             test(h).p_value if h in answer.given else None,
             None if p is None else p.detection.p_value, why)

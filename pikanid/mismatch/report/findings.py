@@ -36,10 +36,14 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Explanation:
-    """A hypothesis: effects, weight among those considered, model, tests."""
+    """A hypothesis: effects, posterior probability, model, tests.
+
+    The probability is that of its criterion among all that explain the recordings, laws outside the
+    catalogue among them, and a law that nothing listed holds (`Settings.verdict.unforeseen`).
+    """
 
     effects: tuple[NamedEffect, ...]
-    relative_weight: float
+    probability: float
     model: Model
     score: float
     p_train: float | None

@@ -22,7 +22,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
     lines += [f"Surely: {part.sentence()}" for part in dx.present]
     lines += dx.remainder.lines() if dx.remainder is not None else []
     for h in dx.hypotheses:
-        lines.append(f"What: {h.title} (relative weight {h.relative_weight:.2f})")
+        lines.append(f"What: {h.title} (probability {h.probability:.3f})")
         for e in h.effects:
             lines.append(f"  {e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():

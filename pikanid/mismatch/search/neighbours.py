@@ -69,6 +69,23 @@ def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
             yield (*rest, other), [{**h.point, **start} for start in starts]
 
 
+def with_next_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With each law of the form next to one of its effects in that one's place."""
+    for effect in h.effects:
+        near = [c for c in candidates if c.next_to == effect.key and c.starts is not None]
+        states = h.whitened.motion(h.minimum.theta) if near else {}
+        for other in near:
+            assert other.starts is not None
+            yield (*_rest(h, effect), other), [
+                {**h.point, **start} for start in other.starts(h.values, states)]
+
+
+def with_other_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With what keeps the name of one of its effects away, if that acts instead, in its place."""
+    yield from with_wider(h, candidates)
+    yield from with_next_form(h, candidates)
+
+
 def with_parts(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """With the sum of other laws that one of its effects is in that one's place."""
     by_key = {c.key: c for c in candidates}
@@ -97,10 +114,10 @@ def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
 
 def with_relatives(h: Hypothesis, effect: Candidate, candidates: Sequence[Candidate]
                    ) -> Iterator[Job]:
-    """Every other member of an effect's families in that one's place."""
+    """Every other member of an effect's families in that one's place, but forms next to members."""
     for other in candidates:
-        if (other.fits and other.key not in h.key and other.site.q == effect.site.q
-                and set(other.families) & set(effect.families)):
+        if (other.fits and not other.next_to and other.key not in h.key
+                and other.site.q == effect.site.q and set(other.families) & set(effect.families)):
             yield (*_rest(h, effect), other), [h.point]
 
 

@@ -32,9 +32,7 @@ def as_strong(h: Hypothesis, effect: Candidate, other: Candidate, more: Sequence
         more: Values of its parameters but the size.
     """
     size, *own = (h.values[p.name] for p in effect.parameters)
-    at = h.model.state_names.index(effect.site.v)
-    speed = np.concatenate([np.abs(response.states[:, at]) for response in
-                            h.whitened.responses(h.minimum.theta, states=True)])
+    speed = np.abs(h.whitened.motion(h.minimum.theta)[effect.site.v])
     shape, wanted = _resistance(effect, own, speed), _resistance(other, more, speed)
     if shape is None or wanted is None:
         return size

@@ -72,7 +72,7 @@ class Search:
     @property
     def choices(self) -> int:
         """Number of entries to choose from."""
-        return sum(c.known and c.suits() for c in self.candidates)
+        return sum(c.known and c.suits() and not c.refines for c in self.candidates)
 
     def base(self) -> Hypothesis:
         """The nominal model without effects, refitted; SimulationFailed where that cannot be."""
@@ -152,7 +152,7 @@ class Search:
         # even without budget, no name without the laws that keep wrong ones away, of parts as well
         parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
         for h in (*parts, *self._contenders()):
-            for job in neighbours.with_wider(h, self.candidates):
+            for job in neighbours.with_other_form(h, self.candidates):
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
 

@@ -19,11 +19,11 @@ class VerdictSettings:
     Attributes:
         indistinct: [criterion] below which hypotheses are not told apart: weights of 1 to 20.
         behind: Times that, and a hypothesis can still be what predicts best.
-        side_by_side: [criterion] below which two explanations are given side by side: a factor of e
-            is no evidence.
         same_law: [criterion]: what differs by less may be the same law, written in another way.
         decoy_handicap: [criterion] that each law outside the catalogue is handicapped by: prior
             odds of e² to 1 that a law is one that has a name.
+        unforeseen: Prior probability that what explains everything is a law that neither the
+            catalogue nor what keeps its names away holds.
         improvement: Ratio of held-out misfits from which on downwards a prediction is better.
         worth: Share of the nominal held-out misfit that an effect must take away where a part
             remains.
@@ -34,6 +34,8 @@ class VerdictSettings:
             most of anything.
         shown: [χ²] that it must gain in the recording it was found in: the other one is the proof.
         needed: [criterion] that each of several effects must gain on held-out recordings.
+        once: Share of what an effect that happens once takes away beside others that one that lasts
+            may take away in its place.
         worse: Times the nominal held-out RMSE: no proof, whatever errors of parameters forgive.
         linear: Standard deviations that a linearisation holds for: beyond, it is renewed.
         missed: [χ²] that a fit to all recordings may exceed fits to each by, where it is best.
@@ -48,9 +50,9 @@ class VerdictSettings:
 
     indistinct: Amount = 6.0
     behind: Factor = 3.0
-    side_by_side: Amount = 2.0
     same_law: Amount = 1.0
     decoy_handicap: Amount = 4.0
+    unforeseen: Rate = 0.005
     improvement: Share = 0.9
     worth: Share = 0.05
     part: Share = 0.5
@@ -58,6 +60,7 @@ class VerdictSettings:
     strong: tuple[Amount, Amount, Amount, Amount] = (40.0, 45.0, 90.0, 135.0)
     shown: Amount = 12.0
     needed: Amount = 4.0
+    once: Share = 0.5
     worse: Factor = 1.5
     linear: Amount = 3.0
     missed: Amount = 15.0

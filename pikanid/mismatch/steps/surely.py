@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from pikanid.mismatch.beyond.patch import FreeCurve
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.partial import Part, Present, lasting, left_over, surely_there
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.search.neighbours import with_relatives
+from pikanid.mismatch.search.neighbours import with_next_form, with_relatives
 from pikanid.mismatch.search.search import Search
 
 
@@ -50,6 +48,7 @@ def _compared(search: Search, lead: Hypothesis) -> bool:
     without = [tuple(e for e in lead.effects if f not in e.families) for f in families]
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
+        *with_next_form(lead, search.candidates),
         *((rest, [lead.point]) for rest in without)])
     return search.closer([lead]) or found
 
@@ -61,9 +60,7 @@ def _has_its_form(case: Case, part: Part, p: Present, noise: Sequence[dict[str, 
     before = case.predicted(h)
     if not p.names or argument is None or before is None or p.effect not in h.effects:
         return True
-    at = h.model.state_names.index(argument)
-    visited = np.concatenate([response.states[:, at] for response in
-                              h.whitened.responses(h.minimum.theta, states=True)])
+    visited = h.whitened.motion(h.minimum.theta)[argument]
     curve = FreeCurve(argument, float(visited.min()), float(visited.max()), h.model)
     effects = [*h.effects, curve.candidate(site)]
     found = fitted(case.model, effects, h.whitened.records, [h.point], 1)

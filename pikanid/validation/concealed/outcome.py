@@ -34,6 +34,7 @@ FORMULAS = {
     "velocity_coupled_drive": r"u_\w\*theta_dot",
     "smooth_friction": r"tanh\([^)]*theta_dot",
     "asymmetric_spring": r"Abs\(theta\)|max\(-?theta(, 0)?\)",
+    "position_friction": r"theta\*\*2\*sign\(theta_dot\)",
     "cable_drag": r"max\(theta - \w+, 0\)\*\*2",
     "cogging": r"sin\([^)]*\*theta\b",
     "quadratic_input": r"u_\w\*\*2",

@@ -56,7 +56,7 @@ class Score:
             does not hide, `near` (the entry that the hidden law resembles), `nothing` is hidden,
             or `other`.
         hypotheses: How many were given.
-        relative_weight: Of the most probable one; None where nothing is answered.
+        probability: Of the most probable one; None where nothing is answered.
         first_is_truth: Whether that one is the truth, its visible part, or a formula of its kind.
         within: Whether each base parameter lies within 3 standard errors of the truth; None where
             none is compared.
@@ -76,7 +76,7 @@ class Score:
     outcome: Outcome
     reason: str
     hypotheses: int
-    relative_weight: float | None
+    probability: float | None
     first_is_truth: bool
     within: bool | None
     held_out: float | None
@@ -200,12 +200,12 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
 def reliability(scores: Iterable[Score],
                 edges: Sequence[float] = (0.0, 0.5, 0.7, 0.9, 0.97, 1.0),
                 ) -> list[tuple[float, Share]]:
-    """For each interval of stated weight that occurs: its mean, and how often it was true.
+    """For each interval of stated probability that occurs: its mean, and how often it was true.
 
     Only the most probable hypothesis of each answer counts.
     """
-    stated = [(s.relative_weight, s.first_is_truth) for s in scores
-              if s.relative_weight is not None]
+    stated = [(s.probability, s.first_is_truth) for s in scores
+              if s.probability is not None]
     rows = []
     for low, high in pairwise(edges):
         inside = [(p, hit) for p, hit in stated

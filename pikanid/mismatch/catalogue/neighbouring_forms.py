@@ -1,0 +1,104 @@
+"""Laws of the forms next to an entry's: other powers of the states, and a wall that stiffens.
+
+A name claims a form.  Where the form next to it explains a recording about as well, the recording
+has not shown which of them acts; where it explains far more, the entry is not what acts.  So every
+power law of the catalogue is compared with those of one power more and one less in each state, and
+an elastic wall with one whose force rises with the square, as that of a cable that tightens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pikanid.formula import units
+from pikanid.mismatch.catalogue.candidate import Begin, Candidate, Family, Powers
+from pikanid.mismatch.catalogue.forces import INF, wall_force
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.model.parts import Parameter
+
+EASED = (0.75, 0.88, 1.0)  # numerical: of a wall's distance, where fits of one that stiffens begin
+Starts = list[dict[str, float]]
+
+
+def neighbouring_forms(entry: Candidate) -> list[Candidate]:
+    """The decoys next to an entry in form; none where it is no power law and no wall."""
+    if entry.ids == ("wall_impact",):
+        return [_stiffening(entry)]
+    if entry.powers is None or not entry.site.rate:
+        return []
+    return [_power_law(entry, near) for near in _next(entry.powers)]
+
+
+def _next(own: Powers) -> list[Powers]:
+    """One power more, and one less, in each state; without the linear laws that a model has."""
+    if own.restores:
+        return [Powers(n, 0, True) for n in (own.q - 1, own.q + 1) if n > 1]
+    near = [(own.q + 1, own.v), (own.q - 1, own.v), (own.q, own.v + 1), (own.q, own.v - 1)]
+    return [Powers(q, v) for q, v in near if min(q, v) >= 0 and (q, v) != (0, 1)]
+
+
+def _power_law(entry: Candidate, near: Powers) -> Candidate:
+    """-c |q|ᵃ |v|ᵇ against the motion, or -k |q|ᵃ towards the rest."""
+    site, own = entry.site, entry.powers
+    assert own is not None
+    mark = f"{entry.ids[0]}_q{near.q}_v{near.v}"
+    unit = units.product((site.unit, 1 - near.q - near.v), ("s", near.v - 2))
+    letter = "k" if near.restores else "c"
+    size = Parameter(site.name(f"{letter}_{near.q}{near.v}"), 0.0, unit, entry.parameters[0].bounds)
+    factors = [_signed(site.q, near.q)] if near.restores else [
+        *_magnitude(site.q, near.q), _signed(site.v, near.v)]
+    text = "*".join([f"-{size.name}", *factors])
+
+    def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
+        q, v = (np.abs(states[n]) for n in (site.q, site.v))
+        as_loud = _loud(own, q, v) / max(_loud(near, q, v), 1e-300)
+        return [{size.name: values[entry.parameters[0].name] * as_loud}]
+
+    # what does not rise with speed is dry friction
+    kind: Family = "dry friction" if near.v == 0 else "drag"
+    return _decoy(entry, mark, text, (size,), starts, entry.families if near.restores else (kind,))
+
+
+def _magnitude(x: str, n: int) -> list[str]:
+    return [] if n == 0 else [f"{x}**{n}" if n % 2 == 0 else f"abs({x})" if n == 1 else
+                              f"abs({x})**{n}"]
+
+
+def _signed(x: str, n: int) -> str:
+    if n == 0:
+        return f"sign({x})"
+    power = x if n <= 2 else f"{x}**{n if n % 2 else n - 1}"
+    return power if n % 2 else f"abs({x})*{power}"
+
+
+def _loud(form: Powers, q: np.ndarray, v: np.ndarray) -> float:
+    """The root mean square of a power law of size 1 over the motion |q|, |v| (L,)."""
+    return float(np.sqrt(np.mean((q**form.q * v**form.v) ** 2)))
+
+
+def _stiffening(wall: Candidate) -> Candidate:
+    """The wall's force k δ², δ how deep it gives way."""
+    site, distance = wall.site, wall.parameters[0]
+    k = Parameter(site.name("k_cable"), 0.0, units.product((site.unit, -1), ("s", -2)), (0.0, INF))
+
+    def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
+        stiffness, at = values[wall.parameters[1].name], values[distance.name]
+        top = float(np.abs(states[site.q]).max(initial=0.0))
+        return [{distance.name: share * at,
+                 k.name: stiffness * max(top - at, 0.0) / max(top - share * at, 1e-9) ** 2}
+                for share in EASED]
+
+    return _decoy(wall, "stiffening_wall", wall_force(
+        site, distance.name, k.name, wall.variant, power=2),
+                  (distance, k), starts, wall.families)
+
+
+def _decoy(entry: Candidate, name: str, text: str, parameters: tuple[Parameter, ...],
+           starts: Begin, families: tuple[Family, ...]) -> Candidate:
+    site: Site = entry.site
+    return Candidate((name,), f"a form next to {entry.name}", text, "dynamics", site, parameters,
+                     lambda m: m.with_term(site.v, text), lambda view: [], entry.variant,
+                     families=families, known=False, static=True,
+                     other_minima=entry.other_minima, next_to=entry.key, starts=starts)

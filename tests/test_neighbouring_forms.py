@@ -1,0 +1,116 @@
+"""Laws of the next form: which they are, where fits begin, and that a name asks about them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pikanid as pk
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.recording import Recording
+
+STILL = pk.excitation.two_pulse()
+
+
+@pytest.fixture(scope="module")
+def by_key() -> dict[str, Candidate]:
+    return {c.key: c for c in candidates(sites(pk.systems.sloshing(), (STILL,)))}
+
+
+def force(law: Candidate, **at: float) -> float:
+    """What a law adds to the acceleration at these values, its size 1."""
+    model = pk.systems.sloshing()
+    added = law.applied(model).equations["theta_dot"] - model.equations["theta_dot"]
+    size = law.parameters[-1].name if law.ids[0] == "stiffening_wall" else law.parameters[0].name
+    return float(added.subs({symbol(n): v for n, v in {size: 1.0, **at}.items()}))
+
+
+@pytest.mark.parametrize(("entry", "near"), [
+    ("coulomb_friction", {lambda q, v: -abs(q) * np.sign(v)}),
+    ("quadratic_drag", {lambda q, v: -abs(q) * abs(v) * v, lambda q, v: -v**3}),
+    ("amplitude_damping", {lambda q, v: -abs(q) ** 3 * v, lambda q, v: -abs(q) * v,
+                           lambda q, v: -q**2 * abs(v) * v, lambda q, v: -q**2 * np.sign(v)}),
+    ("cubic_stiffness", {lambda q, v: -abs(q) * q, lambda q, v: -abs(q) * q**3}),
+])
+def test_one_power_more_and_one_less_in_each_state(by_key: dict[str, Candidate], entry: str,
+                                                   near: set) -> None:
+    """And neither viscous damping nor a linear spring, which the model has."""
+    found = [c for c in by_key.values() if c.next_to == entry]
+    places = [(0.3, -0.9), (-0.2, 0.4), (0.5, 1.7)]
+    got = sorted([round(force(c, theta=q, theta_dot=v), 9) for q, v in places] for c in found)
+    assert got == sorted([round(float(law(q, v)), 9) for q, v in places] for law in near)
+    assert not any(c.known for c in found)
+    assert {c.ids[0][-2:] == "v0" for c in found if "dry friction" in c.families} <= {True}
+
+
+def test_a_wall_may_stiffen_on_each_side(by_key: dict[str, Candidate]) -> None:
+    for entry, theta, expected in (("wall_impact", 0.5, -0.04),
+                                   ("wall_impact[negative side]", -0.5, 0.04),
+                                   ("wall_impact[both sides]", -0.6, 0.09)):
+        [law] = [c for c in by_key.values() if c.next_to == entry]
+        assert force(law, theta=theta, wall=0.3) == pytest.approx(expected)
+        assert force(law, theta=0.1, wall=0.3) == 0
+
+
+def test_a_fit_of_the_next_form_begins_as_loud_as_the_law(by_key: dict[str, Candidate]) -> None:
+    t = np.linspace(0.001, 6, 601)
+    states = {"theta": 0.3 * np.cos(3 * t), "theta_dot": -0.9 * np.sin(3 * t)}
+    q, v = states["theta"], states["theta_dot"]
+    [law] = [c for c in by_key.values() if c.next_to == "coulomb_friction"]
+    assert law.starts is not None
+    [start] = law.starts({"c": 0.7}, states)
+    assert np.mean((start["c_10"] * q * np.sign(v)) ** 2) == pytest.approx(
+        np.mean((0.7 * np.sign(v)) ** 2), rel=1e-6)
+    [wall] = [c for c in by_key.values() if c.next_to == "wall_impact"]
+    assert wall.starts is not None
+    for start in wall.starts({"wall": 0.2, "k_wall": 50.0}, states):
+        depth = np.abs(q).max() - start["wall"]
+        assert start["k_cable"] * depth**2 == pytest.approx(
+            50.0 * (np.abs(q).max() - 0.2))
+
+
+def test_without_a_rest_friction_has_no_next_form() -> None:
+    """Where a coordinate has no origin, no force is a power of it."""
+    model = pk.Model.from_dict({
+        "name": "cart", "states": {"x": {"unit": "m", "initial": 0.0},
+                                   "v": {"unit": "m/s", "initial": 0.0}},
+        "parameters": {"b": {"unit": "1/s", "value": 1.0}},
+        "inputs": {"u": {"unit": "m/s^2"}},
+        "equations": {"x": "v", "v": "u - b*v"},
+        "outputs": {"x": {"unit": "m", "expression": "x"}}})
+    t = np.arange(100) * 0.01
+    run = Recording.from_arrays(t, {"u": np.sin(t), "x": np.cos(t)}, units={"u": "m/s^2", "x": "m"})
+    assert not [c for c in candidates(sites(model, (run,)))
+                if c.next_to and c.ids != ("stiffening_wall",)]
+
+
+def swings(seed: int, cable: float, slack: float) -> Recording:
+    """A damped pendulum on a cable that tightens beyond an angle: SciPy's DOP853."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, 12, 0.01)
+    u = np.repeat(rng.normal(0, 1.2, 12), 100) * np.repeat(rng.random(12) < 0.7, 100)
+    length, damping, mass = 0.05, 0.3, 0.3
+    theta = np.zeros(len(t))
+    state = np.zeros(2)
+    for k in range(len(t) - 1):
+        def rhs(_: float, x: np.ndarray, push: float = u[k]) -> list[float]:
+            pull = cable * max(x[0] - slack, 0.0) ** 2
+            return [x[1], -9.81 / length * np.sin(x[0]) - damping / mass * x[1]
+                    - push / length * np.cos(x[0]) - pull]
+        state = solve_ivp(rhs, (0, 0.01), state, "DOP853", rtol=1e-9, atol=1e-12).y[:, -1]
+        theta[k + 1] = state[0]
+    noisy = theta + rng.normal(0, 0.002, len(t))
+    return Recording.from_arrays(t, {"u_x": u, "theta": noisy},
+                                 units={"u_x": "m/s^2", "theta": "rad"})
+
+
+@pytest.mark.slow
+def test_a_cable_is_not_called_a_wall() -> None:
+    """Its force rises with the square beyond an angle; a wall's law explains it nearly as well."""
+    answer = pk.diagnose(pk.systems.sloshing(), swings(1, 900.0, 0.08), swings(2, 900.0, 0.08))
+    given = [sorted(h.ids) for h in answer.hypotheses] if answer.verdict == "named" else []
+    assert given != [["wall_impact"]]
