@@ -4,10 +4,8 @@ from __future__ import annotations
 
 
 def kan_width(width: object) -> str:
-    return (
-        f"width = {width} cannot make a KAN: list the nodes of at least two layers, each 1 or more "
-        "(or [sums, products]), the first without products."
-    )
+    return (f"width = {width} cannot make a KAN: list the nodes of at least two layers, each 1 or "
+            "more (or [sums, products]), the first without products.")
 
 
 def kan_not_shallow(width: object) -> str:
@@ -27,10 +25,8 @@ def kan_order(order: int, highest: int) -> str:
 
 
 def kan_kinks(count: int, most: int) -> str:
-    return (
-        f"The inputs switch so often that a deep KAN would need {count} kinks beside it, more than "
-        f"{most}: use a shallow one, width=(1, 1)."
-    )
+    return (f"The inputs switch so often that a deep KAN would need {count} kinks beside it, more "
+            f"than {most}: use a shallow one, width=(1, 1).")
 
 
 def kan_device(device: str, detail: str) -> str:
@@ -47,10 +43,8 @@ def kan_knots(layer: int) -> str:
 
 
 def kan_outside(low: float, high: float, start: float, stop: float) -> str:
-    return (
-        f"Times {low:g} to {high:g} s leave the KAN's grid [{start:g}, {stop:g}] s: build it with "
-        "a grid_range that covers them."
-    )
+    return (f"Times {low:g} to {high:g} s leave the KAN's grid [{start:g}, {stop:g}] s: build it "
+            "with a grid_range that covers them.")
 
 
 def kan_kink(time: float, start: float, stop: float) -> str:
@@ -58,18 +52,14 @@ def kan_kink(time: float, start: float, stop: float) -> str:
 
 
 def kan_kink_elsewhere(time: float) -> str:
-    return (
-        f"The kink at t = {time:g} s belongs to other knots than the KAN's: carry curve and kinks "
-        "over together, with `refined`."
-    )
+    return (f"The kink at t = {time:g} s belongs to other knots than the KAN's: carry curve and "
+            "kinks over together, with `refined`.")
 
 
 
 def kan_points(x: object, y: object, inputs: int, outputs: int) -> str:
-    return (
-        f"A KAN with {inputs} inputs and {outputs} outputs cannot be fitted to x {x} and y {y}: "
-        "give finite x (points, inputs) and y (points,) and a KAN with one output."
-    )
+    return (f"A KAN with {inputs} inputs and {outputs} outputs cannot be fitted to x {x} and y "
+            f"{y}: give finite x (points, inputs) and y (points,) and a KAN with one output.")
 
 
 def kan_coefficients(given: object, wanted: object) -> str:
@@ -86,6 +76,5 @@ def spline_knots_unsorted() -> str:
 
 
 def outside_spline(start: float, stop: float) -> str:
-    return (
-        f"A spline from {start:g} to {stop:g} s has no value outside: ask for times between them."
-    )
+    return (f"A spline from {start:g} to {stop:g} s has no value outside: ask for times between "
+            "them.")

@@ -8,10 +8,8 @@ from pikanid.errors.wording import short
 
 
 def left_out_as_slow() -> str:
-    return (
-        "Left out of the sparse scenarios and the real recording, where a fit takes long: try it "
-        "with pikanid identify."
-    )
+    return ("Left out of the sparse scenarios and the real recording, where a fit takes long: try "
+            "it with pikanid identify.")
 
 
 def usage(message: str, command: str) -> str:

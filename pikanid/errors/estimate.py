@@ -4,10 +4,8 @@ from __future__ import annotations
 
 
 def undetermined(name: str, value: float, std: float) -> str:
-    return (
-        f"The recording does not determine '{name}': its standard error ({std:.2g}) is far larger "
-        f"than its value ({value:.3g}).  Fix it, or excite what depends on it."
-    )
+    return (f"The recording does not determine '{name}': its standard error ({std:.2g}) is far "
+            f"larger than its value ({value:.3g}).  Fix it, or excite what depends on it.")
 
 
 

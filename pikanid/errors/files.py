@@ -73,10 +73,8 @@ def no_sheet(where: str, sheet: str, known: Iterable[str]) -> str:
 
 
 def ragged_row(where: str, row: int, cells: int, wanted: int) -> str:
-    return (
-        f"'{where}', row {row}: {cells} cell(s) where the header has {wanted}; the file may be cut "
-        "off, or its delimiter be another (delimiter=)."
-    )
+    return (f"'{where}', row {row}: {cells} cell(s) where the header has {wanted}; the file may be "
+            "cut off, or its delimiter be another (delimiter=).")
 
 
 def not_a_number(where: str, row: int, header: str, cell: str) -> str:
@@ -102,10 +100,8 @@ def bad_rate(rate: float) -> str:
 
 
 def rate_disagrees(where: str, rate: float, name: str, actual: float) -> str:
-    return (
-        f"'{where}' has the time column '{name}' sampled at {actual:.6g} Hz, not at {rate:g} Hz: "
-        "leave out the rate, or map another column to 't'."
-    )
+    return (f"'{where}' has the time column '{name}' sampled at {actual:.6g} Hz, not at {rate:g} "
+            "Hz: leave out the rate, or map another column to 't'.")
 
 
 def bad_delimiter(text: str) -> str:
@@ -117,10 +113,9 @@ def bad_decimal(text: str) -> str:
 
 
 def dataset_missing(local: str, url: str, variable: str) -> str:
-    return (
-        f"The recording '{local}' is not on this machine and cannot be downloaded: connect to the "
-        f"network, or fetch {url} yourself and set {variable} to the folder that holds '{local}'."
-    )
+    return (f"The recording '{local}' is not on this machine and cannot be downloaded: connect to "
+            f"the network, or fetch {url} yourself and set {variable} to the folder that holds "
+            f"'{local}'.")
 
 
 def dataset_altered(path: str, url: str) -> str:

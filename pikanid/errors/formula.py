@@ -84,24 +84,18 @@ def units_meet(where: str, formula: str, found: str, wanted: str, unknown: Seque
 
 
 def number_between_units(where: str, number: str) -> str:
-    return (
-        f"{where} adds '{short(number)}', which has no unit, to terms in different units: declare "
-        "its unit, for a number as a parameter with a value."
-    )
+    return (f"{where} adds '{short(number)}', which has no unit, to terms in different units: "
+            "declare its unit, for a number as a parameter with a value.")
 
 
 def temperatures_meet(where: str, first: str, second: str) -> str:
-    return (
-        f"{where} adds temperatures in '{first}' and '{second}', which begin at different zeros: "
-        "declare all of them in one unit, and differences in 'delta_degC'."
-    )
+    return (f"{where} adds temperatures in '{first}' and '{second}', which begin at different "
+            "zeros: declare all of them in one unit, and differences in 'delta_degC'.")
 
 
 def converted_twice(where: str, number: float, factor: str, value: float) -> str:
-    return (
-        f"{where} needs the factor {value:.6g} {factor}, which is put there by itself, and holds "
-        f"the number {number:.6g}, which looks like it: leave the number out."
-    )
+    return (f"{where} needs the factor {value:.6g} {factor}, which is put there by itself, and "
+            f"holds the number {number:.6g}, which looks like it: leave the number out.")
 
 
 def not_a_formula(where: str, value: object) -> str:

@@ -18,10 +18,8 @@ def too_few_to_diagnose(samples: int, parameters: int, needed: int) -> str:
 
 
 def too_rough_to_diagnose(model: str) -> str:
-    return (
-        f"Model '{model}' cannot be simulated as exactly as the recording's noise asks: check its "
-        "units, its initial values and the given sigma."
-    )
+    return (f"Model '{model}' cannot be simulated as exactly as the recording's noise asks: check "
+            "its units, its initial values and the given sigma.")
 
 
 def bad_drive_bound(name: str, given: float) -> str:
@@ -29,11 +27,9 @@ def bad_drive_bound(name: str, given: float) -> str:
 
 
 def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: float) -> str:
-    return (
-        f"No profile fits into {duration:g} s with {quiet:g} s of rest and samples every {dt:g} s "
-        f"for a model that rings at {frequency:.3g} Hz: leave two periods of motion, and ten "
-        "samples a period."
-    )
+    return (f"No profile fits into {duration:g} s with {quiet:g} s of rest and samples every "
+            f"{dt:g} s for a model that rings at {frequency:.3g} Hz: leave two periods of motion, "
+            "and ten samples a period.")
 
 
 def not_in_catalogue(effect: str, known: Iterable[str]) -> str:
@@ -53,17 +49,13 @@ def nothing_to_drive(models: str) -> str:
 
 
 def too_rough_to_plan(model: str, excitation: str) -> str:
-    return (
-        f"'{short(model)}' moves too wildly under '{short(excitation)}' to be planned with: make "
-        "the excitation smaller, or its samples denser."
-    )
+    return (f"'{short(model)}' moves too wildly under '{short(excitation)}' to be planned with: "
+            "make the excitation smaller, or its samples denser.")
 
 
 def no_profile_simulated(candidates: int) -> str:
-    return (
-        f"None of {candidates} profiles can be simulated with every hypothesis within the limits: "
-        "offer smaller ones."
-    )
+    return (f"None of {candidates} profiles can be simulated with every hypothesis within the "
+            "limits: offer smaller ones.")
 
 
 def limits_not_kept(profile: str) -> str:
@@ -71,24 +63,18 @@ def limits_not_kept(profile: str) -> str:
 
 
 def no_coordinate(model: str) -> str:
-    return (
-        f"'{model}' has no second-order coordinate that an output shows: a diagnosis needs a state "
-        "whose derivative is another state, such as theta' = theta_dot."
-    )
+    return (f"'{model}' has no second-order coordinate that an output shows: a diagnosis needs a "
+            "state whose derivative is another state, such as theta' = theta_dot.")
 
 
 def held_out_channels(name: str, missing: Sequence[str]) -> str:
-    return (
-        f"The held-out recording '{short(name)}' lacks {listed(missing)}, which the recording to "
-        "explain has: give one with the same columns."
-    )
+    return (f"The held-out recording '{short(name)}' lacks {listed(missing)}, which the recording "
+            "to explain has: give one with the same columns.")
 
 
 def held_out_same(train: str, name: str) -> str:
-    return (
-        f"'{short(name)}' holds the same data as '{short(train)}': nothing can be proved on what "
-        "was fitted; give another recording."
-    )
+    return (f"'{short(name)}' holds the same data as '{short(train)}': nothing can be proved on "
+            "what was fitted; give another recording.")
 
 
 def unknown_setting(name: str, close: Sequence[str]) -> str:

@@ -8,10 +8,8 @@ from pikanid.errors.wording import did_you_mean, listed
 
 
 def no_model(kind: str) -> str:
-    return (
-        f"A model is needed, not a {kind}: give a Model (Model.load(path), Model.from_dict(...), "
-        "pikanid.model.systems); the model comes before the recordings."
-    )
+    return (f"A model is needed, not a {kind}: give a Model (Model.load(path), "
+            "Model.from_dict(...), pikanid.model.systems); the model comes before the recordings.")
 
 
 def duplicate_name(name: str, first: str, second: str) -> str:
@@ -36,10 +34,8 @@ def foreign_symbols(names: Sequence[str], where: str) -> str:
 
 
 def spline_at_start(state: str, spline: str) -> str:
-    return (
-        f"The initial value of '{state}' uses {spline}: a spline function belongs in an equation "
-        "or an output; write the initial value as a formula of parameters and inputs."
-    )
+    return (f"The initial value of '{state}' uses {spline}: a spline function belongs in an "
+            "equation or an output; write the initial value as a formula of parameters and inputs.")
 
 
 def no_states() -> str:
@@ -69,10 +65,8 @@ def model_file_missing(path: str, where: str, wanted: str) -> str:
 
 
 def unknown_system(name: str, known: Sequence[str], close: Sequence[str]) -> str:
-    return (
-        f"'{name}' is neither a ready-made model ({listed(known)}) nor a .toml file that exists."
-        f"{did_you_mean(close)}"
-    )
+    return (f"'{name}' is neither a ready-made model ({listed(known)}) nor a .toml file that "
+            f"exists.{did_you_mean(close)}")
 
 
 def path_twice(name: str, what: str) -> str:
@@ -85,15 +79,12 @@ def no_recordings() -> str:
 
 
 def too_few_samples(samples: int, parameters: int) -> str:
-    return (
-        f"There are {samples} usable samples for {parameters} free parameters; a fit needs "
-        f"{parameters + 1} or more, since any model explains fewer: record more, or fix parameters."
-    )
+    return (f"There are {samples} usable samples for {parameters} free parameters; a fit needs "
+            f"{parameters + 1} or more, since any model explains fewer: record more, or fix "
+            "parameters.")
 
 
 def too_few_of_its_own(where: str, samples: int, parameters: Sequence[str]) -> str:
-    return (
-        f"Recording '{where}' has {samples} usable samples for {len(parameters)} parameters of "
-        f"its own ({listed(parameters)}); at least {len(parameters)} are needed: record more, or "
-        "share or fix them."
-    )
+    return (f"Recording '{where}' has {samples} usable samples for {len(parameters)} parameters of "
+            f"its own ({listed(parameters)}); at least {len(parameters)} are needed: record more, "
+            "or share or fix them.")

@@ -30,10 +30,8 @@ def not_of_kind(what: str, kind: str, wanted: str) -> str:
 
 
 def split_outside(where: str, at: float, begin: float, end: float) -> str:
-    return (
-        f"'{where}' cannot be split at {at:g} s, which leaves nothing on one side: it runs from "
-        f"{begin:g} s to {end:g} s."
-    )
+    return (f"'{where}' cannot be split at {at:g} s, which leaves nothing on one side: it runs "
+            f"from {begin:g} s to {end:g} s.")
 
 
 def outside_the_record(where: str, start: float, stop: float, begin: float, end: float) -> str:
@@ -46,10 +44,8 @@ def no_channels(where: str) -> str:
 
 
 def missing_channel(where: str, name: str, known: Iterable[str], close: Sequence[str] = ()) -> str:
-    return (
-        f"'{where}' has no column '{name}'; it has: {listed(known)}.{did_you_mean(close)} "
-        "Map it with --column NAME=COLUMN (in Python columns={'name in the model': 'its header'})."
-    )
+    return (f"'{where}' has no column '{name}'; it has: {listed(known)}.{did_you_mean(close)} Map "
+            "it with --column NAME=COLUMN (in Python columns={'name in the model': 'its header'}).")
 
 
 def unknown_channel_setting(what: str, name: str, known: Iterable[str]) -> str:
@@ -81,10 +77,8 @@ def bad_stride(n: object) -> str:
 
 
 def filter_needs_uniform(where: str, name: str) -> str:
-    return (
-        f"'{where}': the anti-alias filter needs channel '{name}' evenly sampled and without gaps; "
-        "decimate without filter, or window it to a whole stretch first."
-    )
+    return (f"'{where}': the anti-alias filter needs channel '{name}' evenly sampled and without "
+            "gaps; decimate without filter, or window it to a whole stretch first.")
 
 
 def too_short(where: str, name: str, n: int) -> str:
@@ -102,10 +96,8 @@ def time_not_rising(where: str, place: str, now: float, before: float) -> str:
 
 
 def absurd_value(where: str, place: str, name: str, value: float) -> str:
-    return (
-        f"'{where}', {place}: '{name}' is {value:g}, beyond 1e300; leave a missing sample empty "
-        "instead."
-    )
+    return (f"'{where}', {place}: '{name}' is {value:g}, beyond 1e300; leave a missing sample "
+            "empty instead.")
 
 
 def missing_input(where: str, name: str, sample: int, time: float) -> str:
@@ -114,7 +106,5 @@ def missing_input(where: str, name: str, sample: int, time: float) -> str:
 
 
 def constant_output(where: str, name: str, value: float) -> str:
-    return (
-        f"'{where}': output '{name}' is {value:g} throughout; a signal that never changes (a dead "
-        "sensor, a wrong column?) identifies nothing."
-    )
+    return (f"'{where}': output '{name}' is {value:g} throughout; a signal that never changes (a "
+            "dead sensor, a wrong column?) identifies nothing.")

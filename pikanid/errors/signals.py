@@ -40,17 +40,13 @@ def nothing_moves(where: str, names: Sequence[str]) -> str:
 
 
 def signal_short(where: str, name: str, span: float, motion: float) -> str:
-    return (
-        f"'{where}': '{name}' lasts {span:.3g} s, and the motion {motion:.3g} s: it must cover the "
-        f"whole motion."
-    )
+    return (f"'{where}': '{name}' lasts {span:.3g} s, and the motion {motion:.3g} s: it must cover "
+            "the whole motion.")
 
 
 def noise_short(name: str, n: int) -> str:
-    return (
-        f"Channel '{name}' has only {n} samples to estimate its noise from; give sigma yourself, "
-        "with with_sigma or --sigma."
-    )
+    return (f"Channel '{name}' has only {n} samples to estimate its noise from; give sigma "
+            "yourself, with with_sigma or --sigma.")
 
 
 def noise_none(name: str) -> str:
@@ -67,10 +63,8 @@ def pulse_off_grid(start: float, stop: float, dt: float) -> str:
 
 
 def bad_band(frequencies: Sequence[float], dt: float) -> str:
-    return (
-        f"Frequencies {', '.join(f'{f:g}' for f in frequencies) or '(none)'} Hz: they must rise "
-        f"and lie between 0 and half the sampling rate, {0.5 / dt:g} Hz."
-    )
+    return (f"Frequencies {', '.join(f'{f:g}' for f in frequencies) or '(none)'} Hz: they must "
+            f"rise and lie between 0 and half the sampling rate, {0.5 / dt:g} Hz.")
 
 
 def bad_move_bounds(acceleration: float, velocity: float) -> str:
@@ -79,14 +73,10 @@ def bad_move_bounds(acceleration: float, velocity: float) -> str:
 
 
 def move_too_long(distance: float, seconds: float) -> str:
-    return (
-        f"A move over {distance:g} m takes {seconds:.3g} s and does not fit: give more duration, "
-        "fewer moves, or higher bounds."
-    )
+    return (f"A move over {distance:g} m takes {seconds:.3g} s and does not fit: give more "
+            "duration, fewer moves, or higher bounds.")
 
 
 def unknown_excitation(name: str, known: Sequence[str], close: Sequence[str]) -> str:
-    return (
-        f"'{short(name, 200)}' is neither an excitation ({listed(known)}) nor a file that exists."
-        f"{did_you_mean(close)}"
-    )
+    return (f"'{short(name, 200)}' is neither an excitation ({listed(known)}) nor a file that "
+            f"exists.{did_you_mean(close)}")

@@ -28,39 +28,30 @@ def relaxation_cannot_see(names: Sequence[str], why: str) -> str:
 
 
 def smoothing_undetermined(names: Sequence[str]) -> str:
-    return (
-        f"PDA fits splines to the data alone, but the outputs do not determine {listed(names)}: "
-        "use the strategy iPDA or NLS, which also use the physics there."
-    )
+    return ("PDA fits splines to the data alone, but the outputs do not determine "
+            f"{listed(names)}: use the strategy iPDA or NLS, which also use the physics there.")
 
 
 def relaxation_locked(lam: float, kept: float) -> str:
-    return (
-        f"λ stays at {kept:.3g}: at {lam:.3g} these splines could no longer follow the physics. "
-        "For less bias use more intervals (or IPDA, whose default knots do not lock)."
-    )
+    return (f"λ stays at {kept:.3g}: at {lam:.3g} these splines could no longer follow the "
+            "physics. For less bias use more intervals (or IPDA, whose default knots do not lock).")
 
 
 def curve_follows_data(effective: float, count: int, lam: float) -> str:
-    return (
-        f"The curve uses {effective:.0f} degrees of freedom for {count} parameters, even at λ = "
-        f"{lam:.3g}: it follows the data rather than the equations, which do not fit them. "
-        "Estimates differ from those of NLS, and standard errors are too small; compare with NLS."
-    )
+    return (f"The curve uses {effective:.0f} degrees of freedom for {count} parameters, even at λ "
+            f"= {lam:.3g}: it follows the data rather than the equations, which do not fit them. "
+            "Estimates differ from those of NLS, and standard errors are too small; compare with "
+            "NLS.")
 
 
 def relaxation_smears() -> str:
-    return (
-        "The model is not smooth (sign, abs, clip ...): splines smear its switches, which biases "
-        "the parameters. Compare with the strategy NLS."
-    )
+    return ("The model is not smooth (sign, abs, clip ...): splines smear its switches, which "
+            "biases the parameters. Compare with the strategy NLS.")
 
 
 def relaxation_stuck(lam: float, kept: float) -> str:
-    return (
-        f"λ stays at {kept:.3g}: at {lam:.3g} the fit got no further. The estimate may still be "
-        "biased towards the splines; compare it with the strategy NLS."
-    )
+    return (f"λ stays at {kept:.3g}: at {lam:.3g} the fit got no further. The estimate may still "
+            "be biased towards the splines; compare it with the strategy NLS.")
 
 
 def grid_not_settled(gap: float, intervals: int) -> str:
@@ -69,17 +60,13 @@ def grid_not_settled(gap: float, intervals: int) -> str:
 
 
 def estimate_not_simulated() -> str:
-    return (
-        "The model cannot be simulated at the estimate, so that residuals are those of the fitted "
-        "splines: the parameters are not to be trusted."
-    )
+    return ("The model cannot be simulated at the estimate, so that residuals are those of the "
+            "fitted splines: the parameters are not to be trusted.")
 
 
 def not_converged(lam: float) -> str:
-    return (
-        f"Gauss-Newton stopped before it converged at λ = {lam:.3g}: start nearer, or tighten the "
-        "bounds."
-    )
+    return (f"Gauss-Newton stopped before it converged at λ = {lam:.3g}: start nearer, or tighten "
+            "the bounds.")
 
 
 
@@ -98,17 +85,13 @@ def newton_stopped(iterations: int, move: float) -> str:
 
 
 def network_smears_switches(count: int, most: int) -> str:
-    return (
-        f"The inputs switch {count} times, more than the {most} kinks that a network is given: it "
-        "smears them, which biases the parameters. Compare with the strategy NLS."
-    )
+    return (f"The inputs switch {count} times, more than the {most} kinks that a network is given: "
+            "it smears them, which biases the parameters. Compare with the strategy NLS.")
 
 
 def covariance_unknown() -> str:
-    return (
-        "The network can follow the data whatever the parameters are, so that standard errors are "
-        "not known: use fewer units, or more data."
-    )
+    return ("The network can follow the data whatever the parameters are, so that standard errors "
+            "are not known: use fewer units, or more data.")
 
 
 def curve_misleads(name: str, value: float, reference: float, std: float, residual: float,
@@ -131,15 +114,11 @@ def bad_start() -> str:
 
 
 def fit_diverged(where: str) -> str:
-    return (
-        f"The fit broke down {where}, where the model's right-hand side or its cost was not "
-        "finite: the best iterate before that is kept. Try other guesses or bounds, or a larger "
-        "first grid."
-    )
+    return (f"The fit broke down {where}, where the model's right-hand side or its cost was not "
+            "finite: the best iterate before that is kept. Try other guesses or bounds, or a "
+            "larger first grid.")
 
 
 def lbfgs_stopped(steps: int, gradient: float) -> str:
-    return (
-        f"L-BFGS stopped after {steps} steps with a gradient of norm {gradient:.2g}: it is not at "
-        "a minimum, and the estimate depends on where it stopped."
-    )
+    return (f"L-BFGS stopped after {steps} steps with a gradient of norm {gradient:.2g}: it is not "
+            "at a minimum, and the estimate depends on where it stopped.")

@@ -8,31 +8,23 @@ from pikanid.errors.wording import short
 
 
 def edge_argument_still(argument: str, value: float) -> str:
-    return (
-        f"The argument '{argument}' of the discrepancy stays at {value:.4g} in every recording: "
-        "leave it out, or add a recording that moves it."
-    )
+    return (f"The argument '{argument}' of the discrepancy stays at {value:.4g} in every "
+            "recording: leave it out, or add a recording that moves it.")
 
 
 def no_static_law(arguments: Sequence[str]) -> str:
-    return (
-        f"No static law of {', '.join(arguments)} explains the recording: what is missing depends "
-        "on something else, on the past, or sits in a sensor or an input."
-    )
+    return (f"No static law of {', '.join(arguments)} explains the recording: what is missing "
+            "depends on something else, on the past, or sits in a sensor or an input.")
 
 
 def discrepancy_not_simulated() -> str:
-    return (
-        "The model with its discrepancy cannot be simulated along the whole recording: use fewer "
-        "arguments, or a nominal model that follows the recording more closely."
-    )
+    return ("The model with its discrepancy cannot be simulated along the whole recording: use "
+            "fewer arguments, or a nominal model that follows the recording more closely.")
 
 
 def edge_points(x: int, y: int, fewest: int) -> str:
-    return (
-        f"An edge of {x} arguments and {y} values cannot be named: give at least {fewest} finite "
-        "points (x, y) over which x moves."
-    )
+    return (f"An edge of {x} arguments and {y} values cannot be named: give at least {fewest} "
+            "finite points (x, y) over which x moves.")
 
 
 def candidate_without_argument(text: str, argument: str) -> str:
@@ -58,10 +50,8 @@ def no_law_simulated() -> str:
 
 
 def no_edges(model: str) -> str:
-    return (
-        f"The estimate of '{model}' holds no edges to read: give one that kan_discrepancy made, or "
-        "a KAN."
-    )
+    return (f"The estimate of '{model}' holds no edges to read: give one that kan_discrepancy "
+            "made, or a KAN.")
 
 
 def not_a_network(path: str) -> str:

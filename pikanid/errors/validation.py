@@ -28,10 +28,8 @@ def conceal_excitation(given: str, known: Iterable[str]) -> str:
 
 
 def conceal_mix(text: str, known: Iterable[str]) -> str:
-    return (
-        f"--mix '{short(text, 200)}' cannot be read: write shares that are not all zero, such as "
-        f"'single=0.6,nothing=0.4' (classes: {listed(known)})."
-    )
+    return (f"--mix '{short(text, 200)}' cannot be read: write shares that are not all zero, such "
+            f"as 'single=0.6,nothing=0.4' (classes: {listed(known)}).")
 
 
 def conceal_sigma(sigma: float) -> str:
@@ -44,9 +42,8 @@ def conceal_truth_inside(truth: str, folder: str) -> str:
 
 
 def conceal_taken(place: str) -> str:
-    return (
-        f"'{short(place, 200)}' already holds something else: choose another name, or remove it."
-    )
+    return (f"'{short(place, 200)}' already holds something else: choose another name, or remove "
+            "it.")
 
 
 def conceal_other_settings(place: str) -> str:
@@ -60,7 +57,5 @@ def truth_case(detail: str) -> str:
 
 
 def diagnosis_unreadable(case: str, detail: object) -> str:
-    return (
-        f"The diagnosis of case '{short(case)}' cannot be scored: {short(str(detail))} (wanted: "
-        "verdict, mismatch, and hypotheses with effects' ids and a probability)."
-    )
+    return (f"The diagnosis of case '{short(case)}' cannot be scored: {short(str(detail))} "
+            "(wanted: verdict, mismatch, and hypotheses with effects' ids and a probability).")
