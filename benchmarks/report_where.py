@@ -172,14 +172,14 @@ def case(kind: str, number: int) -> Row:
         closed(dx.where.time, period), closed(spans(t, acts), period))
     true = {"k": stiffness, "d": damping}
 
-    def bias(estimate: pk.Estimate) -> float:
-        found = dict(zip((f.name for f in estimate.free), estimate.theta, strict=True))
-        found |= {n: v.value for n, v in dx.where.parameters.items() if estimate is dx.after}
+    def bias(estimate: pk.Estimate, **beside: float) -> float:
+        found = dict(zip((f.name for f in estimate.free), estimate.theta, strict=True)) | beside
         return float(np.mean([abs(found[n] / true[n] - 1) for n in true]))
 
     return Row(kind, place, size, float(acts.mean()), dx.verdict,
                ", ".join(map(str, dx.where.region)), f1(said, acts), f1(flagged, acts), overlap,
-               bias(dx.after), bias(dx.before))
+               bias(dx.after, **{n: v.value for n, v in dx.where.parameters.items()}),
+               bias(dx.before))
 
 
 def main() -> None:

@@ -11,6 +11,7 @@ from typing import get_args
 import numpy as np
 
 from pikanid.mismatch.beyond.force_shape import ForceShape
+from pikanid.mismatch.beyond.free_channels import surely_in_dynamics
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.local_force import Local
 from pikanid.mismatch.beyond.region import Course, course, regions_of_laws
@@ -45,7 +46,8 @@ def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site
 
 def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
            shape: ForceShape | None, force: ForceOverTime | None,
-           candidates: Sequence[Candidate] = (), local: Local | None = None) -> Where:
+           candidates: Sequence[Candidate] = (), local: Local | None = None,
+           tried: Sequence[Hypothesis] = ()) -> Where:
     """The place of a mismatch, as far as the answer and the nominal residual tell.
 
     Where all laws of a sure answer act in a part of the recording only, that is its place in time.
@@ -53,8 +55,8 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
     recording resolves, where the residual is louder than noise.
 
     Without an answer the shape of the missing force says what it depends on, and whether a static
-    law can be all that is missing.  `local` is a force without a name that acts
-    in a region, if there is one.
+    law can be all that is missing.  `local` is a force without a name that acts in a region, if
+    there is one, and `tried` are explanations that were refitted.
     """
     settings = base.whitened.settings
     # what the new terms are made of
@@ -71,6 +73,9 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
     region = local.intervals if local else regions_of_laws(courses, site, settings)
     channels = _channels(answer, site, candidates) or _channel_of_shape(
         answer, site, shape, settings)
+    if not channels and answer.verdict in ("partial", "unconfirmed", "unnamed") and (
+            surely_in_dynamics(base, site, candidates, tried)):
+        channels = ("dynamics",)
     windows = local.course.windows(_period(site)) if local else _seconds(
         base, answer, courses, force)
     values = values_of(base.model.parameters, local.hypothesis.values, local.hypothesis.std,
