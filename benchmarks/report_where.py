@@ -1,6 +1,7 @@
 """Laws that act in one regime only: how well a diagnosis says where.  Writes `reports/where.md`.
 
-    python benchmarks/report_where.py [FOLDER] [--work build/where] [--cases 4] [--kinds ...]
+    python benchmarks/report_where.py [FOLDER] [--work build/where] [--cases 3] [--kinds ...]
+        [--sets build/diagnosis]
 
 An oscillator of unknown stiffness and damping gets a further law that is exactly zero outside of a
 region of one state, of random place and size: the kind of case of Y. Wang, "Where Is My Physics
@@ -21,6 +22,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import where_sets
 from provenance import provenance
 from scipy.integrate import solve_ivp
 
@@ -187,7 +189,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=Path("reports"))
     parser.add_argument("--work", type=Path, default=Path("build/where"))
-    parser.add_argument("--cases", type=int, default=4, help="of each kind")
+    parser.add_argument("--cases", type=int, default=3, help="of each kind")
+    parser.add_argument("--sets", type=Path, default=Path("build/diagnosis"),
+                        help="work folder of report_diagnosis.py, whose diagnoses are scored too")
     parser.add_argument("--kinds", choices=list(LAWS), nargs="*", default=list(LAWS))
     given = parser.parse_args()
     given.work.mkdir(parents=True, exist_ok=True)
@@ -200,7 +204,7 @@ def main() -> None:
             rows.append(Row(**json.loads(kept.read_text())))
             print(rows[-1], flush=True)
     given.folder.mkdir(parents=True, exist_ok=True)
-    atomically(given.folder / "where.md", report(rows).encode())
+    atomically(given.folder / "where.md", (report(rows) + where_sets.section(given.sets)).encode())
 
 
 def report(rows: list[Row]) -> str:

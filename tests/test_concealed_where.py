@@ -214,6 +214,17 @@ def test_laws_that_act_always_have_neither_window_nor_region() -> None:
     assert said is not None and said.region is None and said.invented
 
 
+def test_what_is_left_beside_the_effects_need_not_be_placed() -> None:
+    left = case(entry("coulomb_friction", c=0.1), laws=(WALL,))
+    said = answer(region=[{"state": "theta", "from": 0.1, "to": 1.0}])
+    for given in (answer(), said):
+        found = place(left, given, truth(left))
+        assert found is not None and found.region is None and not found.invented
+    both = case(WALL, laws=(entry("one_way_friction", c=0.1),))
+    found = place(both, said, truth(both))
+    assert found is not None and found.region == 1.0
+
+
 def test_a_limit_acts_on_either_side() -> None:
     limited = case(entry("input_saturation", limit=0.5))
     seen = truth_of(limited, push(1.0, lambda t: np.linspace(-1.0, 1.0, len(t))))

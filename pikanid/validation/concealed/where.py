@@ -14,9 +14,10 @@ counts there, otherwise `part`; `unsaid` if nothing is said.
 a natural period apart count as one on both sides: a force that follows the motion comes and goes in
 each, and no recording of its integrals shows when.
 
-*Region.* F₁ of the samples in which a law that acts in a regime does so, and those that lie in the
-region said: twice what both hold over the sum of either (C. J. van Rijsbergen, Information
-Retrieval, 1979), as localisation of a discrepancy is scored by Y. Wang, arXiv 2606.23215.
+*Region.* F₁ of the samples in which a hidden effect that acts in a regime does so, and those that
+lie in the region said: twice what both hold over the sum of either (C. J. van Rijsbergen,
+Information Retrieval, 1979), as localisation of a discrepancy is scored by Y. Wang, arXiv
+2606.23215.
 """
 
 from __future__ import annotations
@@ -154,7 +155,8 @@ def place(case: Mapping[str, Any], diagnosis: Mapping[str, Any],
     said = read_where(diagnosis, case["id"])
     entries, laws = case["effects"], case.get("remainder", [])
     overlap = region = None
-    local = [] if truth is None else [a for a in truth.acting if a.regime is not None]
+    every = [] if truth is None else [a for a in truth.acting if a.regime is not None]
+    local = [a for a in every if a.id in {effect["id"] for effect in entries}]
     if truth is not None and truth.windows is not None:
         gap = natural_period(case)
         overlap = intersection_over_union(closed(said.windows, gap), closed(truth.windows, gap))
@@ -164,7 +166,7 @@ def place(case: Mapping[str, Any], diagnosis: Mapping[str, Any],
     return Place(case["id"], channel_outcome(said.channels, entries, laws),
                  said.equation == EQUATION,
                  states_outcome(said.states & {"theta", "theta_dot"}, entries, laws),
-                 overlap, region, bool(said.regions) and truth is not None and not local)
+                 overlap, region, bool(said.regions) and truth is not None and not every)
 
 
 def channel_outcome(said: frozenset[str], effects: Sequence[Mapping[str, Any]],
