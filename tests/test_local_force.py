@@ -108,6 +108,8 @@ def found(term: str) -> tuple[Local | None, Where, dict[str, np.ndarray]]:
     case = open_case(MODEL, (seen,), None, None, lambda text: None, DEFAULTS)
     shape = force_shape(case.base, case.sites[0], case.candidates)
     local = local_force(case.base, case.model, shape, case.sites[0])
+    if local is not None:  # a law of that very region is no better
+        assert local_force(case.base, case.model, shape, case.sites[0], local.hypothesis)
     where = locate(case.base, case.base, Answer("unnamed", (), ()), case.sites[0], shape, None,
                    case.candidates, local)
     clean = pk.simulate(truth, moves)["theta"]
@@ -142,7 +144,8 @@ def test_the_region_is_found_and_the_parameters_beside_it(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("term", ["", "-60*theta**3", "-abs(theta_dot)*theta_dot"])
+@pytest.mark.parametrize("term", [
+    "", "-60*theta**3", "-abs(theta_dot)*theta_dot", "8*u_x**2"])
 def test_a_law_that_acts_always_has_none(term: str) -> None:
     local, where, _ = found(term)
     assert local is None and where.region == () and not where.parameters

@@ -7,7 +7,7 @@ Muggeo, Stat. Med. 22, 2003), on one side or both, alike on both, with one power
 them the nominal model has to do alone, so that its parameters come from clean motion, the idea of
 Y. Wang, "Where Is My Physics Wrong?", arXiv 2606.23215.  A region is reported if such a force
 explains the recording better than a smooth free curve of the same state over the whole range does,
-than anything else that is given, and than chance.
+and than chance, and no worse than anything else that is given.
 """
 
 from __future__ import annotations
@@ -66,9 +66,8 @@ def local_force(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site,
         The force; None where it may act anywhere.
     """
     settings = base.whitened.settings
-    edge = max((e for e in shape.edges if e.argument in (site.q, site.v)),
-               key=lambda e: e.alone, default=None)
-    if edge is None or edge.alone < settings.beyond.read:
+    edge = max(shape.edges, key=lambda e: e.alone, default=None)
+    if edge is None or edge.alone < settings.beyond.read or edge.argument in site.inputs:
         return None
     low, high = edge.curve.low, edge.curve.high
     curve = FreeCurve(edge.argument, low, high, nominal)
@@ -79,7 +78,7 @@ def local_force(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site,
     drawn = curve.matrix(x) @ [smooth.values[n] for n in curve.names]
     # what a line does is the free parameters' own
     seen_as = replace(Curve.of_points(x, drawn, 1.0), free=np.column_stack([np.ones(len(x)), x]))
-    rivals = [h for h in (base, smooth, given) if h is not None]
+    rivals = [base, smooth]
     found: list[tuple[Hypothesis, LocalForce]] = []
 
     def fit(force: LocalForce) -> None:
@@ -89,10 +88,15 @@ def local_force(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site,
         if h is not None:
             found.append((h, force))
 
+    within = settings.verdict.indistinct
+
+    def noise() -> float:
+        return overdispersion([*rivals, *(h for h, _ in found), *([given] if given else [])])
+
     def better() -> tuple[Hypothesis, LocalForce] | None:
-        scale = overdispersion([*rivals, *(h for h, _ in found)])
+        scale = noise()
         best = min(found, key=lambda pair: pair[0].score(scale), default=None)
-        return best if best and best[0].score(scale) + settings.verdict.indistinct < min(
+        return best if best and best[0].score(scale) + within < min(
             h.score(scale) for h in rivals) else None
 
     for sides in ((ABOVE,), (BELOW,), (BELOW, ABOVE), (ALIKE,)):
@@ -103,6 +107,10 @@ def local_force(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site,
     if (pair := better()) is None:
         return None
     best, force = pair
+    scale = noise()
+    # what is given may be a law of that very region
+    if given and best.score(scale) > given.score(scale) + within:
+        return None
     ends = force.ends(best.values)
     visited = edge.curve.x
     clean = (visited > ends[0]) & (visited < ends[1])
