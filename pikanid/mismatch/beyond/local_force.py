@@ -7,7 +7,7 @@ Muggeo, Stat. Med. 22, 2003), on one side or both, alike on both, with one power
 them the nominal model has to do alone, so that its parameters come from clean motion, the idea of
 Y. Wang, "Where Is My Physics Wrong?", arXiv 2606.23215.  A region is reported if such a force
 explains the recording better than a smooth free curve of the same state over the whole range does,
-and than chance, and no worse than anything else that is given.
+and than chance, no worse than anything else that is given, and leaves little beside noise.
 """
 
 from __future__ import annotations
@@ -110,6 +110,8 @@ def local_force(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site,
     scale = noise()
     # what is given may be a law of that very region
     if given and best.score(scale) > given.score(scale) + within:
+        return None
+    if best.noise**2 > settings.beyond.unexplained:
         return None
     ends = force.ends(best.values)
     visited = edge.curve.x
