@@ -72,6 +72,21 @@ def test_a_law_that_acts_always_has_no_region(
     assert found is not None and found.intervals(site, 0.05) == ()
 
 
+def test_the_course_of_a_law_beside_a_further_input() -> None:
+    """What an effect reads besides is no input of the nominal model."""
+    model = pk.systems.sloshing()
+    run = pk.simulate(model, pk.excitation.two_pulse(), sigma=SIGMA, seed=0)
+    run = run.with_channels(replace(run["u_x"], name="u_y", values=run["u_x"].values[::-1]))
+    records = Records((run,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},), DEFAULTS)
+    known = {c.key: c for c in candidates(sites(model, (run,)))}
+    h = fitted(model, (known["cross_axis[u_y]"], known["wall_impact"]), records,
+               [{"wall": 0.05, "k_wall": 40.0}], 1)
+    assert h is not None and len(h.model.input_names) > len(model.input_names)
+    found = course(h, model, known["wall_impact"])
+    assert found is not None
+    np.testing.assert_array_equal(found.acts, found.values["theta"] > h.values["wall"])
+
+
 def test_what_is_no_force_of_the_instant_has_no_course(
         stopped: tuple[Hypothesis, Hypothesis, Site, dict[str, Candidate]]) -> None:
     base, _, _, known = stopped

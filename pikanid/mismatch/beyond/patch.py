@@ -104,10 +104,11 @@ class FreeCurve:
     Without the straight line, which belongs to the free parameters.
     """
 
-    def __init__(self, argument: str, low: float, high: float, model: Model):
+    def __init__(self, argument: str, low: float, high: float, model: Model,
+                 intervals: int = INTERVALS):
         self.argument, self.unit = argument, model.state(argument).unit
         self.low, self.high = low, high
-        self.inner = np.linspace(-1.0, 1.0, INTERVALS + 1)[1:-1]
+        self.inner = np.linspace(-1.0, 1.0, intervals + 1)[1:-1]
         self.name = "delta"
         while any(taken.startswith(self.name) for taken in model.symbols):
             self.name += "_x"

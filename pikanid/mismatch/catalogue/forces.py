@@ -16,6 +16,7 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 INF = float("inf")
+NEAREST = 0.1  # definition: of the half range, at which a wall may stand
 SIDE, BOTH = "negative side", "both sides"
 SIDES = {"": (1,), SIDE: (-1,), BOTH: (1, -1)}  # definition: of the walls of each variant
 
@@ -100,7 +101,8 @@ def wall_impact(site: Site) -> list[Candidate]:
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
     walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.half_range, np.array([0.03, 0.1, 0.3])
 
-    w = Parameter(site.name("wall"), 1e6, site.unit, (0.0, INF))
+    # what is touched about the rest is no wall but a spring that differs between the sides
+    w = Parameter(site.name("wall"), 1e6, site.unit, (NEAREST * site.half_range, INF))
     k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
 
     def one(variant: str, name: str = "impact on a wall") -> Candidate:

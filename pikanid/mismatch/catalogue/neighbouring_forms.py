@@ -3,12 +3,14 @@
 A name claims a form.  Where the form next to it explains a recording about as well, the recording
 has not shown which of them acts; where it explains far more, the entry is not what acts.  So every
 power law of the catalogue is compared with those of one power more and one less in each state, and
-an elastic wall with one whose force rises with the square, as that of a cable that tightens.
+an elastic wall with one whose force rises with the square, as that of a cable that tightens, and a
+boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,9 +18,11 @@ from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Begin, Candidate, Family, Powers
 from pikanid.mismatch.catalogue.forces import INF, wall_force
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.model.parts import Parameter
+from pikanid.model import Model
+from pikanid.model.parts import Parameter, State
 
 EASED = (0.75, 0.88, 1.0)  # numerical: of a wall's distance, where fits of one that stiffens begin
+MEMORIES = (0.3, 1.0, 3.0)  # numerical: of the time to swing, where fits of a memory begin
 Starts = list[dict[str, float]]
 
 
@@ -26,6 +30,8 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
     """The decoys next to an entry in form; none where it is no power law and no wall."""
     if entry.ids == ("wall_impact",):
         return [_stiffening(entry)]
+    if entry.ids == ("boundary_layer",):
+        return [_fading(entry)]
     if entry.powers is None or not entry.site.rate:
         return []
     return [_power_law(entry, near) for near in _next(entry.powers)]
@@ -93,6 +99,27 @@ def _stiffening(wall: Candidate) -> Candidate:
     return _decoy(wall, "stiffening_wall", wall_force(
         site, distance.name, k.name, wall.variant, power=2),
                   (distance, k), starts, wall.families)
+
+
+def _fading(layer: Candidate) -> Candidate:
+    """-κ (v - w), τ w' = v - w: W. E. Cummins, Schiffstechnik 9 (1962), with a kernel of one time.
+    """
+    site, usual = layer.site, 1 / layer.site.rate
+    kappa = Parameter(site.name("kappa_m"), 0.0, "1/s", (0.0, INF))
+    tau = Parameter(site.name("tau_m"), usual, "s", (1e-3 * usual, INF))
+    wake = site.name("wake")
+
+    def extend(model: Model) -> Model:
+        model = model.with_state(State(wake), f"({site.v} - {wake})/{tau.name}")
+        return model.with_term(site.v, f"-{kappa.name}*({site.v} - {wake})")
+
+    def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
+        strength = values[layer.parameters[0].name] * site.rate**0.5
+        return [{kappa.name: strength, tau.name: share * usual} for share in MEMORIES]
+
+    made = _decoy(layer, "fading_memory", f"-{kappa.name}*({site.v} - {wake})", (kappa, tau),
+                  starts, layer.families)
+    return replace(made, extend=extend, static=False)
 
 
 def _decoy(entry: Candidate, name: str, text: str, parameters: tuple[Parameter, ...],

@@ -65,7 +65,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             if len(h.effects) > 1 and not e.absent and not speaks(
                     h, o, predict, asks.needed * scale):
                 return f"the held-out recording does not need {e.name}"
-            if e.absent and rest and (other := _lasting(rest, o, fits.values())) and smaller(
+            if e.absent and (other := _lasting(rest, o, fits.values())) and smaller(
                     asks.once * (o.minimum.chi2 - h.minimum.chi2),
                     o.minimum.chi2 - other.minimum.chi2):
                 return f"a lasting effect would take up most of what {e.name} does"

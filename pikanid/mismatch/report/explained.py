@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Predict
 from pikanid.mismatch.judge.verdict import Answer, Test, criterion
 from pikanid.mismatch.report.findings import Explanation, NamedEffect, values_of
-from pikanid.mismatch.settings.verdict import VerdictSettings
+from pikanid.mismatch.settings.settings import Settings
 
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
-                 asks: VerdictSettings, overdispersion: float = 1.0
+                 settings: Settings, overdispersion: float = 1.0
                  ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
     """Given and rejected hypotheses, for reports.
 
@@ -20,17 +21,22 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         answer: That is reported.
         scale: That divides χ² where hypotheses are compared.
         test, predict: Adequacy on the train and on the held-out recordings.
-        asks: What counts as evidence.
+        settings: What counts as evidence, and as adequate.
         overdispersion: That variances of parameters are multiplied by.
     """
     pool = [*answer.given, *answer.others]
     if not pool:
         return (), ()
 
+    asks = settings.verdict
+    # where even these leave something, it is nearly sure that something else acts
+    elsewhere = asks.unforeseen if any(
+        not smaller(test(h).p_value, settings.adequate) for h in answer.given) else (
+            1 - asks.unforeseen)
     scores = np.array([criterion(h, predict(h), scale, asks)
                        for h in (*answer.given, *answer.rivals)] or [0.0])
     weights = np.exp(-0.5 * (scores - scores.min()))
-    weights *= (1 - asks.unforeseen) / weights.sum()
+    weights *= (1 - elsewhere) / weights.sum()
 
     def one(h: Hypothesis, probability: float, why: str) -> Explanation:
         table = answer.twins.get(h.key, {})

@@ -33,7 +33,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.before, overdispersion([case.base]))
     after = widened(as_estimate(best, case.before), counts) if answer.given else before
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
-                                   case.settings.verdict, counts)
+                                   case.settings, counts)
     proof = _proof(case, answer, best)
     if answer.verdict == "none" and proof is not None and proof.p_value < alpha:
         case.notes.append(

@@ -5,11 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pikanid.mismatch.beyond.patch import FreeCurve
+import numpy as np
+
+from pikanid.mismatch.beyond.free_curve import share_lacking, with_free_curve
 from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
-from pikanid.mismatch.judge.partial import Part, Present, lasting, left_over, surely_there
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.partial import (
+    Doubtful,
+    Part,
+    Present,
+    families_of,
+    lasting,
+    left_over,
+    surely_there,
+)
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.neighbours import with_next_form, with_relatives
 from pikanid.mismatch.search.search import Search
@@ -35,8 +47,9 @@ def with_sure_part(case: Case, answer: Answer) -> Answer:
         part = sure()
     if part is None:
         return answer
-    part = replace(part, present=tuple(
-        p if _has_its_form(case, part, p, noise) else replace(p, names=()) for p in part.present))
+    part = _against_curves(case, part, noise)
+    if not part.present:
+        return answer
     return replace(answer, verdict="partial", given=(part.hypothesis,), part=part)
 
 
@@ -53,20 +66,52 @@ def _compared(search: Search, lead: Hypothesis) -> bool:
     return search.closer([lead]) or found
 
 
-def _has_its_form(case: Case, part: Part, p: Present, noise: Sequence[dict[str, float]]) -> bool:
-    """Whether a free curve of the state that a law depends on leaves about as much beside it."""
-    h, site = part.hypothesis, p.effect.site
-    argument = {"dry friction": site.v, "drag": site.v, "restoring force": site.q}.get(p.family)
-    before = case.predicted(h)
-    if not p.names or argument is None or before is None or p.effect not in h.effects:
-        return True
-    visited = h.whitened.motion(h.minimum.theta)[argument]
-    curve = FreeCurve(argument, float(visited.min()), float(visited.max()), h.model)
-    effects = [*h.effects, curve.candidate(site)]
-    found = fitted(case.model, effects, h.whitened.records, [h.point], 1)
+def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -> Part:
+    """What is there still once free curves of the states stand for laws that nobody has listed.
+
+    A family is not sure where a free curve in its place leaves little more, of a state that its
+    members do not depend on: a magnet is no friction with a memory.  A name is not where a free
+    curve beside it, of the state that it depends on, leaves far less: then its form is another one.
+    """
+    h, rule = part.hypothesis, case.settings.part
+    before, without = case.predicted(h), case.predicted(case.base)
+    if before is None or without is None:
+        return part
+    own_left, nominal = left_over(h, before, noise), left_over(case.base, without, noise)
+    present, doubtful = [], list(part.doubtful)
+    for p in part.present:
+        members = [e for e in h.effects if p.family in families_of(e, h, rule.dry)]
+        argument = _argument(p)
+        rest = [e for e in h.effects if e not in members]
+        others = [s for s in (p.effect.site.q, p.effect.site.v) if s != argument]
+        # a curve holds a constant, too
+        rivals = [] if p.family == "constant force" or not members else [
+            _left_with_curve(case, h, rest, s, p.effect.site, noise) for s in others]
+        if h.far and rivals:  # no fit may get there
+            rivals += [nominal * share_lacking(case.base, s, p.effect.site) for s in others]
+        kappa = min(rivals, default=np.inf) / max(own_left, rule.floor)
+        if smaller(kappa, rule.dominance):
+            doubtful.append(Doubtful(p.family, p.effect, "a free curve of a state it does not "
+                                     f"depend on leaves {kappa:.2g} times as much in its place, "
+                                     f"{rule.dominance:.2g} are asked"))
+            continue
+        if p.names and argument and members:
+            beside = _left_with_curve(case, h, h.effects, argument, p.effect.site, noise)
+            if not smaller(own_left / max(beside, rule.floor), rule.form):
+                p = replace(p, names=())
+        present.append(replace(p, dominance=min(p.dominance, float(kappa))))
+    return replace(part, present=tuple(present), doubtful=tuple(doubtful))
+
+
+def _argument(p: Present) -> str:
+    """The state that a family's members depend on; empty where it is none, or several."""
+    site = p.effect.site
+    return {"dry friction": site.v, "drag": site.v, "restoring force": site.q}.get(p.family, "")
+
+
+def _left_with_curve(case: Case, h: Hypothesis, effects: Sequence[Candidate], argument: str,
+                     site: Site, noise: Sequence[dict[str, float]]) -> float:
+    """What these effects and a free curve of a state leave; infinite where that cannot be run."""
+    found = with_free_curve(case.model, h, effects, argument, site)
     after = None if found is None else case.predicted(found)
-    if found is None or after is None:
-        return True
-    rule = case.settings.part
-    left = max(left_over(found, after, noise), rule.floor)
-    return smaller(left_over(h, before, noise) / left, rule.form)
+    return np.inf if found is None or after is None else left_over(found, after, noise)

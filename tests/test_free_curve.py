@@ -1,0 +1,56 @@
+"""How much of what an equation lacks a free curve of a state takes up, read off the motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import pikanid as pk
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.beyond.free_curve import share_lacking, with_free_curve
+from pikanid.mismatch.catalogue.site import Site, sites
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.noise.level import NoiseModel
+
+SIGMA = 0.002
+MAGNET = "-20*(theta/0.06)/(1 + (theta/0.06)**2)**2"  # as strong as gravity, about the rest only
+
+
+def base_of(term: str) -> tuple[Hypothesis, Site]:
+    """The nominal fit to a recording of a rig with a further force."""
+    model = pk.systems.sloshing()
+    run = pk.simulate(model.with_term("theta_dot", term),
+                      pk.excitation.planar_moves(8, 10.0, seed=2), sigma=SIGMA, seed=2)
+    records = Records((run,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},), DEFAULTS)
+    base = fitted(model, (), records, [{}], 1)
+    assert base is not None
+    return base, sites(model, (run,))[0]
+
+
+def test_a_force_of_the_angle_is_read_off_where_no_fit_gets_there() -> None:
+    base, site = base_of(MAGNET)
+    assert base.far
+    own, other = (share_lacking(base, name, site) for name in ("theta", "theta_dot"))
+    assert own < 0.02 and own < 0.2 * other
+
+
+def test_friction_is_a_force_of_the_rate() -> None:
+    base, site = base_of("-6*tanh(theta_dot/0.05)")
+    own, other = (share_lacking(base, name, site) for name in ("theta_dot", "theta"))
+    assert own < 0.2 and own < 0.5 * other
+
+
+def test_nothing_is_read_off_an_output_that_is_not_the_coordinate() -> None:
+    base, site = base_of(MAGNET)
+    lever = replace(site, output=replace(site.output, expression=2 * symbol("theta")))
+    assert share_lacking(base, "theta", lever) == 1.0
+
+
+def test_a_curve_that_is_fitted_explains_a_force_of_its_state() -> None:
+    base, site = base_of("-60*theta*abs(theta)")
+    found = with_free_curve(base.model, base, (), "theta", site)
+    assert found is not None and not base.whitened.rows > base.minimum.chi2
+    assert found.minimum.chi2 == pytest.approx(found.whitened.rows, rel=0.1)
