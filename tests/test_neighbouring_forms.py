@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import solve_ivp
 
 import pikanid as pk
@@ -72,6 +73,14 @@ def test_a_memory_fades_with_one_time(by_key: dict[str, Candidate]) -> None:
     assert (added + symbol("kappa_m") * (v - wake)).expand() == 0
     assert (made.equations["wake"] * symbol("tau_m") - v + wake).expand() == 0
     assert made.state("wake").initial == 0 and not law.static
+
+
+def test_a_parameter_may_settle_instead_of_drifting(by_key: dict[str, Candidate]) -> None:
+    [law] = [c for c in by_key.values() if c.next_to == "parameter_drift[d_theta]"]
+    model, d = pk.systems.sloshing(), symbol("d_theta")
+    settled = d * (1 + symbol("a_d_theta") * sp.exp(-symbol("t") / symbol("tau_d_theta")))
+    got = law.applied(model).equations["theta_dot"]
+    assert sp.simplify(got - model.equations["theta_dot"].xreplace({d: settled})) == 0
 
 
 def test_a_fit_of_the_next_form_begins_as_loud_as_the_law(by_key: dict[str, Candidate]) -> None:

@@ -1,10 +1,11 @@
 """Laws of the forms next to an entry's: other powers of the states, and a wall that stiffens.
 
 A name claims a form.  Where the form next to it explains a recording about as well, the recording
-has not shown which of them acts; where it explains far more, the entry is not what acts.  So every
-power law of the catalogue is compared with those of one power more and one less in each state, and
-an elastic wall with one whose force rises with the square, as that of a cable that tightens, and a
-boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially.
+has not shown which of them acts; where it explains far more, the entry is not what acts.  So
+compared are: every power law of the catalogue with those of one power more and one less in each
+state; an elastic wall with one whose force rises with the square, as that of a cable that tightens;
+a boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially; a
+steady drift with a parameter that settles.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from pikanid.formula import units
+from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Begin, Candidate, Family, Powers
 from pikanid.mismatch.catalogue.forces import INF, wall_force
 from pikanid.mismatch.catalogue.site import Site
@@ -23,6 +25,7 @@ from pikanid.model.parts import Parameter, State
 
 EASED = (0.75, 0.88, 1.0)  # numerical: of a wall's distance, where fits of one that stiffens begin
 MEMORIES = (0.3, 1.0, 3.0)  # numerical: of the time to swing, where fits of a memory begin
+SETTLED = (0.1, 0.3, 1.0)  # numerical: of the recording, where fits of what settles begin
 Starts = list[dict[str, float]]
 
 
@@ -32,6 +35,8 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
         return [_stiffening(entry)]
     if entry.ids == ("boundary_layer",):
         return [_fading(entry)]
+    if entry.ids == ("parameter_drift",):
+        return [_settling(entry)]
     if entry.powers is None or not entry.site.rate:
         return []
     return [_power_law(entry, near) for near in _next(entry.powers)]
@@ -120,6 +125,24 @@ def _fading(layer: Candidate) -> Candidate:
     made = _decoy(layer, "fading_memory", f"-{kappa.name}*({site.v} - {wake})", (kappa, tau),
                   starts, layer.families)
     return replace(made, extend=extend, static=False)
+
+
+def _settling(drift: Candidate) -> Candidate:
+    """p (1 + a exp(-t/τ)): a parameter that settles, as that of oil that warms up."""
+    site, p, (first, last) = drift.site, drift.variant, drift.site.span
+    a = Parameter(site.name(f"a_{p}"), 0.0, "")
+    tau = Parameter(site.name(f"tau_{p}"), 0.25 * (last - first), "s",
+                    (1e-3 * (last - first), INF))
+    text = f"{p}*(1 + {a.name}*exp(-t/{tau.name}))"
+
+    def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
+        change = values[drift.parameters[0].name] * (last - first)
+        return [{a.name: -change, tau.name: share * (last - first)} for share in SETTLED]
+
+    made = _decoy(drift, "settling_parameter", f"{p} -> {text}", (a, tau), starts, drift.families)
+    return replace(made, static=False, extend=lambda m: m.replace(equations={
+        **m.equations, site.v: m.equations[site.v].xreplace(
+            {symbol(p): m.formula(text, "settling")})}))
 
 
 def _decoy(entry: Candidate, name: str, text: str, parameters: tuple[Parameter, ...],

@@ -34,6 +34,7 @@ FORMULAS = {
     "velocity_coupled_drive": r"u_\w\*theta_dot",
     "smooth_friction": r"tanh\([^)]*theta_dot",
     "asymmetric_spring": r"Abs\((\w+ - )?theta\)|max\(-?theta(, 0)?\)",
+    "warming_damping": r"d_theta\*\(1 \+ \w+\*exp\(-t/",
     "fluid_memory": r"\(theta_dot - wake\)",
     "position_friction": r"theta\*\*2\*sign\(theta_dot\)",
     "cable_drag": r"max\(theta - \w+, 0\)\*\*2",
