@@ -25,6 +25,7 @@ from pikanid.model import Model
 from pikanid.simulation.vectorfield import VectorField
 
 FINE = 12  # numerical: pieces of a curve, for a law that acts in a tenth of the range
+DEPENDENT = 1e-8  # numerical: relative size of singular values that are none
 FEWEST = 8  # numerical: samples that a smoothing spline needs
 
 
@@ -85,5 +86,5 @@ def _left(pieces: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     columns, target = (np.concatenate([part - part.mean(axis=0) for part in parts])
                        for parts in zip(*pieces, strict=True))
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    rest = target - columns @ np.linalg.lstsq(columns, target, 1e-8)[0]
+    rest = target - columns @ np.linalg.lstsq(columns, target, DEPENDENT)[0]
     return float(rest @ rest)

@@ -115,7 +115,8 @@ def _fading(layer: Candidate) -> Candidate:
     wake = site.name("wake")
 
     def extend(model: Model) -> Model:
-        model = model.with_state(State(wake), f"({site.v} - {wake})/{tau.name}")
+        state = State(wake, unit=f"{site.unit}/s")
+        model = model.with_state(state, f"({site.v} - {wake})/{tau.name}")
         return model.with_term(site.v, f"-{kappa.name}*({site.v} - {wake})")
 
     def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:

@@ -112,6 +112,7 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
                 for o in given)]:
             reasons[h.key] = "the held-out recording speaks against one of its effects"
             given.remove(h)
+    adequate_known = [h for h in given if h.known]
     if checked and len(given) > 1:
         given = _by_evidence(given, total, reasons, asks)
     if checked:
@@ -127,6 +128,19 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             return Answer("unconfirmed", _most_probable_first(merged, predict, scale, asks),
                           tuple(h for h in rest if h not in most)[:5], twins, reasons)
         return Answer("unnamed", (), rest[:5], {}, reasons)
+    doubt = why_not(known[0], ranked, predict, scale, settings) if proves else ""
+    if doubt and not outside:
+        # what it holds may be sure by itself, whatever may be there besides
+        reach = total(known[0]) + asks.behind * within
+        simplest = min((h for h in adequate_known if _within(h, known[0])
+                        and (h is known[0] or below(total(h), reach))),
+                       key=lambda h: len(h.effects))
+        sure = not why_not(simplest, ranked, predict, scale, settings)
+        if sure and all(h is not simplest for h in known):
+            reasons.pop(simplest.key, None)  # that more predicts better is not sure
+            sure = explains_all(simplest)
+            known += [simplest] if sure else []
+        doubt = "" if sure else doubt
     merged, twins = merged_twins(known, tried, asks)
     # laws outside the catalogue that would do as well are for the reader to know
     lowest = min(map(total, known))
@@ -134,11 +148,6 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         [h for h in outside if below(
             total(h) - (0.0 if h.next_form else _handicap(h, asks)), lowest + within)], tried, asks)
     merged, twins = merged + open_to, {**twins, **more}
-    doubt = why_not(known[0], ranked, predict, scale, settings) if proves else ""
-    if doubt and not outside:
-        # what it holds may be sure by itself, whatever may be there besides
-        simplest = min((h for h in known if h.key <= known[0].key), key=lambda h: len(h.effects))
-        doubt = why_not(simplest, ranked, predict, scale, settings) and doubt
     # beside one name such a law may explain it as much better as is no evidence: it is given, too
     margin = within if len(merged) == 2 else 0.0
     if proves and not known[0].symbolic and any(
@@ -179,6 +188,12 @@ def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
     fewest = min(len(h.effects) for h in good)
     return tuple(in_order((h for h in good if len(h.effects) == fewest), lambda h: found[h.key],
                           Hypothesis.place, band=0.0)[:3])
+
+
+def _within(fewer: Hypothesis, more: Hypothesis) -> bool:
+    """Whether a hypothesis holds all effects of another one, or laws that contain them."""
+    return all(e.key in more.key or any(e.key in law.covers for law in more.effects)
+               for e in fewer.effects)
 
 
 def _handicap(h: Hypothesis, asks: VerdictSettings) -> float:
