@@ -67,9 +67,11 @@ def _power_law(entry: Candidate, near: Powers) -> Candidate:
         as_loud = _loud(own, q, v) / max(_loud(near, q, v), 1e-300)
         return [{size.name: values[entry.parameters[0].name] * as_loud}]
 
-    # what does not rise with speed is dry friction
-    kind: Family = "dry friction" if near.v == 0 else "drag"
-    return _decoy(entry, mark, text, (size,), starts, entry.families if near.restores else (kind,))
+    # what does not rise with speed is dry friction; one whose load grows with the deflection takes
+    # energy out as drag does, faster than with the square of the amplitude
+    kinds: tuple[Family, ...] = ("drag",) if near.v else (
+        "dry friction", "drag") if near.q else ("dry friction",)
+    return _decoy(entry, mark, text, (size,), starts, entry.families if near.restores else kinds)
 
 
 def _magnitude(x: str, n: int) -> list[str]:

@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+# Friction whose load grows with the deflection loses energy with the cube of the amplitude, as
+# quadratic drag does: it is of both kinds.
 FAMILIES: dict[str, tuple[str, ...]] = {
     "dry friction": ("coulomb_friction", "stribeck_friction", "one_way_friction",
                      "hysteresis:bouc_wen", "smooth_friction", "stick_slip_friction",
                      "position_friction"),
     "drag": ("quadratic_drag", "power_drag", "amplitude_damping", "boundary_layer",
-             "fluid_memory"),
+             "fluid_memory", "position_friction"),
     "restoring force": ("cubic_stiffness", "quintic_stiffness", "even_stiffness", "wall_impact",
                         "hard_stop", "cogging", "cable_drag", "magnet", "asymmetric_spring"),
     "constant force": ("static_bias", "sensor_offset", "one_way_friction"),
