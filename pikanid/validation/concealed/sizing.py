@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pikanid import errors
@@ -47,14 +49,7 @@ def sized(shape: Shape, wanted: float, base: Rig, experiment: Experiment,
             return float("inf")
         return float(np.sqrt(np.sum(unexplained(jacobian, change) ** 2)))
 
-    low, high = 0.0, 1.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if distance(middle) < wanted:
-            low = middle
-        else:
-            high = middle
-    return shape.sized(low)
+    return shape.sized(_halved(distance, wanted, 0.0, 1.0, HALVINGS)[0])
 
 
 def strong(shape: Shape, rng: np.random.Generator, base: Rig, experiment: Experiment,
@@ -82,14 +77,20 @@ def strong(shape: Shape, rng: np.random.Generator, base: Rig, experiment: Experi
         raise errors.SimulationFailed(errors.conceal_faint())
     wanted = float(np.exp(rng.uniform(np.log(STRONG), np.log(farthest))))
     first = int(np.argmax(reached >= wanted))
-    low, high = float(LADDER[first - 1]) if first else 0.0, float(LADDER[first])
-    for _ in range(RUNGS):
+    below = float(LADDER[first - 1]) if first else 0.0
+    return shape.sized(_halved(distance, wanted, below, float(LADDER[first]), RUNGS)[1])
+
+
+def _halved(distance: Callable[[float], float], wanted: float, low: float, high: float,
+            times: int) -> tuple[float, float]:
+    """The interval in which a distance reaches what is wanted, halved so many times."""
+    for _ in range(times):
         middle = 0.5 * (low + high)
         if distance(middle) < wanted:
             low = middle
         else:
             high = middle
-    return shape.sized(high)
+    return low, high
 
 
 def _nominal_sensitivities(base: Rig, experiment: Experiment, noise: Noise,
