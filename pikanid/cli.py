@@ -110,10 +110,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Unlike str(), it names the option.
         return _complain(errors.usage(problem.format_message(), command), 2)
     except (BrokenPipeError, SystemExit):
-        # The reader has left (typer and rich make SystemExit of it); Python must not flush again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader has left (typer and rich make SystemExit of it).
+        _leave_unsaid()
         return EXIT_PIPE
     except OSError as problem:
+        try:
+            sys.stdout.flush()
+        except OSError:  # a full disk behind a buffer that still holds what was printed
+            _leave_unsaid()
         place = str(problem.filename or "the output")
         return _complain(errors.cannot_write(place, problem.strerror or ""), 2)
     except MemoryError:
@@ -130,6 +134,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if code == EXIT_INTERRUPTED:
         print("Interrupted.", file=sys.stderr)
     return int(code or 0)
+
+
+def _leave_unsaid() -> None:
+    """Python flushes once more when it ends, which would fail again, with an exit code of its own.
+    """
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(text: str, code: int) -> int:

@@ -86,7 +86,8 @@ def _surely(dx: Diagnosis) -> str:
             f"{escape(n)} = {rounded(v.value, p.std_with_remainder[n])} {escape(v.unit)}"
             for n, v in p.parameters.items())
         here = escape(p.name) if p.ids else (
-            f"{escape(p.name)}<br><span class=small>or {escape(', '.join(p.alternatives))}</span>")
+            f"{escape(p.name)}<br><span class=small>its form is not sure: compared with "
+            f"{escape(', '.join(p.compared))}</span>" if p.compared else escape(p.name))
         rows.append(f"<tr><td><b>{escape(p.family)}</b></td><td>{here}</td><td>{values}</td>"
                     f"<td>{'no other explains it' if p.dominance is None else f'{p.dominance:.2g}'}"
                     "</td></tr>")
@@ -100,24 +101,24 @@ def _surely(dx: Diagnosis) -> str:
 def _what(dx: Diagnosis) -> str:
     if not dx.hypotheses and not dx.rejected:
         return ""
-    text = "<h2>What</h2>" + "".join(_explanation(h) for h in dx.hypotheses)
+    text = "<h2>What</h2>" + "".join(_explanation(h, dx.odds(h)) for h in dx.hypotheses)
     if dx.hypotheses:
         text += _parameters(dx)
     if dx.rejected:
-        rows = "".join(f"<tr><td>{escape(h.title)}</td><td>{escape(h.why_not)}</td></tr>"
-                       for h in dx.rejected)
+        rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(why)}</td></tr>"
+                       for title, why in dx.not_given)
         text += f"<p>Tried and not given:</p><table>{rows}</table>"
     return text
 
 
-def _explanation(h: Explanation) -> str:
+def _explanation(h: Explanation, odds: str) -> str:
     rows = "".join(
         f"<tr><td>{escape(n)}</td><td>{rounded(v.value, v.std)}</td>"
         f"<td>{escape(v.unit)}</td></tr>"
         for e in h.effects for n, v in e.parameters.items())
     formulas = "".join(f"<li>{escape(e.name)} ({escape(' or '.join(e.ids))}): "
                        f"<code>{escape(e.expression)}</code></li>" for e in h.effects)
-    return (f"<p><b>{escape(h.title)}</b>, probability {h.probability:.3f}</p>"
+    return (f"<p><b>{escape(h.title)}</b>{escape(odds)}</p>"
             f"<ul>{formulas}</ul>"
             f"<table>{rows}</table>")
 

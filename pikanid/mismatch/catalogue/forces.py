@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -157,7 +156,7 @@ def disturbance(site: Site) -> list[Candidate]:
                 # forces half a period apart ring alike: those in quadrature must be there too
                 centres = np.sort(np.concatenate([centres, centres + 0.5 * np.pi / site.rate]))
             centres = centres[centres < last]
-            humps = _humps(view.t.tobytes(), centres.tobytes(), 2 * width)
+            humps = _humps(view.t, centres, 2 * width)
             found += [TangentDirection(
                 {a.name: 1.0, at.name: float(centre), w.name: 2 * width}, force=hump)
                       for centre, hump in zip(centres, humps, strict=True)]
@@ -168,12 +167,13 @@ def disturbance(site: Site) -> list[Candidate]:
                       absent=True)]
 
 
-# every hypothesis is tested along the same times
-@functools.lru_cache(maxsize=4)
-def _humps(times: bytes, centres: bytes, width: float) -> np.ndarray:
-    """(centres, L) of raised cosines of unit height."""
-    phase = (np.frombuffer(times) - np.frombuffer(centres)[:, None]) / width
-    return 0.5 * (1 + np.cos(2 * np.pi * np.clip(phase, -0.5, 0.5)))
+def _humps(t: np.ndarray, centres: np.ndarray, width: float) -> np.ndarray:
+    """(centres, L) of raised cosines of unit height over times (L,)."""
+    found = np.zeros((len(centres), len(t)))
+    for row, centre in zip(found, centres, strict=True):
+        own = slice(*np.searchsorted(t, [centre - 0.5 * width, centre + 0.5 * width]))
+        row[own] = 0.5 * (1 + np.cos(2 * np.pi * (t[own] - centre) / width))
+    return found
 
 
 def initial_state(site: Site) -> list[Candidate]:

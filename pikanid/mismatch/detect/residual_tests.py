@@ -56,18 +56,26 @@ def project(J: np.ndarray, rows: np.ndarray) -> np.ndarray:
     if J.shape[1] == 0:
         return rows
     q = orthonormal(J)
-    return rows - q @ (q.T @ rows)
+    spanned = q @ (q.T @ rows)
+    return np.asarray(np.subtract(rows, spanned, out=spanned))
 
 
 def unit_columns(D: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """D without what J explains, in unit columns, and the lengths left (m,); 0 where nothing is."""
     with np.errstate(over="ignore", invalid="ignore"):  # a sign without bounds tells nothing
-        before = np.linalg.norm(D, axis=0)
+        before = _lengths(D)
         rest = project(J, D)
-        length = np.linalg.norm(rest, axis=0)
+        length = _lengths(rest)
     good = np.isfinite(length) & (length > SPANNED * before) & (before > 0)
-    scaled = np.where(good, rest / np.where(good, length, 1.0), 0.0)
-    return scaled, np.where(good, length, 0.0)
+    rest = rest.copy() if rest is D else rest
+    rest /= np.where(good, length, 1.0)  # in place: of a long recording there is no room for two
+    rest[:, ~good] = 0.0
+    return rest, np.where(good, length, 0.0)
+
+
+def _lengths(columns: np.ndarray) -> np.ndarray:
+    """(m,) of columns (N, m), without room for their squares."""
+    return np.sqrt(np.einsum("ij,ij->j", columns, columns))
 
 
 def detect(r: np.ndarray, J: np.ndarray, units: np.ndarray, one_sided: np.ndarray,

@@ -7,8 +7,9 @@ solved along the fitted motion.  One pass over a recording serves every entry of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -60,18 +61,27 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
         with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
             listed = {(k, n): s for k, c in enumerate(chosen) for n, s in enumerate(
                 c.directions(line.view))}
-            blocks.append(whitened.whiten(r, line.columns(
-                [(chosen[k], s) for (k, _), s in listed.items()])))
+            blocks.append(line.columns([(chosen[k], s) for (k, _), s in listed.items()],
+                                       partial(whitened.whiten, r)))
         places.append(list(listed))
-        known = {**listed, **known}
+        # what they do along the motion is as large as the columns, and not needed again
+        known = {**{at: replace(s, force=None, push={}, seen=None) for at, s in listed.items()},
+                 **known}
     every = {place: column for column, place in enumerate(sorted(known))}
+    return Directions(blocks[0] if len(blocks) == 1 else _below(blocks, places, every),
+                      tuple(chosen), np.array([k for k, _ in every], int),
+                      tuple(known[p] for p in every))
+
+
+def _below(blocks: list[np.ndarray], places: Sequence[Sequence[tuple[int, int]]],
+           every: Mapping[tuple[int, int], int]) -> np.ndarray:
+    """Columns (rows, m) of all recordings, each sign's in its own; zeros where it has none."""
     D, first = np.zeros((sum(map(len, blocks)), len(every))), 0
     for own in places:
-        block = blocks.pop(0)  # of a long recording there is no room for two
+        block = blocks.pop(0)  # of long recordings there is no room for two
         D[first:first + len(block), [every[place] for place in own]] = block
         first += len(block)
-    return Directions(D, tuple(chosen), np.array([k for k, _ in every], int),
-                      tuple(known[p] for p in every))
+    return D
 
 
 class Tangent:
@@ -149,11 +159,16 @@ class Tangent:
                     {o.name: y[:, i] for i, o in enumerate(self.model.outputs)},
                     {o.name: rate[:, i] for i, o in enumerate(self.model.outputs)}, force)
 
-    def columns(self, listed: Sequence[tuple[Candidate, TangentDirection]]) -> np.ndarray:
-        """δy (rows, m) of every sign; a few at a time, to keep long recordings in memory."""
+    def columns(self, listed: Sequence[tuple[Candidate, TangentDirection]],
+                whiten: Callable[[np.ndarray], np.ndarray] = lambda rows: rows) -> np.ndarray:
+        """δy (rows, m) of every sign, whitened; a few at a time, to keep long recordings in
+        memory.
+        """
         together = min(TOGETHER, max(CELLS // len(self.t), 1))
-        parts = [self._columns(listed[k:k + together]) for k in range(0, len(listed), together)]
-        return np.concatenate(parts, axis=1) if parts else np.empty((len(self.stop), 0))
+        found = np.empty((len(self.stop), len(listed)))
+        for k in range(0, len(listed), together):
+            found[:, k:k + together] = whiten(self._columns(listed[k:k + together]))
+        return found
 
     def _columns(self, listed: Sequence[tuple[Candidate, TangentDirection]]) -> np.ndarray:
         L, n, m = len(self.t), self.x.shape[1], len(listed)

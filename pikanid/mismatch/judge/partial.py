@@ -8,7 +8,7 @@ best one with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -33,7 +33,7 @@ class Present:
         family: Of physics.
         effect: The best explanation's member of it.
         names: The effect's ids, where no other member does as well; else empty.
-        alternatives: Keys of the other members that were compared.
+        alternatives: Other members that were compared: names by key.
         probability, probability_family: Posterior of the effect, and of the family.
         dominance, dominance_within: κ over explanations without the family, and without the effect.
         share: Of the held-out misfit's square that the best explanation with it explains.
@@ -42,7 +42,7 @@ class Present:
     family: Family
     effect: Candidate
     names: tuple[str, ...]
-    alternatives: tuple[str, ...]
+    alternatives: Mapping[str, str]
     probability: float
     probability_family: float
     dominance: float
@@ -243,11 +243,10 @@ def _examined(family: Family, lead: _Weighed, found: Sequence[_Weighed], rule: P
     exact = all(e.known for e in members) and not (
         smaller(own, 1 - rule.rate) or smaller(within, rule.within)
         or smaller(lead.share, rule.exact))
-    compared = dict.fromkeys(e.key for w in holders for e in w.hypothesis.effects
-                             if family in families_of(e, w.hypothesis, rule.dry))
+    compared = {e.key: e.name for w in holders for e in w.hypothesis.effects
+                if e.key != effect.key and family in families_of(e, w.hypothesis, rule.dry)}
     return Present(family, effect, effect.ids if exact else (),
-                   tuple(k for k in compared if k != effect.key), own, total, dominance, within,
-                   lead.share)
+                   compared, own, total, dominance, within, lead.share)
 
 
 def _holds(h: Hypothesis, effect: Candidate) -> bool:

@@ -201,6 +201,18 @@ class DiagnosisData:
         """The extended model at its estimates; the nominal one where nothing is named."""
         return self.after.fitted_model
 
+    @property
+    def not_given(self) -> list[tuple[str, str]]:
+        """Title of each hypothesis that is not given, and why it is not."""
+        return [(title, h.why_not) for title, h in zip(
+            titles_apart(self.rejected), self.rejected, strict=True)]
+
+    def odds(self, h: Explanation) -> str:
+        """How probable a hypothesis is, to stand after its title; of one that leaves something
+        beside what is surely there, nothing.
+        """
+        return "" if self.verdict == "partial" else f" (probability {h.probability:.3f})"
+
     def sentence(self) -> str:
         """The verdict as an engineer would put it."""
         if self.verdict == "none":

@@ -25,7 +25,7 @@ class Present:
         ids: Its name, where no other member of the family does as well; else empty.
         name: Of the member in the best explanation, for people.
         expression: As that is added to the model.
-        alternatives: Keys of the other members that were compared.
+        alternatives: Other members that were compared: names by key.
         probability: Posterior of that member.
         probability_family: Posterior of the family.
         dominance: κ: how many times more the best explanation without the family leaves; None where
@@ -40,7 +40,7 @@ class Present:
     ids: tuple[str, ...]
     name: str
     expression: str
-    alternatives: tuple[str, ...]
+    alternatives: Mapping[str, str]
     probability: float
     probability_family: float
     dominance: float | None
@@ -54,10 +54,16 @@ class Present:
         """The name where it is sure, otherwise the family."""
         return self.name if self.ids else self.family
 
+    @property
+    def compared(self) -> list[str]:
+        """Names of the other members, each once."""
+        return [name for name in dict.fromkeys(self.alternatives.values()) if name != self.name]
+
     def sentence(self) -> str:
         """In words."""
-        others = f"; {' or '.join(self.alternatives)} would do" if self.alternatives else ""
-        within = "" if self.ids else f" (here as {self.name}{others})"
+        unsure = f"; its form is not sure, compared with {', '.join(self.compared)}" * bool(
+            self.compared)
+        within = "" if self.ids else f" (here as {self.name}{unsure})"
         if self.dominance is None:
             return f"{self.title}{within}: no explanation does without it"
         return (f"{self.title}{within}: without it the best explanation leaves "

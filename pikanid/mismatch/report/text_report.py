@@ -22,13 +22,12 @@ def lines_of(dx: DiagnosisData) -> list[str]:
     lines += [f"Surely: {part.sentence()}" for part in dx.present]
     lines += dx.remainder.lines() if dx.remainder is not None else []
     for h in dx.hypotheses:
-        lines.append(f"What: {h.title} (probability {h.probability:.3f})")
+        lines.append(f"What: {h.title}{dx.odds(h)}")
         for e in h.effects:
             lines.append(f"  {e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
                 lines.append(f"    {name} = {rounded(v.value, v.std)} {v.unit}".rstrip())
-    for h in dx.rejected[:4]:
-        lines.append(f"Not: {h.title}: {h.why_not}")
+    lines += [f"Not: {title}: {why}" for title, why in dx.not_given[:4]]
     if dx.held_out is not None and dx.hypotheses:
         p = dx.held_out
         several = len(p.outputs) > 1
