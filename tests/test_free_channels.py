@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.beyond.free_channels import _left, surely_in_dynamics
+from pikanid.mismatch.beyond.free_channels import _left, sure_channels
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -34,7 +34,7 @@ def opened(truth: Model, short: bool = False) -> Case:
 def test_only_what_no_sensor_and_no_input_can_do_is_surely_a_force(
         truth: Model, surely: bool) -> None:
     case = opened(truth)
-    assert surely_in_dynamics(case.base, case.sites[0], case.candidates, ()) is surely
+    assert (sure_channels(case.base, case.sites[0], case.candidates, ()) == ("dynamics",)) is surely
 
 
 def test_a_long_delay_is_no_force_once_it_has_been_refitted() -> None:
@@ -43,11 +43,11 @@ def test_a_long_delay_is_no_force_once_it_has_been_refitted() -> None:
         "theta", [pk.Parameter("tau", 0.06)], delay="tau")
     case = opened(truth, short=True)
     base, site = case.base, case.sites[0]
-    assert surely_in_dynamics(base, site, case.candidates, (base,))
+    assert sure_channels(base, site, case.candidates, (base,))
     late = next(c for c in case.candidates if c.key == "input_delay")
     found = fitted(MODEL, (late,), case.records, [{**base.values, "tau": 0.05}], 1)
     assert found is not None
-    assert not surely_in_dynamics(base, site, case.candidates, (base, found))
+    assert not sure_channels(base, site, case.candidates, (base, found))
 
 
 def test_what_is_left_of_noise_is_nothing() -> None:

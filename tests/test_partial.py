@@ -13,7 +13,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.as_estimate import widened
-from pikanid.mismatch.judge.partial import Doubtful, Present, _examined, _Weighed
+from pikanid.mismatch.judge.partial import Doubtful, Present, Weighed, _examined
 from pikanid.mismatch.report import part as reported_as
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.findings import Where, values_of
@@ -38,16 +38,16 @@ DRAG = effect("quadratic_drag", "drag")
 
 
 def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: float = 0.95,
-            later: float | None = None) -> _Weighed:
+            later: float | None = None) -> Weighed:
     """An explanation that leaves so much [σ²], and so much of each held-out sample [σ]."""
     h: Any = SimpleNamespace(effects=effects, values={})
     predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
                                      inert=frozenset())
-    return _Weighed(h, predicted, left, 0.0, weight, share,
+    return Weighed(h, predicted, left, 0.0, weight, share,
                     frozenset(f for e in effects for f in e.families))
 
 
-def examined(*found: _Weighed, family: Any = "dry friction") -> Present | Doubtful:
+def examined(*found: Weighed, family: Any = "dry friction") -> Present | Doubtful:
     return _examined(family, found[0], found, RULE, DEFAULTS.least_proof)
 
 

@@ -107,5 +107,5 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
         if answer.verdict == "unnamed" and case.later is not None:
             mend = patch(case.base, case.model, shape, site, case.records, case.later,
                          case.predicted)
-    answer = with_sure_part(case, answer)
+    answer = with_sure_part(case, answer, site)
     return replace(reported(case, detection, answer, site, shape), patch=mend)

@@ -17,6 +17,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.channels import needed
 from pikanid.mismatch.judge.doubt import Predict, worth
 from pikanid.mismatch.judge.prediction import HeldOut, rmse
 from pikanid.mismatch.search.overdispersion import repeated
@@ -85,7 +86,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class _Weighed:
+class Weighed:
     """A hypothesis with what it predicts, its criterion S, posterior weight, and what it leaves of
     σ² in all recordings.
     """
@@ -99,6 +100,17 @@ class _Weighed:
     families: frozenset[Family] = field(default_factory=frozenset)
 
 
+@dataclass(frozen=True)
+class Explanations:
+    """Explanations, the best first, what χ² is divided by, and the best one that predicts most of
+    what the nominal model misses, if there is one.
+    """
+
+    weighed: tuple[Weighed, ...]
+    overdispersion: float
+    lead: Weighed | None
+
+
 def families_of(effect: Candidate, h: Hypothesis, dry: float) -> tuple[Family, ...]:
     """Of an effect as it was fitted: a force that hardly rises with speed is dry friction."""
     if isinstance(effect.exponent, Parameter) and h.values[effect.exponent.name] <= dry:
@@ -106,11 +118,11 @@ def families_of(effect: Candidate, h: Hypothesis, dry: float) -> tuple[Family, .
     return effect.families
 
 
-def surely_there(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
+def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
                  noise: Sequence[dict[str, float]], settings: Settings,
                  ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None
-                 ) -> Part | None:
-    """What is there whatever the remainder is; None where nothing is sure.
+                 ) -> Explanations | None:
+    """Explanations to be compared, weighed; None where the held-out recordings prove nothing.
 
     Args:
         ranked: All hypotheses, best first, the nominal model among them.
@@ -123,7 +135,7 @@ def surely_there(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
     rule = settings.part
     pool = _pool(ranked, rule)
     ahead([partial(predict, h) for h in pool])
-    found = [_Weighed(h, p, left_over(h, p, noise), families=frozenset(
+    found = [Weighed(h, p, left_over(h, p, noise), families=frozenset(
                  f for e in h.effects for f in families_of(e, h, rule.dry)))
              for h in pool if (p := predict(h)) is not None]
     nominal = next((w for w in found if not w.hypothesis.effects), None)
@@ -132,7 +144,19 @@ def surely_there(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
         return None
     found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
     # of the explanations that predict most of what the nominal model misses
-    lead = next((w for w in found if not smaller(w.share, rule.share)), None)
+    return Explanations(tuple(found), counts,
+                        next((w for w in found if not smaller(w.share, rule.share)), None))
+
+
+def surely_there(explained: Explanations, scale: float, settings: Settings) -> Part | None:
+    """What is there whatever the remainder is; None where nothing is sure.
+
+    Args:
+        explained: Explanations, weighed.
+        scale: That divides χ², as far as the train recordings tell.
+        settings: What is asked.
+    """
+    rule, found, lead = settings.part, explained.weighed, explained.lead
     if lead is None:
         return None
     examined = [_examined(family, lead, found, rule, scale * settings.least_proof)
@@ -148,8 +172,8 @@ def surely_there(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     return Part(tuple(sorted(present, key=lambda p: -p.dominance)),
-                tuple(d for d in examined if isinstance(d, Doubtful)), fewest.hypothesis, counts,
-                fewest.share)
+                tuple(d for d in examined if isinstance(d, Doubtful)), fewest.hypothesis,
+                explained.overdispersion, fewest.share)
 
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -160,7 +184,7 @@ def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
     """The best lasting hypotheses, the best ones without each family of the first and those with
-    another member of it, and the nominal model.
+    another member of it, those that need none of its channels, and the nominal model.
     """
     left = lasting(ranked)
     chosen = left[: rule.pool]
@@ -172,6 +196,8 @@ def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
         own = {e.key for e in apart[first.fit]} if first else set()
         chosen += [h for h in left if not apart[h.fit]][: rule.rivals]
         chosen += [h for h in left if any(e.key not in own for e in apart[h.fit])][: rule.rivals]
+    for channel in sorted(needed(first)) if first else ():
+        chosen += [h for h in left if channel not in needed(h)][: rule.rivals]
     chosen += [h for h in left if not h.effects]
     return list({h.fit: h for h in chosen}.values())
 
@@ -186,8 +212,8 @@ def left_over(h: Hypothesis, predicted: HeldOut, noise: Sequence[dict[str, float
                for name, size in sizes.items())
 
 
-def _weighed(found: list[_Weighed], nominal: _Weighed, scale: float,
-             handicap: float) -> tuple[list[_Weighed], float]:
+def _weighed(found: list[Weighed], nominal: Weighed, scale: float,
+             handicap: float) -> tuple[list[Weighed], float]:
     """The same with criterion and weights, best first; and what divides χ².
 
     That is the larger one of the overdispersions of the train recordings and of the best
@@ -207,7 +233,7 @@ def _weighed(found: list[_Weighed], nominal: _Weighed, scale: float,
     return sorted(made, key=lambda w: (w.score, w.hypothesis.place())), counts
 
 
-def _examined(family: Family, lead: _Weighed, found: Sequence[_Weighed], rule: PartSettings,
+def _examined(family: Family, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
               proof: float) -> Present | Doubtful:
     """A family of the leading explanation: surely there, or why not.
 
@@ -224,12 +250,12 @@ def _examined(family: Family, lead: _Weighed, found: Sequence[_Weighed], rule: P
                if family in families_of(e, lead.hypothesis, rule.dry)]
     effect = members[0]
     total = sum(w.weight for w in holders)
-    dominance = _dominance(lead, others, rule)
+    kappa = dominance(lead, others, rule)
     if smaller(total, 1 - rule.rate):
         return Doubtful(family, effect, f"its probability is {total:.3g}")
-    if smaller(dominance, rule.dominance):
+    if smaller(kappa, rule.dominance):
         return Doubtful(family, effect, "without it the best explanation leaves "
-                        f"{dominance:.2g} times as much, {rule.dominance:.2g} are asked")
+                        f"{kappa:.2g} times as much, {rule.dominance:.2g} are asked")
     if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof):
         return Doubtful(family, effect, "the held-out recording could not have refuted it (it is "
                         f"worth {power:.2g} of chi-squared there, {proof:.2g} are asked)")
@@ -238,7 +264,7 @@ def _examined(family: Family, lead: _Weighed, found: Sequence[_Weighed], rule: P
     rivals = [w for w in holders if w not in same and not any(
         _contains(e, effect) for e in w.hypothesis.effects)]
     own = sum(w.weight for w in same)
-    within = _dominance(lead, rivals, rule)
+    within = dominance(lead, rivals, rule)
     # what needs a law outside the catalogue beside it has no name of its own
     exact = all(e.known for e in members) and not (
         smaller(own, 1 - rule.rate) or smaller(within, rule.within)
@@ -246,7 +272,7 @@ def _examined(family: Family, lead: _Weighed, found: Sequence[_Weighed], rule: P
     compared = {e.key: e.name for w in holders for e in w.hypothesis.effects
                 if e.key != effect.key and family in families_of(e, w.hypothesis, rule.dry)}
     return Present(family, effect, effect.ids if exact else (),
-                   compared, own, total, dominance, within, lead.share)
+                   compared, own, total, kappa, within, lead.share)
 
 
 def _holds(h: Hypothesis, effect: Candidate) -> bool:
@@ -261,7 +287,7 @@ def _contains(law: Candidate, effect: Candidate) -> bool:
     return effect.key in law.covers or any(effect.key in parts for parts in sums)
 
 
-def _dominance(lead: _Weighed, others: Sequence[_Weighed], rule: PartSettings) -> float:
+def dominance(lead: Weighed, others: Sequence[Weighed], rule: PartSettings) -> float:
     """κ: how many times more the best of its rivals leaves; infinite where it has none."""
     least = min((w.left for w in others[: rule.rivals]), default=np.inf)
     return float(least / max(lead.left, rule.floor))

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from pikanid.mismatch.catalogue.candidate import Channel
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import below, in_order, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
@@ -32,7 +33,8 @@ class Answer:
     `twins` lists, for a hypothesis given, the effects that stand for each other in it; `reasons`
     why others are not given, and `doubt` what keeps the first one from being confirmed.  `rivals`
     are laws outside the catalogue that explain all as well, but are not likely enough to be given.
-    `part` is what is surely there although something is left.
+    `part` is what is surely there although something is left, and `channels` are those in which
+    something is, whatever it is.
     """
 
     verdict: Verdict
@@ -43,6 +45,7 @@ class Answer:
     doubt: str = ""
     rivals: tuple[Hypothesis, ...] = ()
     part: Part | None = None
+    channels: tuple[Channel, ...] = ()
 
 
 def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict,

@@ -11,7 +11,6 @@ from typing import get_args
 import numpy as np
 
 from pikanid.mismatch.beyond.force_shape import ForceShape
-from pikanid.mismatch.beyond.free_channels import surely_in_dynamics
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.local_force import Local
 from pikanid.mismatch.beyond.region import Course, course, regions_of_laws
@@ -20,6 +19,7 @@ from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import unit_columns
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.channels import acts_in
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Where, values_of
 from pikanid.mismatch.report.part import Value
@@ -46,8 +46,7 @@ def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site
 
 def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
            shape: ForceShape | None, force: ForceOverTime | None,
-           candidates: Sequence[Candidate] = (), local: Local | None = None,
-           tried: Sequence[Hypothesis] = ()) -> Where:
+           candidates: Sequence[Candidate] = (), local: Local | None = None) -> Where:
     """The place of a mismatch, as far as the answer and the nominal residual tell.
 
     Where all laws of a sure answer act in a part of the recording only, that is its place in time.
@@ -56,7 +55,7 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
 
     Without an answer the shape of the missing force says what it depends on, and whether a static
     law can be all that is missing.  `local` is a force without a name that acts in a region, if
-    there is one, and `tried` are explanations that were refitted.
+    there is one.
     """
     settings = base.whitened.settings
     # what the new terms are made of
@@ -71,11 +70,9 @@ def locate(base: Hypothesis, best: Hypothesis, answer: Answer, site: Site,
     fit = best if answer.part is not None or not answer.given else _simplest(answer)
     courses = [course(fit, base.model, e) for e in _sure(answer)]
     region = local.intervals if local else regions_of_laws(courses, site, settings)
-    channels = _channels(answer, site, candidates) or _channel_of_shape(
+    channels = answer.channels if answer.part is None else ()
+    channels = channels or _channels(answer, candidates) or _channel_of_shape(
         answer, site, shape, settings)
-    if not channels and answer.verdict in ("partial", "unconfirmed", "unnamed") and (
-            surely_in_dynamics(base, site, candidates, tried)):
-        channels = ("dynamics",)
     windows = local.course.windows(_period(site)) if local else _seconds(
         base, answer, courses, force)
     values = values_of(base.model.parameters, local.hypothesis.values, local.hypothesis.std,
@@ -113,18 +110,14 @@ def _period(site: Site) -> float:
     return 2 * np.pi / site.rate if site.rate else 0.0
 
 
-def _channels(answer: Answer, site: Site, candidates: Sequence[Candidate]) -> tuple[Channel, ...]:
+def _channels(answer: Answer, candidates: Sequence[Candidate]) -> tuple[Channel, ...]:
     """Channels in which something surely acts, whichever of the explanations holds.
 
     Of an answer that is not confirmed: the one that all effects of all its hypotheses share.
     """
     def of(e: Candidate, names: Sequence[str]) -> frozenset[Channel]:
-        if len(e.ids) > 1:
-            return frozenset(get_args(Channel))  # exact twins: a delay of input and of sensor
         others = {c.channel for c in candidates for i in c.ids if i in names and i not in e.ids}
-        if not e.known and e.channel == "dynamics":
-            return _channels_of_formula(e, site)
-        return frozenset({e.channel} if e.channel in others else {e.channel} | others)
+        return acts_in(e) if e.channel in others else acts_in(e) | others
 
     def of_family(family: str) -> frozenset[Channel]:
         return frozenset(c.channel for c in candidates if family in c.families)
@@ -133,7 +126,7 @@ def _channels(answer: Answer, site: Site, candidates: Sequence[Candidate]) -> tu
     if answer.part is not None:
         told = [of(p.effect, p.names) if p.names else of_family(p.family)
                 for p in answer.part.present]
-        found = [{next(iter(c)) for c in told if len(c) == 1}]
+        found = [{*answer.channels, *(next(iter(c)) for c in told if len(c) == 1)}]
     for h in () if answer.part is not None else answer.given:
         table = answer.twins.get(h.key, {})
         told = [of(e, table.get(e.key, e.names)) for e in h.effects]
@@ -143,17 +136,6 @@ def _channels(answer: Answer, site: Site, candidates: Sequence[Candidate]) -> tu
     if answer.verdict not in SURE and any(own != shared for own in found):
         return ()
     return tuple(c for c in get_args(Channel) if c in shared)
-
-
-def _channels_of_formula(e: Candidate, site: Site) -> frozenset[Channel]:
-    """A force of inputs alone is what an input's curve makes; one of inputs and states is either's.
-    """
-    def holds(names: Sequence[str]) -> bool:
-        return any(re.search(rf"\b{n}\b", e.expression) for n in names)
-
-    if not holds(site.inputs):
-        return frozenset({"dynamics"})
-    return frozenset({"dynamics", "input"} if holds(site.model.state_names) else {"input"})
 
 
 def _channel_of_shape(answer: Answer, site: Site, shape: ForceShape | None, settings: Settings

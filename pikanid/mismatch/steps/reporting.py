@@ -52,8 +52,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
             shape is not None and answer.verdict not in ("named", "set")) else None
     return Diagnosis(
         answer.verdict, detection.p_value, case.settings,
-        locate(case.base, best, answer, site, shape, force, case.candidates, local,
-               case.search.ranked()),
+        locate(case.base, best, answer, site, shape, force, case.candidates, local),
         given, rejected, before, after, proof, tuple(levels),
         tuple(case.notes), smallest(case.base, case.candidates, counts),
         advice(answer.verdict, given, case.records, case.rate, case.proves,

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pikanid.mismatch.beyond.free_channels import sure_channels
 from pikanid.mismatch.beyond.free_curve import share_lacking, with_free_curve
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate
@@ -15,8 +16,10 @@ from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.partial import (
     Doubtful,
+    Explanations,
     Part,
     Present,
+    explanations,
     families_of,
     lasting,
     left_over,
@@ -27,30 +30,38 @@ from pikanid.mismatch.search.neighbours import with_next_form, with_relatives
 from pikanid.mismatch.search.search import Search
 
 
-def with_sure_part(case: Case, answer: Answer) -> Answer:
-    """The answer, where not everything is explained, with what is surely there nevertheless."""
-    if not case.proves or case.later is None or answer.verdict not in (
-            "unconfirmed", "unnamed"):
+def with_sure_part(case: Case, answer: Answer, site: Site) -> Answer:
+    """The answer, where not everything is explained, with what is surely there nevertheless, and
+    the channels in which something is.
+    """
+    if answer.verdict not in ("unconfirmed", "unnamed"):
         return answer
-    noise = [{name: level.sigma for name, level in records.levels[0].items()}
-             for records in (case.records, case.later)]
-    search = case.search
-
-    def sure() -> Part | None:
-        return surely_there(search.ranked(), search.scale(), case.predicted, noise, case.settings,
-                            case.ahead)
-
-    part = sure()
-    for _ in range(case.settings.budget.rechecked):
-        if not _compared(search, part.hypothesis if part else lasting(search.ranked())[0]):
-            break
-        part = sure()
-    if part is None:
-        return answer
-    part = _against_curves(case, part, noise)
-    if not part.present:
+    explained, part = _sure(case) if case.proves else (None, None)
+    answer = replace(answer, channels=sure_channels(
+        case.base, site, case.candidates, case.search.ranked(), explained))
+    if part is None or not part.present:
         return answer
     return replace(answer, verdict="partial", given=(part.hypothesis,), part=part)
+
+
+def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
+    """Explanations with all that they are to be compared with, and what is sure of them."""
+    assert case.later is not None
+    noise = [{name: level.sigma for name, level in records.levels[0].items()}
+             for records in (case.records, case.later)]
+    search, settings = case.search, case.settings
+
+    def weighed() -> tuple[Explanations | None, Part | None]:
+        found = explanations(search.ranked(), search.scale(), case.predicted, noise, settings,
+                             case.ahead)
+        return found, None if found is None else surely_there(found, search.scale(), settings)
+
+    explained, part = weighed()
+    for _ in range(settings.budget.rechecked):
+        if not _compared(search, part.hypothesis if part else lasting(search.ranked())[0]):
+            break
+        explained, part = weighed()
+    return explained, None if part is None else _against_curves(case, part, noise)
 
 
 def _compared(search: Search, lead: Hypothesis) -> bool:
