@@ -59,6 +59,39 @@ def test_a_wall_may_stiffen_on_each_side(by_key: dict[str, Candidate]) -> None:
         assert force(law, theta=0.1, wall=0.3) == 0
 
 
+def test_a_loop_may_be_a_spring_that_gives_way(by_key: dict[str, Candidate]) -> None:
+    [law] = [c for c in by_key.values() if c.next_to == "hysteresis[bouc_wen]"]
+    assert force(law, theta=0.1, z_yield=0.05) == pytest.approx(-2 / 5)
+    assert force(law, theta=-0.05, z_yield=0.05) == pytest.approx(1 / 2)
+    assert law.static and law.families == ("restoring force",)
+
+
+@pytest.mark.parametrize(("entry", "expected"), [
+    ("sensor_gain", {1.1 * 0.3 + 0.5 * 0.3**2, 1.1 * 0.3 + 0.5 * 0.3**3}),
+    ("sensor_nonlinearity", {0.3 + 0.5 * 0.3**2, 0.3 + 0.5 * 0.3**4})])
+def test_a_sensor_may_bend_otherwise(by_key: dict[str, Candidate], entry: str,
+                                     expected: set[float]) -> None:
+    seen = set()
+    for law in (c for c in by_key.values() if c.next_to == entry):
+        shown = law.applied(pk.systems.sloshing()).output("theta").expression
+        values = {"theta": 0.3, "k_out": 1.1, "b_2": 0.5, "b_3": 0.5, "b_4": 0.5}
+        seen.add(round(float(shown.subs({symbol(n): v for n, v in values.items()})), 9))
+        assert law.channel == "sensor" and not law.known
+    assert seen == {round(v, 9) for v in expected}
+
+
+def test_an_input_may_bend_beside_its_scale(by_key: dict[str, Candidate]) -> None:
+    forces = set()
+    for law in (c for c in by_key.values() if c.next_to == "input_gain"):
+        pushed = law.applied(pk.systems.sloshing()).equations["theta_dot"]
+        at = {"u_x": 2.0, "k_in": 1.1, "b_2": 0.5, "b_3": 0.5}
+        plain = pk.systems.sloshing().equations["theta_dot"].subs(symbol("u_x"), symbol("pushed"))
+        same = pushed.subs({symbol(n): v for n, v in at.items()})
+        forces |= {total for total in (2.2 + 0.5 * 4, 2.2 + 0.5 * 8)
+                   if sp.simplify(plain.subs(symbol("pushed"), total) - same) == 0}
+    assert forces == {4.2, 6.2}
+
+
 def test_a_wall_does_not_stand_at_the_rest(by_key: dict[str, Candidate]) -> None:
     """What is touched there is a spring that differs between the sides."""
     distance = by_key["wall_impact"].parameters[0]
@@ -112,7 +145,7 @@ def test_without_a_rest_friction_has_no_next_form() -> None:
     t = np.arange(100) * 0.01
     run = Recording.from_arrays(t, {"u": np.sin(t), "x": np.cos(t)}, units={"u": "m/s^2", "x": "m"})
     assert not [c for c in candidates(sites(model, (run,)))
-                if c.next_to and c.ids != ("stiffening_wall",)]
+                if c.next_to and c.channel == "dynamics" and c.ids != ("stiffening_wall",)]
 
 
 def swings(seed: int, force: Callable[[float], float]) -> Recording:

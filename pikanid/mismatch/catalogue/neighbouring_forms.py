@@ -5,7 +5,9 @@ has not shown which of them acts; where it explains far more, the entry is not w
 compared are: every power law of the catalogue with those of one power more and one less in each
 state; an elastic wall with one whose force rises with the square, as that of a cable that tightens;
 a boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially; a
-steady drift with a parameter that settles.
+steady drift with a parameter that settles; a loop of hysteresis with a spring that gives way
+without a memory; a scale error of input or sensor with curves that bend as well, and a cubic one
+with other powers.
 """
 
 from __future__ import annotations
@@ -26,17 +28,26 @@ from pikanid.model.parts import Parameter, State
 EASED = (0.75, 0.88, 1.0)  # numerical: of a wall's distance, where fits of one that stiffens begin
 MEMORIES = (0.3, 1.0, 3.0)  # numerical: of the time to swing, where fits of a memory begin
 SETTLED = (0.1, 0.3, 1.0)  # numerical: of the recording, where fits of what settles begin
+BENT = (2, 3)  # definition: powers of a curve beside its straight part
 Starts = list[dict[str, float]]
 
 
 def neighbouring_forms(entry: Candidate) -> list[Candidate]:
-    """The decoys next to an entry in form; none where it is no power law and no wall."""
+    """The decoys next to an entry in form; none where no form is next to it."""
     if entry.ids == ("wall_impact",):
         return [_stiffening(entry)]
     if entry.ids == ("boundary_layer",):
         return [_fading(entry)]
     if entry.ids == ("parameter_drift",):
         return [_settling(entry)]
+    if entry.ids == ("hysteresis",) and entry.channel == "dynamics" and entry.site.rate:
+        return [_yielding(entry)]
+    if entry.ids == ("input_gain",):
+        return [_bent(entry, entry.variant or entry.site.inputs[0], n) for n in BENT]
+    if entry.ids == ("sensor_gain",) and entry.site.rate:
+        return [_bent(entry, entry.site.output.name, n) for n in BENT]
+    if entry.ids == ("sensor_nonlinearity",):
+        return [_bent_otherwise(entry, n) for n in (2, 4)]
     if entry.powers is None or not entry.site.rate:
         return []
     return [_power_law(entry, near) for near in _next(entry.powers)]
@@ -130,6 +141,14 @@ def _fading(layer: Candidate) -> Candidate:
     return replace(made, extend=extend, static=False)
 
 
+def _yielding(loop: Candidate) -> Candidate:
+    """-b q/(z² + q²)^½: a spring that gives way as the loop does, without its memory."""
+    site, (b, z) = loop.site, loop.parameters
+    text = f"-{b.name}*({site.q}/{z.name})/(1 + ({site.q}/{z.name})**2)"
+    return _decoy(loop, "yielding_spring", text, (b, z), lambda values, states: [
+        {b.name: values[b.name], z.name: values[z.name]}], ("restoring force",))
+
+
 def _settling(drift: Candidate) -> Candidate:
     """p (1 + a exp(-t/τ)): a parameter that settles, as that of oil that warms up."""
     site, p, (first, last) = drift.site, drift.variant, drift.site.span
@@ -146,6 +165,41 @@ def _settling(drift: Candidate) -> Candidate:
     return replace(made, static=False, extend=lambda m: m.replace(equations={
         **m.equations, site.v: m.equations[site.v].xreplace(
             {symbol(p): m.formula(text, "settling")})}))
+
+
+def _bent(scale: Candidate, channel: str, n: int) -> Candidate:
+    """(k + b yⁿ⁻¹) y of an input or an output y, in place of its scale alone."""
+    site, k = scale.site, scale.parameters[0]
+    b = Parameter(site.name(f"b_{n}"), 0.0, units.product((_unit(scale, channel), 1 - n)))
+    text = f"{k.name}*{channel} + {b.name}*{channel}**{n}"
+    return _curve(scale, channel, f"{scale.ids[0]}_bent_{n}", text, (k, b), lambda values, states: [
+        {k.name: values[k.name], b.name: 0.0}])
+
+
+def _bent_otherwise(cubic: Candidate, n: int) -> Candidate:
+    """y + b |y|ⁿ⁻¹ y, in place of y + b y³."""
+    site, o = cubic.site, cubic.site.output.name
+    b = Parameter(site.name(f"b_{n}"), 0.0, units.product((_unit(cubic, o), 1 - n)))
+
+    def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
+        top = float(np.abs(states[site.q]).max(initial=0.0))
+        return [{b.name: values[cubic.parameters[0].name] * top ** (3 - n)}]
+
+    return _curve(cubic, o, f"sensor_power_{n}", f"{o} + {b.name}*abs({o})*{o}**{n - 1}", (b,),
+                  starts)
+
+
+def _unit(entry: Candidate, channel: str) -> str:
+    return (entry.site.model.input(channel) if entry.channel == "input" else
+            entry.site.output).unit or "1"
+
+
+def _curve(entry: Candidate, channel: str, name: str, text: str,
+           parameters: tuple[Parameter, ...], starts: Begin) -> Candidate:
+    made = _decoy(entry, name, text, parameters, starts, entry.families)
+    mapped = Model.map_input if entry.channel == "input" else Model.map_output
+    return replace(made, channel=entry.channel, static=entry.static,
+                   extend=lambda m: mapped(m, channel, function=text))
 
 
 def _decoy(entry: Candidate, name: str, text: str, parameters: tuple[Parameter, ...],
