@@ -1,7 +1,7 @@
 """How good are diagnoses?  Open sets of concealed recordings, scored: `reports/diagnosis.md`.
 
-    python benchmarks/report_diagnosis.py [FOLDER] [--work build/diagnosis] [--cases 60]
-        [--workers 2] [--only rich ...] [--alarms 400] [--thresholds 8]
+    python benchmarks/report_diagnosis.py [FOLDER] [--work build/diagnosis] [--cases 80]
+        [--workers 2] [--only rich ...] [--rounds 3] [--alarms 400] [--thresholds 8]
         [--recordings silverbox ...]
 
 Every set is made from its seed, every diagnosis is kept in the work folder: an interrupted run goes
@@ -11,17 +11,19 @@ on where it stopped.  Nothing of the truth reaches a diagnosis.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import diagnosis_alarms
+import diagnosis_decoys
 import diagnosis_real
 import diagnosis_thresholds
 import numpy as np
@@ -41,7 +43,8 @@ LONGEST = 5  # diagnoses of a set that are timed again by themselves
 @dataclass(frozen=True)
 class Set:
     """An open set: its name, excitation, noise [rad], seed, mix (default where None), and how many
-    times as many cases as are asked for it has.
+    times as many cases as are asked for it has.  Those of the default mix are made in several
+    rounds.
     """
 
     name: str
@@ -53,12 +56,25 @@ class Set:
 
 
 SETS = (
-    Set("rich", "rich", 0.1 * DEGREE, 20431),
-    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20432),
-    Set("rich_1deg", "rich", 1.0 * DEGREE, 20433),
-    Set("remainder", "mixed", 0.1 * DEGREE, 20434, {"remainder": 1.0}, 1.5),
-    Set("unforeseen", "mixed", 0.1 * DEGREE, 20435, {"unforeseen": 1.0}, 1.5),
+    Set("rich", "rich", 0.1 * DEGREE, 20631),
+    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20632),
+    Set("rich_1deg", "rich", 1.0 * DEGREE, 20633),
+    Set("remainder", "mixed", 0.1 * DEGREE, 20634, {"remainder": 1.0}, 1.5),
+    Set("unforeseen", "mixed", 0.1 * DEGREE, 20635, {"unforeseen": 1.0}, 1.5),
+    Set("outside", "mixed", 0.1 * DEGREE, 20636, {"outside": 1.0}, 1.5),
+    Set("nothing", "mixed", 0.1 * DEGREE, 20637, {"nothing": 1.0}, 2.5),
 )
+LATER = 100  # from the seed of one round to that of the next
+
+
+def rounds(chosen: Sequence[Set], count: int) -> list[Set]:
+    """All sets; those of the default mix once for every round, with a seed of its own.
+
+    >>> [(s.name, s.seed) for s in rounds(SETS[2:4], 2)]
+    [('rich_1deg', 20633), ('rich_1deg_2', 20733), ('remainder', 20634)]
+    """
+    return [replace(one, name=one.name + (f"_{k + 1}" if k else ""), seed=one.seed + LATER * k)
+            for one in chosen for k in range(1 if one.mix else count)]
 
 
 def main() -> None:
@@ -66,7 +82,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=Path("reports"))
     parser.add_argument("--work", type=Path, default=Path("build/diagnosis"))
-    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--cases", type=int, default=80)
+    parser.add_argument("--rounds", type=int, default=3, help="of the sets of all kinds of cases")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--alarms", type=int, default=400,
                         help="clean recordings of each noise; 0 for none")
@@ -79,17 +96,19 @@ def main() -> None:
     parser.add_argument("--recordings", choices=list(diagnosis_real.RECORDINGS), nargs="*",
                         default=list(diagnosis_real.RECORDINGS), help="real ones to diagnose")
     given = parser.parse_args()
-    chosen = [s for s in SETS if not given.only or s.name in given.only]
+    chosen = rounds([s for s in SETS if not given.only or s.name in given.only], given.rounds)
     parts = ["# Diagnoses of concealed recordings\n", provenance(), INTRODUCTION]
-    every: list[Score] = []
+    every: dict[str, list[Score]] = {}
     for one in chosen:
         found = list(_diagnosed(one, given.work, given.cases, given.workers))
         parts.append(_section(one, found))
         longest = sorted(found, key=lambda each: -each[1]["cpu"])[:LONGEST]
         parts.append(_alone(given.work / one.name, [score.case for score, _ in longest]))
-        every += [score for score, _ in found] if one.mix is None else []
-    if sum(s.mix is None for s in chosen) > 1:
-        parts.append(_together(every, given.folder))
+        every[one.name] = [score for score, _ in found]
+    if len(chosen) > 1:
+        parts.append(_together(every, given.rounds, given.folder))
+    if any(s.name == "outside" for s in chosen):
+        parts.append(diagnosis_decoys.section(given.work, given.workers, ["outside"]))
     if given.alarms:
         parts.append(diagnosis_alarms.section(given.alarms, given.work, given.workers))
     if given.thresholds:
@@ -101,8 +120,19 @@ def main() -> None:
     atomically(given.folder / "diagnosis.md", "\n".join(parts).encode())
 
 
-def _together(scores: list[Score], folder: Path) -> str:
-    """The sets taken together, and how true the stated probabilities are."""
+def _together(every: Mapping[str, list[Score]], count: int, folder: Path) -> str:
+    """The sets taken together, round by round, and how true the stated probabilities are."""
+    scores = list(itertools.chain(*every.values()))
+    whole = [s.name for s in SETS if s.mix is None]
+    lines = [f"\n## All {len(scores)} cases together\n", "| sets | right | wrong | missed |",
+             "| --- | --- | --- | --- |"]
+    for k in range(count):
+        own = [f"{name}_{k + 1}" if k else name for name in whole]
+        lines.append(_row(f"round {k + 1}: {', '.join(whole)}",
+                          [s for name in own for s in every.get(name, ())]))
+    lines += [_row(name, found) for name, found in every.items()
+              if name.rstrip("_0123456789") not in whole]
+    lines.append(_row("all", scores))
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     rows = reliability(scores)
     figure = new_figure(4.5, 4.0)
@@ -122,12 +152,15 @@ def _together(scores: list[Score], folder: Path) -> str:
              xlim=(0, 1.2), ylim=(-0.05, 1.12))
     axis.legend(loc="upper left", fontsize=8)
     save_figure(figure, folder / "figures" / "diagnosis_reliability.png")
-    lines = [f"\n## All {len(scores)} cases together\n", "| what | share |", "| --- | --- |"]
-    lines += [f"| {name.replace('_', ' ')} | {share} |" for name, share in tally(scores).items()]
     lines += ["", "| probability stated | true |", "| --- | --- |"]
     lines += [f"| {p:.2f} | {share} |" for p, share in rows]
     return "\n".join([*lines, "", "![stated probability against truth]"
                       "(figures/diagnosis_reliability.png)"]) + "\n"
+
+
+def _row(name: str, scores: list[Score]) -> str:
+    found = tally(scores)
+    return f"| {name} | {found['right']} | {found['wrong']} | {found['missed']} |"
 
 
 def _real(work: Path, names: Sequence[str]) -> str:

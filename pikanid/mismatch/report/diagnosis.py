@@ -72,6 +72,8 @@ class Diagnosis(DiagnosisData):
                              "parameters": {n: _entry(v) for n, v in e.parameters.items()}}
                             for e in h.effects],
                 "probability": h.probability} for h in self.hypotheses],
+            "rejected": [{"effects": [list(e.ids) for e in h.effects], "why_not": h.why_not}
+                         for h in self.rejected],
             "parameters": {"before": _parameters(self.before), "after": _parameters(self.after)},
             "held_out": None if self.held_out is None else self.held_out.to_dict(),
             "undetectable_below": {
