@@ -64,7 +64,7 @@ platforms: $(STAMP) ## quick tests and diagnoses under other CPU settings (an ho
 
 bench: $(STAMP) ## time the code against its references; writes reports/performance.md
 	mkdir -p build reports
-	$(BIN)/python -m pytest benchmarks -m "" --benchmark-only --benchmark-json build/benchmarks.json
+	$(BIN)/python -m pytest benchmarks/test_bench_*.py -m "" --benchmark-only --benchmark-json build/benchmarks.json
 	$(BIN)/python benchmarks/ipda_scaling.py > build/ipda_scaling.md
 	$(BIN)/python benchmarks/performance.py build/benchmarks.json reports/performance.md \
 		build/ipda_scaling.md

@@ -127,3 +127,15 @@ def test_other_starts_may_not_ask_for_far_shorter_steps() -> None:
     shooting.hurry()
     assert shooting.choose_steps(THETA * [1, 1, 300.0, 1], "fine")
     assert all(s.longest >= u / HURRY / 2 for s, u in zip(shooting.steps, usual, strict=True))
+
+
+def test_steps_that_are_fine_stay_as_they_are_when_asked_for_again() -> None:
+    """Where they are checked once more, as after a fit, nothing is gained by shorter ones."""
+    shooting = Shooting(Problem(model(), [recording(0, True)]))
+    theta = shooting.problem.guess
+    shooting.choose_steps(theta, "coarse")
+    assert shooting.choose_steps(theta, "fine")
+    fine = shooting.steps[0].longest
+    for _ in range(3):
+        assert not shooting.choose_steps(theta, "fine")
+    assert shooting.steps[0].longest == fine

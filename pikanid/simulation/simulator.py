@@ -182,7 +182,8 @@ class Simulator:
         Args:
             tolerance: Of the outputs, in their own units or in those of `scale`; default 1e-8 of
                 the largest output.
-            known: Coarser steps in use: shorter ones follow from the method's order, checked at p.
+            known: Steps in use: shorter ones follow from the method's order, checked at p; these
+                where they are fine enough.
             finest: Give up below this step [s]; at least 1/4096 of the median interval is tried.
             trial: The response at p for given steps and whether these are likely to be chosen; by
                 default simulated without sensitivities.
@@ -250,9 +251,16 @@ def _largest(y: np.ndarray, unit: np.ndarray | float) -> float:
 
 def _foretold(trial: Trial, tolerance: float, known: Steps, unit: np.ndarray | float = 1.0
               ) -> Steps | None:
-    """Steps for `tolerance` by the known order, checked; None where that does not hold."""
+    """Steps for `tolerance` by the known order, checked, or the known ones where these do; None
+    where that does not hold.
+    """
     if not known.error > 0:
         return None
+    if known.error <= tolerance:
+        rough, fine = trial(known, True), trial(Steps(known.method, known.longest / 2), False)
+        error = _largest(fine.y - rough.y, unit) * 16 / 15
+        enough = rough.finished and fine.finished and error <= tolerance
+        return Steps(known.method, known.longest, error) if enough else None
     ratio = min((tolerance / (4 * known.error)) ** 0.25, 0.5)
     if ratio < 1.0 / FORETOLD:
         return None
