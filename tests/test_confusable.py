@@ -134,8 +134,8 @@ def test_what_cannot_be_asked() -> None:
         Confusable((), 4.0).smallest("coulomb_friction")
     decay = pk.Model.from_dict({
         "name": "decay", "states": {"x": {"initial": 1.0}}, "parameters": {"k": {"guess": 0.5}},
-        "equations": {"x": "-k*x"}, "outputs": {"x": {"expression": "x"}}})
-    with pytest.raises(errors.BadModel):
+        "equations": {"x": "-k*x"}, "outputs": {"clock": {"expression": "k*t"}}})
+    with pytest.raises(errors.BadModel, match="no state"):
         confusable(decay, excitation.free_decay(1.0), 0.1)
 
 

@@ -67,14 +67,15 @@ def test_a_small_motion_bends_no_spring(hypotheses: tuple[Case, list[Hypothesis]
     assert "could not have refuted cubic stiffness" in said and motion > 1e3
 
 
-def test_a_first_order_model_is_refused_before_any_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_of_which_nothing_is_seen_is_refused_before_any_fit(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     fits: list[object] = []
     monkeypatch.setattr(NLS, "fit", lambda *given: fits.append(given))
     decay = pk.Model.from_dict({
         "name": "decay", "states": {"x": {"initial": 1.0}},
         "parameters": {"k": {"guess": 0.5}}, "equations": {"x": "-k*x"},
-        "outputs": {"x": {"expression": "x"}}})
+        "outputs": {"y": {"expression": "k*t"}}})
     t = np.linspace(0, 1, 50)
-    with pytest.raises(pk.errors.BadModel, match="second-order"):
-        pk.diagnose(decay, Recording.from_arrays(t, {"x": np.exp(-t)}))
+    with pytest.raises(pk.errors.BadModel, match="no state that reaches an output"):
+        pk.diagnose(decay, Recording.from_arrays(t, {"y": np.exp(-t)}))
     assert not fits

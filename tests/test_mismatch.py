@@ -27,7 +27,7 @@ from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.fitting.hypothesis import extended
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
-from pikanid.model import Model, systems
+from pikanid.model import systems
 from pikanid.noise.level import NoiseModel
 from pikanid.optimise.levenberg_marquardt import minimise
 from pikanid.problem.problem import Problem
@@ -58,17 +58,6 @@ def test_site_is_found_from_the_formulas(recording: Recording) -> None:
     assert site.inputs == ("u_x",) and site.extra == ("u_y",)
     assert site.rate == pytest.approx(np.sqrt(9.81 / 0.045))
     assert site.free_in_force == ("l_theta", "d_theta") and site.rest
-
-
-def test_model_without_a_second_order_coordinate_is_refused() -> None:
-    decay = Model.from_dict({
-        "name": "decay", "states": {"x": {"initial": 1.0}},
-        "parameters": {"k": {"guess": 0.5}}, "equations": {"x": "-k*x"},
-        "outputs": {"x": {"expression": "x"}}})
-    t = np.linspace(0, 1, 50)
-    rec = Recording.from_arrays(t, {"x": np.exp(-t)})
-    with pytest.raises(errors.BadModel, match="second-order"):
-        diagnose(decay, rec)
 
 
 # What a small effect does, computed to first order, against the extended model itself.

@@ -269,6 +269,7 @@ def test_effects_are_added_until_one_is_not_worth_it_elsewhere(
     monkeypatch.setattr(Search, "_extend", grown)
     for name in ("_fit_all", "_simplify"):
         monkeypatch.setattr(Search, name, lambda *_, **__: None)
+    monkeypatch.setattr("pikanid.mismatch.search.neighbours.with_other_form", lambda *_: ())
     search.predicts = worth
     grown(search, search.ranked()[0])
     assert len(search.grow(lambda h: False)[0].effects) == 3

@@ -155,3 +155,18 @@ def test_a_force_that_cannot_push_promises_nothing_where_it_would_have_to(drag: 
     assert screen.promised(screen.found.candidates[of["quadratic_drag"]]) == screen.gain[k]
     (other,) = np.flatnonzero(screen.found.owner == of["cubic_stiffness"])
     assert not screen.found.one_sided[other] and screen.gain[other] == screen.z[other] ** 2
+
+
+def test_squares_that_overflow_are_no_residual() -> None:
+    """A motion may be finite, and its derivatives in units of the noise not."""
+    model = pk.Model.from_dict({
+        "states": {"x": {"initial": 1.0}}, "equations": {"x": "a*x"},
+        "parameters": {"a": {"guess": 1.0, "bounds": [0.0, 100.0]}},
+        "outputs": {"x": {"expression": "x"}}})
+    t = np.linspace(0.0, 10.0, 101)
+    run = pk.Recording.from_arrays(t, {"x": np.exp(0.1 * t)})
+    whitened = Whitened(model, Records((run,), ({"x": NoiseModel(1e-3, 0.0, 0.0, 0.1, "")},),
+                                       DEFAULTS))
+    assert whitened.choose_steps(np.array([1.0]))
+    assert whitened.residual(np.array([1.0])) is not None
+    assert whitened.residual(np.array([35.0])) is None

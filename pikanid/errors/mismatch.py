@@ -62,9 +62,9 @@ def limits_not_kept(profile: str) -> str:
     return f"Profile '{short(profile)}' exceeds the limits however small it is made."
 
 
-def no_coordinate(model: str) -> str:
-    return (f"'{model}' has no second-order coordinate that an output shows: a diagnosis needs a "
-            "state whose derivative is another state, such as theta' = theta_dot.")
+def nothing_seen(model: str) -> str:
+    return (f"'{model}' has no state that reaches an output: a diagnosis needs one whose equation "
+            "shows in what is measured.")
 
 
 def held_out_channels(name: str, missing: Sequence[str]) -> str:

@@ -42,7 +42,8 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     so.
 
     Args:
-        model: Nominal model with a second-order coordinate (a state that is the rate of another).
+        model: Nominal model.  Where a state is the rate of another one, physics is looked for in
+            the equation of that rate; without any, in those of all states that reach an output.
         train: Recording, or several, to explain.
         held_out: Recording, or several, with another excitation, to prove it on.  Without one the
             end of the recording is set aside, and the verdict is at most "unconfirmed".
@@ -57,7 +58,7 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         The diagnosis; `model` is the extended model, `to_dict()` the content of diagnosis.json.
 
     Raises:
-        BadModel: No coordinate is found, or nothing is free.
+        BadModel: No state reaches an output, or nothing is free.
         BadRecording: A channel is missing or unusable; there are too few samples; train and
             held-out are the same.
         BadSetting: alpha is no probability, settings are none, or workers is not positive.

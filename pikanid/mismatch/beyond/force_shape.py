@@ -78,7 +78,7 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
         site: Coordinate.
         candidates: That the rest is tested against.
     """
-    names = [site.q, site.v, *site.inputs]
+    names = [*site.moving, *site.inputs]
     splines = [_Spline() for _ in names]
     whitened, fit = base.whitened, base.minimum
     found = directions(whitened, fit.theta,
@@ -107,7 +107,7 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
             at, spline.matrix(at), coefficients[own], covariance[np.ix_(own, own)], seen.T @ seen,
             seen.T @ target, samples=len(target),
             free=at[:, None] if removed else np.empty((len(at), 0)), argument=name,
-            unit=f"{site.unit}/s^2")
+            unit=site.force_unit)
         lone = _explained((rest / size)[:, own], target)[0]
         edges.append(Edge(name, spline.grid, values, std,
                           float(gain / max(everything[0], 1e-300)),
@@ -115,7 +115,7 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
                           float(lone / max(everything[0], 1e-300)), curve))
     left = residual_tests(whitened, fit.theta, fit.r, np.hstack([fit.J, D]), candidates, site.rate)
     static: Literal[True] | None = True if left.p_value >= whitened.settings.refusal else None
-    return ForceShape(tuple(edges), f"{site.unit}/s^2", static)
+    return ForceShape(tuple(edges), site.force_unit, static)
 
 
 class _Spline:

@@ -40,7 +40,7 @@ def symbolic_candidates(shape: ForceShape, site: Site, entries: Sequence[Candida
         settings: How much an edge must explain, how it is named, and how many
             formulas are read of it.
     """
-    named = {(e.form, e.argument): e.key for e in entries if e.form and e.site.q == site.q}
+    named = {(e.form, e.argument): e.key for e in entries if e.form and e.site.v == site.v}
     best, asks = max((e.alone for e in shape.edges), default=0.0), settings.beyond
     edges = [e for e in shape.edges if e.alone > max(asks.read, asks.read_beside * best)]
     return [_candidate(site, edge, fit, constant, named)
@@ -62,7 +62,7 @@ def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entr
     parameters = tuple(_with_units(law, site, edge, fit))
     expression = law.expression
     if constant:
-        force = Parameter(site.name("force_0"), 0.0, f"{site.unit}/s^2")
+        force = Parameter(site.name("force_0"), 0.0, site.force_unit)
         parameters = (*parameters, force)
         expression = expression + symbol(force.name)
     text = str(expression)
@@ -76,7 +76,7 @@ def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entr
 def _with_units(law: Laws, site: Site, edge: Edge, fit: FormFit) -> Iterator[Parameter]:
     channels: list[State | Input] = [*site.model.states, *site.model.inputs]
     own = next(c.unit for c in channels if c.name == edge.argument)
-    powers = [(f"({site.unit})/s^2", 1, -(p or 0)) for p in fit.form.powers]
+    powers = [(site.force_unit, 1, -(p or 0)) for p in fit.form.powers]
     found = [units.product((unit, one), (own, power)) for unit, one, power in powers]
     found += ["" if k.power is None else units.product((own, k.power)) for k in fit.form.knobs]
     for parameter, unit in zip(law.parameters, found, strict=True):

@@ -50,7 +50,7 @@ def share_lacking(base: Hypothesis, argument: str, site: Site) -> float:
     """Share of what the nominal equation lacks that a free curve of a state leaves, both beside the
     free parameters; one where the output is not the coordinate itself, or too short.
     """
-    if site.output.expression != symbol(site.q):
+    if site.output.expression != symbol(site.moving[0]):
         return 1.0
     pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
     theta, problem = base.minimum.theta, base.whitened.problem
@@ -63,8 +63,9 @@ def share_lacking(base: Hypothesis, argument: str, site: Site) -> float:
         inside = (line.t >= samples.t[0]) & (line.t <= samples.t[-1])
         t, x, u = line.t[inside], line.x[inside].copy(), line.u[inside]
         q = make_smoothing_spline(samples.t, samples.y)
-        at = {n: line.model.state_names.index(n) for n in (site.q, site.v)}
-        x[:, at[site.q]], x[:, at[site.v]] = q(t), q.derivative()(t)
+        at = {n: line.model.state_names.index(n) for n in site.moving}
+        for order, name in enumerate(site.moving):
+            x[:, at[name]] = q.derivative(order)(t)
         field = VectorField(line.model)
         free = [line.model.parameter_names.index(n) for n in line.model.free_names]
         pieces.append((t, x[:, at[argument]], field.rhs_jacobians(t, x, u, line.p)[1][

@@ -144,7 +144,7 @@ def force_over_time(base: Hypothesis, site: Site) -> ForceOverTime | None:
     spread *= max(fitted.left, 1.0) ** 0.5
     return ForceOverTime(t, means @ force, np.linalg.norm(spread, axis=0),
                          critical_value(spread, 1 - settings.band), resolution, fitted.freedom,
-                         fitted.left, f"{site.unit}/s^2", (stop - start) / intervals, period,
+                         fitted.left, site.force_unit, (stop - start) / intervals, period,
                          settings.beyond.resolved)
 
 

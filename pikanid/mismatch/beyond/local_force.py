@@ -187,7 +187,7 @@ class LocalForce:
                 terms.append(f"{name}*({up}**{k}{down})")
                 # z is a number, but carries the unit of what it is made from
                 parameters.append(Parameter(name, 0.0, units.product(
-                    (f"({site.unit})/s^2", 1), (self.unit or "1", -k))))
+                    (site.force_unit, 1), (self.unit or "1", -k))))
         text = " + ".join(terms)
         return Candidate(("local",), "a force in a region", text, "dynamics", site,
                          tuple(parameters), lambda m: m.with_term(site.v, text), lambda view: (),

@@ -70,7 +70,7 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
         records, later: To fit, and held out.
         predict: What a hypothesis makes of the held-out recordings.
     """
-    edges = [e for e in shape.edges if e.argument in (site.q, site.v)]
+    edges = [e for e in shape.edges if e.argument in site.moving]
     if not edges:
         return None
     edge = max(edges, key=lambda e: e.alone)
@@ -131,7 +131,7 @@ class FreeCurve:
                                               for k in map(float, self.inner))]
         text = " + ".join(f"{n}*{p}" for n, p in zip(self.names, shapes, strict=True))
         # z is a number, but carries the unit of what it is made from
-        own = [units.product((f"({site.unit})/s^2", 1), (self.unit or "1", -power))
+        own = [units.product((site.force_unit, 1), (self.unit or "1", -power))
                for power in (0, 2, *(3 for _ in shapes[2:]))]
         return Candidate(("patch",), "a KAN edge", text, "dynamics", site,
                          tuple(Parameter(n, 0.0, unit)

@@ -110,7 +110,7 @@ def course(best: Hypothesis, nominal: Model, effect: Candidate) -> Course | None
             [values.get(name, m.values[name]) for name in m.parameter_names]))
         for m in (alone, nominal))
     force = np.abs(with_it - without)[:, nominal.state_names.index(effect.site.v)]
-    seen = {effect.site.q, effect.site.v, *effect.site.inputs}
+    seen = {*effect.site.moving, *effect.site.inputs}
     return Course(grid.T, force > ROUNDING * max(float(force.max(initial=0.0)), 1e-300), {
         name: column for name, column in zip(
             (*nominal.state_names, *nominal.input_names), (*x.T, *u.T), strict=True)

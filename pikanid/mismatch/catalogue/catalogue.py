@@ -72,12 +72,12 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
     """
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, which has one sensor
-    first = {s.output.name: s.q for s in reversed(sites)}
+    first = {s.output.name: s.v for s in reversed(sites)}
     for table in (ENTRIES, DECOYS):
         for site in sites:
             for make, families in table:
                 for candidate in make(site):
-                    if candidate.channel != "sensor" or first[site.output.name] == site.q:
+                    if candidate.channel != "sensor" or first[site.output.name] == site.v:
                         made.setdefault(candidate.key, replace(candidate, families=families))
     for entry in [*made.values()]:
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}

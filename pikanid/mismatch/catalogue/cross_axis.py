@@ -17,7 +17,7 @@ def cross_axis(site: Site) -> list[Candidate]:
     """
     found = []
     goal = site.inputs[0] if site.inputs else site.v
-    unit = site.model.input(goal).unit if site.inputs else f"{site.unit}/s^2"
+    unit = site.model.input(goal).unit if site.inputs else site.force_unit
     for c in site.extra:
         k = Parameter(site.name(f"kappa_{c}"), 0.0, unit)  # for each unit of the channel
 

@@ -80,7 +80,7 @@ def one_way_friction(site: Site) -> list[Candidate]:
     """Dry friction in one direction only."""
     found = []
     for sign in (1, -1):
-        c = Parameter(site.name("c_one"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+        c = Parameter(site.name("c_one"), 0.0, site.force_unit, (0.0, INF))
         law = term(
             site, "one_way_friction", "friction in one direction",
             f"-{c.name}*(sign({site.v}) + {sign})/2", c,
@@ -99,9 +99,9 @@ def _half_and_half(suffix: str, sign: int) -> Parts:
 
 def stribeck_friction(site: Site) -> list[Candidate]:
     """Dry friction that is greater at low speed."""
-    c = Parameter(site.name("c_s"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+    c = Parameter(site.name("c_s"), 0.0, site.force_unit, (0.0, INF))
     rise = Parameter(site.name("rise"), 0.5, "", (0.0, 20.0))
-    slow = Parameter(site.name("v_s"), 0.2, f"{site.unit}/s", (0.01, INF))
+    slow = Parameter(site.name("v_s"), 0.2, site.speed_unit, (0.01, INF))
     text = f"-{c.name}*(1 + {rise.name}*exp(-({site.v}/{slow.name})**2))*sign({site.v})"
 
     def directions(view: View) -> list[TangentDirection]:

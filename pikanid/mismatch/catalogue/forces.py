@@ -48,7 +48,7 @@ def static_bias(site: Site) -> list[Candidate]:
     """A constant force, or a tilt; a system that starts at rest starts where it holds balance, or
     where dry friction holds it.
     """
-    b = Parameter(site.name("bias"), 0.0, f"{site.unit}/s^2")
+    b = Parameter(site.name("bias"), 0.0, site.force_unit)
     k = site.stiffness
     # without a restoring force there is no balance to start in
     balanced = site.rest and site.rate > 0
@@ -96,6 +96,8 @@ def parameter_drift(site: Site) -> list[Candidate]:
 
 def wall_impact(site: Site) -> list[Candidate]:
     """A stiff stop on one side, or two at the same distance, that give way elastically."""
+    if not site.q:
+        return []
     # a contact shorter than from one sample to the next looks the same, however short
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
     walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.half_range, np.array([0.03, 0.1, 0.3])
@@ -135,7 +137,7 @@ def wall_force(site: Site, distance: str, stiffness: str, variant: str, power: i
 
 def disturbance(site: Site) -> list[Candidate]:
     """A force that acts once, for a short time."""
-    a = Parameter(site.name("peak"), 0.0, f"{site.unit}/s^2")
+    a = Parameter(site.name("peak"), 0.0, site.force_unit)
     first, last = site.span
     # what nothing follows that it set in motion cannot be told from a few bad samples
     last -= min(0.5 * np.pi / site.rate, 0.5 * (last - first)) if site.rate else 0.0
@@ -178,23 +180,23 @@ def _humps(t: np.ndarray, centres: np.ndarray, width: float) -> np.ndarray:
 
 def initial_state(site: Site) -> list[Candidate]:
     """A start other than assumed."""
-    starts = [site.model.state(n).initial for n in (site.q, site.v)]
+    starts = [site.model.state(n).initial for n in site.moving]
     free = {p.name for p in site.model.parameters if p.free}
     if any(s.name in free for e in starts for s in e.free_symbols):
         return []
-    q = Parameter(site.name(f"d_{site.q}"), 0.0, site.unit, scope="recording")
-    v = Parameter(site.name(f"d_{site.v}"), 0.0, f"{site.unit}/s", scope="recording")
+    sizes = {n: Parameter(site.name(f"d_{n}"), 0.0, unit, scope="recording") for n, unit in zip(
+        reversed(site.moving), (site.speed_unit, site.unit), strict=False)}
+    sizes = {n: sizes[n] for n in site.moving}
 
     def extend(model: Model) -> Model:
         return model.with_initial(**{
-            site.q: model.state(site.q).initial + symbol(q.name),
-            site.v: model.state(site.v).initial + symbol(v.name)})
+            n: model.state(n).initial + symbol(p.name) for n, p in sizes.items()})
 
     def directions(view: View) -> Sequence[TangentDirection]:
         still = np.zeros(len(view.t))
-        return [TangentDirection({q.name: 1.0}, force=still, initial={site.q: 1.0}),
-                TangentDirection({v.name: 1.0}, force=still, initial={site.v: 1.0})]
+        return [TangentDirection({p.name: 1.0}, force=still, initial={n: 1.0})
+                for n, p in sizes.items()]
 
     return [Candidate(("initial_state",), "another initial state",
-                      f"{site.q}(0) + {q.name}, {site.v}(0) + {v.name}", "dynamics", site, (q, v),
-                      extend, directions, per_recording=True)]
+                      ", ".join(f"{n}(0) + {p.name}" for n, p in sizes.items()), "dynamics", site,
+                      tuple(sizes.values()), extend, directions, per_recording=True)]

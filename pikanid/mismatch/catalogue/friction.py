@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pikanid.formula import units
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import (
     Candidate,
@@ -37,13 +38,13 @@ def coulomb_friction(site: Site) -> list[Candidate]:
     -c tanh(v/w), rounded over speeds of w (S. Andersson, A. Söderberg and S. Björklund, Tribol.
     Int. 40, 2007).
     """
-    c = Parameter(site.name("c"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+    c = Parameter(site.name("c"), 0.0, site.force_unit, (0.0, INF))
     law = term(site, "coulomb_friction", "Coulomb friction", f"-{c.name}*sign({site.v})", c,
                lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING, twin="coulomb")
     sharp = replace(law, static=True, resistance=np.ones_like, exponent=0.0, form="sign",
                     argument=site.v, powers=Powers(0, 0))
     usual = site.half_range * (site.rate or 1.0)
-    width = Parameter(site.name("w_c"), max(ROUNDED * usual, 1e-6), f"{site.unit}/s",
+    width = Parameter(site.name("w_c"), max(ROUNDED * usual, 1e-6), site.speed_unit,
                       (max(SHARP * usual, 1e-9), INF))
     text = f"-{c.name}*tanh({site.v}/{width.name})"
     rounded = Candidate(
@@ -55,7 +56,9 @@ def coulomb_friction(site: Site) -> list[Candidate]:
 
 def quadratic_drag(site: Site) -> list[Candidate]:
     """Drag that grows with the square of the speed."""
-    q = Parameter(site.name("q2"), 0.0, f"1/({site.unit})", (0.0, INF))
+    unit = f"1/({site.unit})" if site.q else units.product((site.force_unit, 1),
+                                                           (site.speed_unit, -2))
+    q = Parameter(site.name("q2"), 0.0, unit, (0.0, INF))
     law = term(site, "quadratic_drag", "quadratic drag", f"-{q.name}*abs({site.v})*{site.v}", q,
                lambda w: -np.abs(w.x[site.v]) * w.x[site.v], one_sided=True)
     return [replace(law, static=True, resistance=np.square, exponent=2.0, form="signed square",
@@ -64,7 +67,7 @@ def quadratic_drag(site: Site) -> list[Candidate]:
 
 def power_drag(site: Site) -> list[Candidate]:
     """Drag with an exponent of its own, other than 0, 1 and 2."""
-    c = Parameter(site.name("c_n"), 0.0, f"({site.unit})/s^2", (0.0, INF))
+    c = Parameter(site.name("c_n"), 0.0, site.force_unit, (0.0, INF))
     n = Parameter(site.name("n"), 1.5, "", (0.2, 4.0))
     text = f"-{c.name}*signed_power({site.v}, {n.name})"
 
@@ -98,7 +101,9 @@ def amplitude_damping(site: Site) -> list[Candidate]:
 
 def hysteresis(site: Site) -> list[Candidate]:
     """A force with memory: Bouc-Wen."""
-    b = Parameter(site.name("b_z"), 0.0, f"{site.unit}/s^2", (0.0, INF))
+    if not site.q:
+        return []
+    b = Parameter(site.name("b_z"), 0.0, site.force_unit, (0.0, INF))
     # a loop narrower than that is dry friction, and as hard to simulate as a wall
     least = max(0.01 * site.half_range, 1e-4)
     d = Parameter(site.name("z_yield"), max(0.01, least), site.unit, (least, INF))

@@ -128,7 +128,7 @@ def _fading(layer: Candidate) -> Candidate:
     wake = site.name("wake")
 
     def extend(model: Model) -> Model:
-        state = State(wake, unit=f"{site.unit}/s")
+        state = State(wake, unit=site.speed_unit)
         model = model.with_state(state, f"({site.v} - {wake})/{tau.name}")
         return model.with_term(site.v, f"-{kappa.name}*({site.v} - {wake})")
 

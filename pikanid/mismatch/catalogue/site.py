@@ -1,4 +1,4 @@
-"""Where in a model physics can be missing: coordinates, inputs and outputs, from its formulas."""
+"""Where in a model physics can be missing: equations, inputs and outputs, from its formulas."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid import errors
+from pikanid.formula import units
 from pikanid.formula.expressions import symbol
 from pikanid.model import Model
 from pikanid.model.parts import Output
@@ -16,13 +17,14 @@ from pikanid.recording import Recording
 
 @dataclass(frozen=True)
 class Site:
-    """A second-order coordinate q'' = a(q, q', u; p) of a model and what surrounds it.
+    """The equation v' = a(q, v, u; p) of a state in a model and what surrounds it.
 
     Attributes:
         model: The nominal model, its inputs held as recorded.
-        q, v: Names of the coordinate and of its rate.
-        output: In which q is seen.
-        inputs: Recorded inputs that act on q''.
+        q, v: Names of a coordinate and of its rate; of a state that is no other one's rate, an
+            empty text and the state.
+        output: In which q, or the state, is seen.
+        inputs: Recorded inputs that act on v'.
         extra: Recorded channels that the model does not use.
         rate: Natural frequency at the guesses [rad/s]; 0 without a restoring force.
         rest: Whether the model starts in equilibrium.
@@ -47,23 +49,44 @@ class Site:
 
     @property
     def acceleration(self) -> sp.Expr:
-        """The right-hand side of q''."""
+        """The right-hand side of v'."""
         return self.model.equations[self.v]
 
     @property
     def unit(self) -> str:
-        """Of the coordinate."""
+        """Of the coordinate, or of what a state would be the rate of."""
+        if not self.q:
+            return units.product((self.speed_unit, 1), ("s", 1))
         return self.model.state(self.q).unit or "1"
 
     @property
+    def speed_unit(self) -> str:
+        """Of the rate, or the state."""
+        return f"{self.unit}/s" if self.q else self.model.state(self.v).unit or "1"
+
+    @property
+    def force_unit(self) -> str:
+        """Of what is added to v'."""
+        return f"{self.unit}/s^2" if self.q else units.product((self.speed_unit, 1), ("s", -1))
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Names of coordinate and rate, or of the state alone."""
+        return (self.q, self.v) if self.q else (self.v,)
+
+    @property
     def free_in_force(self) -> tuple[str, ...]:
-        """Estimated parameters that q'' depends on."""
+        """Estimated parameters that v' depends on."""
         used = {s.name for s in self.acceleration.free_symbols}
         return tuple(p.name for p in self.model.parameters if p.free and p.name in used)
 
     @property
     def stiffness(self) -> sp.Expr:
-        """-∂a/∂q in equilibrium without inputs: what a constant force is held by."""
+        """-∂a/∂q in equilibrium without inputs: what a constant force is held by; 0 where there is
+        no coordinate.
+        """
+        if not self.q:
+            return sp.S.Zero
         return -_at_rest(self.model, self.acceleration.diff(symbol(self.q)))
 
     def name(self, wanted: str) -> str:
@@ -75,10 +98,11 @@ class Site:
 
 
 def sites(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
-    """The coordinates that an output shows, one site each.
+    """The coordinates that an output shows, one site each; without any, the equations of all states
+    that reach an output.
 
     Raises:
-        BadModel: If no state is the rate of another one, or none of these is seen.
+        BadModel: If no state reaches an output.
     """
     pairs = [(s.name, e.name) for s in model.states
              if (e := model.equations[s.name]).is_Symbol and e.name in model.state_names
@@ -86,10 +110,33 @@ def sites(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
     seen = [(q, v, o) for q, v in pairs for o in model.outputs if o.expression.has(symbol(q))]
     chosen = {q: (q, v, o) for q, v, o in reversed(seen)}
     if not chosen:
-        raise errors.BadModel(errors.no_coordinate(model.name))
+        return _of_first_order(model, recordings)
     ordered = [chosen[q] for q, _ in pairs if q in chosen]
     return tuple(_site(model, recordings, q, v, o, f"_{q}" if len(ordered) > 1 else "")
                  for q, v, o in ordered)
+
+
+def _of_first_order(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
+    """One site for each state, in the output that it reaches through the fewest others."""
+    found = [(s.name, o) for s in model.states if (o := _reached(model, s.name)) is not None]
+    if not found:
+        raise errors.BadModel(errors.nothing_seen(model.name))
+    # what is seen itself comes first
+    found.sort(key=lambda pair: not pair[1].expression.has(symbol(pair[0])))
+    return tuple(_site(model, recordings, "", v, o, f"_{v}" if len(found) > 1 else "")
+                 for v, o in found)
+
+
+def _reached(model: Model, state: str) -> Output | None:
+    """The output that a state acts on, directly or through the equations of the fewest others."""
+    reached = {state}
+    for _ in model.states:
+        for o in model.outputs:
+            if any(o.expression.has(symbol(n)) for n in reached):
+                return o
+        reached |= {s.name for s in model.states
+                    if any(model.equations[s.name].has(symbol(n)) for n in reached)}
+    return None
 
 
 def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, output: Output,
@@ -102,7 +149,7 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
     extra = tuple(n for n in first.names
                   if n not in used and all(n in r and _moves(r, n) for r in recordings))
     at = {symbol(n): value for n, value in model.values.items()}
-    slope = _at_rest(model, a.diff(symbol(q))).subs(at)
+    slope = _at_rest(model, a.diff(symbol(q))).subs(at) if q else sp.S.Zero
     k = -float(slope) if slope.is_number else 0.0
     force = _at_rest(model, a)
     starts = [s.initial for s in model.states if s.name in (q, v)]

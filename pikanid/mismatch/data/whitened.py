@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -182,8 +183,8 @@ class Whitened:
         return float(len(self.problem.model.states) * sum(steps))
 
     def residual(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run, or no
-        steps were found that could.
+        """Whitened residual (rows,) and Jacobian (rows, n_free); None where it cannot be run, no
+        steps were found that could, or squares of either overflow.
         """
         if not self.steps:
             return None
@@ -196,7 +197,9 @@ class Whitened:
             J[:, self.columns[r][1]] = response.sensitivity
             parts.append(self.whiten(r, response.y - self.measured(r)))
             jacobians.append(self.whiten(r, J))
-        return np.concatenate(parts), np.concatenate(jacobians)
+        rows, jacobian = np.concatenate(parts), np.concatenate(jacobians)
+        finite = all(math.isfinite(np.vdot(a, a)) for a in (rows, jacobian))
+        return (rows, jacobian) if finite else None
 
     def chi2(self, theta: np.ndarray) -> float:
         """Sum of squares of the whitened residual, without derivatives; infinite if it fails, or

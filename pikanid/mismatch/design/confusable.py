@@ -139,7 +139,7 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
         tell: Called with the effect that is being looked at.
 
     Raises:
-        BadModel: If the model has no second-order coordinate that is seen.
+        BadModel: If no state reaches an output.
         BadSetting: If σ is unknown for an output, an id in `only` is none of this model's, or
             `strength` does not tell effects apart (above 4 σ by default).
         SimulationFailed: If the nominal model cannot be simulated.

@@ -26,7 +26,7 @@ def own_beginning(problem: Problem, theta: np.ndarray, sites: tuple[Site, ...]) 
         for site in sites:
             h = model.output(site.output.name).expression.subs(
                 {TIME: experiment.t0, **{symbol(n): v for n, v in values.items()}})
-            slope = h.diff(symbol(site.q))
+            slope = h.diff(symbol(site.moving[0]))
             samples = [s for s in experiment.samples
                        if model.outputs[s.output].name == site.output.name]
             shift = h.subs({symbol(n): 0 for n in model.state_names})
@@ -35,8 +35,8 @@ def own_beginning(problem: Problem, theta: np.ndarray, sites: tuple[Site, ...]) 
             t, y = samples[0].t, samples[0].y
             count = max(5, int(np.searchsorted(t, t[0] + SHARE / site.rate)) if site.rate else 5)
             rate, level = np.polyfit(t[:count] - experiment.t0, y[:count], 2)[1:]
-            for name, value in ((site.q, (level - float(shift)) / float(slope)),
-                                (site.v, rate / float(slope))):
+            begun = ((level - float(shift)) / float(slope), rate / float(slope))
+            for name, value in zip(site.moving, begun, strict=False):
                 start = model.state(name).initial
                 if start.is_Symbol and start.name in inside:
                     found[inside[start.name]] = value

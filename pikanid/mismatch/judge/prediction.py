@@ -104,7 +104,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
 
     own = np.array([k not in shared for k in range(len(free))])
     if own.any():
-        begun = own_beginning(whitened.problem, guess, tuple({c.site.q: c.site
+        begun = own_beginning(whitened.problem, guess, tuple({c.site.v: c.site
                                                               for c in candidates}.values()))
         guess = min(guess, begun, key=whitened.chi2)
         first = minimise(whitened.residual, guess, np.where(own, whitened.problem.lower, guess),

@@ -117,7 +117,7 @@ def with_relatives(h: Hypothesis, effect: Candidate, candidates: Sequence[Candid
     """Every other member of an effect's families in that one's place, but forms next to members."""
     for other in candidates:
         if (other.fits and not other.next_to and other.key not in h.key
-                and other.site.q == effect.site.q and set(other.families) & set(effect.families)):
+                and other.site.v == effect.site.v and set(other.families) & set(effect.families)):
             yield (*_rest(h, effect), other), [h.point]
 
 

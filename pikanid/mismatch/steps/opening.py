@@ -43,7 +43,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         workers: Threads of the search.
 
     Raises:
-        BadModel: No coordinate is found.
+        BadModel: No state reaches an output.
         BadRecording: A channel is missing or unusable; there are too few samples; train and
             held-out are the same.
         SimulationFailed: The model cannot be simulated, or not as exactly as the noise asks.

@@ -94,7 +94,7 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
         members = [e for e in h.effects if p.family in families_of(e, h, rule.dry)]
         argument = _argument(p)
         rest = [e for e in h.effects if e not in members]
-        others = [s for s in (p.effect.site.q, p.effect.site.v) if s != argument]
+        others = [s for s in p.effect.site.moving if s != argument]
         # a curve holds a constant, too
         rivals = [] if p.family == "constant force" or not members else [
             _left_with_curve(case, h, rest, s, p.effect.site, noise) for s in others]

@@ -1,0 +1,114 @@
+"""Models without a coordinate: physics is looked for in the equations of their states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pikanid as pk
+from pikanid.errors import BadModel
+from pikanid.formula.expressions import TIME
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.model.parts import Output
+
+STILL = pk.Recording.from_arrays(np.arange(100) * 0.01, {"u": np.sin(np.arange(100))},
+                                 units={"u": "V"})
+
+
+def motor() -> pk.Model:
+    return pk.Model.from_dict({
+        "name": "motor", "states": {"w": {"unit": "rad/s", "initial": 0.0}},
+        "inputs": {"u": {"unit": "V", "hold": "zero"}},
+        "parameters": {"k": {"unit": "rad/(s^2*V)", "guess": 8.0, "bounds": [0.0, 100.0]},
+                       "b": {"unit": "1/s", "guess": 1.5, "bounds": [0.0, 50.0]}},
+        "equations": {"w": "k*u - b*w"},
+        "outputs": {"w": {"unit": "rad/s", "expression": "w"}}})
+
+
+def tanks() -> pk.Model:
+    return pk.Model.from_dict({
+        "name": "tanks", "inputs": {"u": {"unit": "V"}},
+        "states": {"x1": {"unit": "cm"}, "x2": {"unit": "cm"}},
+        "parameters": {"k": {"unit": "cm/(s*V)", "value": 1.0},
+                       "a": {"unit": "1/s", "guess": 0.1, "bounds": [0.001, 10.0]},
+                       "b": {"unit": "1/s", "guess": 0.1, "bounds": [0.001, 10.0]}},
+        "equations": {"x1": "k*u - a*x1", "x2": "a*x1 - b*x2"},
+        "outputs": {"y": {"unit": "cm", "expression": "x2"}}})
+
+
+def test_every_state_that_reaches_an_output_is_a_site() -> None:
+    [one] = sites(motor(), (STILL,))
+    assert (one.q, one.v, one.moving, one.inputs, one.suffix) == ("", "w", ("w",), ("u",), "")
+    assert (one.speed_unit, one.force_unit, one.rate) == ("rad/s", "rad/s^2", 0.0)
+    seen, behind = sites(tanks(), (STILL,))
+    assert (seen.v, seen.inputs, seen.suffix) == ("x2", (), "_x2")
+    assert (behind.v, behind.inputs, behind.output.name) == ("x1", ("u",), "y")
+
+
+def test_what_nothing_shows_is_refused() -> None:
+    clock = motor().replace(outputs=(Output("clock", TIME, "s"),))
+    with pytest.raises(BadModel, match="no state that reaches an output"):
+        sites(clock, (STILL,))
+
+
+def test_nothing_that_needs_a_position_is_looked_for() -> None:
+    found = {i for c in candidates(sites(motor(), (STILL,))) for i in c.ids}
+    assert not found & {"cubic_stiffness", "wall_impact", "second_mode", "boundary_layer",
+                        "amplitude_damping"}
+    assert {"coulomb_friction", "quadratic_drag", "input_dead_zone", "sensor_lag", "static_bias",
+            "parameter_drift", "initial_state"} <= found
+    # the sensor is one, whatever states lie before it
+    keys = [c.key for c in candidates(sites(tanks(), (STILL,)))]
+    assert sum(k.startswith("sensor_drift") for k in keys) == 1
+    assert {"quadratic_drag_x1", "quadratic_drag_x2"} <= set(keys)
+
+
+def driven(seed: int, rate: Callable[[float, float], float]) -> pk.Recording:
+    """A motor in steps of voltage: SciPy's DOP853 from one to the next."""
+    rng = np.random.default_rng(seed)
+    n, h = 1000, 0.01
+    u = np.repeat(rng.uniform(-6, 6, n // 40), 40)
+    w = np.zeros(n)
+    for k in range(n - 1):
+        w[k + 1] = solve_ivp(lambda t, x, push=u[k]: [rate(x[0], push)], (0, h), [w[k]], "DOP853",
+                             rtol=1e-8, atol=1e-10, max_step=h / 2).y[0, -1]
+    return pk.Recording.from_arrays(np.arange(n) * h, {"u": u, "w": w + rng.normal(0, 0.1, n)},
+                                    units={"u": "V", "w": "rad/s"})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rate", "ids"), [
+    (lambda w, u: 10 * u - 2 * w, None),
+    (lambda w, u: 10 * u - 2 * w - 8 * np.tanh(w / 0.01), "coulomb_friction"),
+    (lambda w, u: 10 * u - 2 * w - 0.15 * abs(w) * w, "quadratic_drag"),
+    (lambda w, u: 10 * np.sign(u) * max(abs(u) - 0.8, 0.0) - 2 * w, "input_dead_zone")])
+def test_a_motor_whose_speed_is_measured(rate: Callable[[float, float], float], ids: str | None
+                                         ) -> None:
+    answer = pk.diagnose(motor(), driven(1, rate), driven(2, rate))
+    assert answer.mismatch is (ids is not None)
+    if ids is not None:
+        assert answer.verdict == "named" and [
+            e.ids[0] for h in answer.hypotheses for e in h.effects] == [ids]
+
+
+@pytest.mark.slow
+def test_a_leak_of_the_tank_that_is_not_seen_is_found_there() -> None:
+    def run(seed: int) -> pk.Recording:
+        rng = np.random.default_rng(seed)
+        n, h = 1000, 1.0
+        u, x = np.repeat(rng.uniform(0.2, 1.0, n // 50), 50), np.zeros((n, 2))
+        for k in range(n - 1):
+            def rates(t: float, y: np.ndarray, push: float = u[k]) -> list[float]:
+                return [push - 0.1 * y[0] - 0.01 * y[0] ** 2, 0.1 * y[0] - 0.08 * y[1]]
+            x[k + 1] = solve_ivp(rates, (0, h), x[k], "DOP853", rtol=1e-8, atol=1e-10).y[:, -1]
+        return pk.Recording.from_arrays(
+            np.arange(n) * h, {"u": u, "y": x[:, 1] + rng.normal(0, 0.03, n)},
+            units={"u": "V", "y": "cm"})
+
+    answer = pk.diagnose(tanks(), run(1), run(2))
+    assert answer.verdict in ("named", "set") and answer.where.equation == "x1"
+    assert any("quadratic_drag" in e.ids for h in answer.hypotheses for e in h.effects)
