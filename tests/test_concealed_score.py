@@ -209,7 +209,12 @@ NAMED = ("dry friction", "coulomb_friction")
      (0, 0)),
     (beside("hysteresis"), surely(DRY), "part", "", (1, 0)),
     (case("coulomb_friction"), surely(DRY), "part", "", (0, 0)),
-    (case(), surely(DRY), "wrong", "nothing", (0, 0))])
+    (case(), surely(DRY), "wrong", "nothing", (0, 0)),
+    # liquid in a tank has a second planar mode, but no stiffness of its own kind
+    (case("potential_flow"), surely(("mode", "second_mode")), "part", "", (0, 0)),
+    (case("potential_flow"), surely(("mode", "")), "part", "", (0, 0)),
+    (case("potential_flow"), surely(("restoring force", "")), "wrong", "family", (0, 0)),
+    (case("potential_flow"), answer(["second_mode"]), "wrong", "other", (0, 0))])
 def test_what_is_said_beside_a_remainder_has_to_be_there(
         truth: dict, given: dict, outcome: str, reason: str, found: tuple[int, int]) -> None:
     score = judge(truth, given)

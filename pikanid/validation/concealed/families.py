@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 # Friction whose load grows with the deflection loses energy with the cube of the amplitude, as
-# quadratic drag does: it is of both kinds.
+# quadratic drag does: it is of both kinds.  Liquid has modes beside the one that a pendulum is.
 FAMILIES: dict[str, tuple[str, ...]] = {
     "dry friction": ("coulomb_friction", "stribeck_friction", "one_way_friction",
                      "hysteresis:bouc_wen", "smooth_friction", "stick_slip_friction",
@@ -25,7 +25,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "input curve": ("input_saturation", "soft_saturation", "input_dead_zone",
                     "hysteresis:backlash", "velocity_coupled_drive", "quadratic_input"),
     "sensor curve": ("sensor_saturation", "sensor_nonlinearity", "eccentric_encoder"),
-    "mode": ("second_mode", "internal_resonance"),
+    "mode": ("second_mode", "internal_resonance", "potential_flow"),
     "slow change": ("parameter_drift", "sensor_drift", "wobbling_length", "warming_damping"),
     "other axis": ("cross_axis",),
 }

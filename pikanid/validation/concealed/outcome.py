@@ -22,6 +22,8 @@ SYMBOLIC = "symbolic:"
 # Laws that an entry of the catalogue includes: dry friction, with or without a rise at low speed,
 # with a sharp or a rounded reversal.
 INCLUDED = {"stribeck_friction": "coulomb_friction", "smooth_friction": "coulomb_friction"}
+# Entries that a truth holds beside more: liquid has a second planar mode, which stays linear.
+HELD = {"potential_flow": "second_mode"}
 # What the formula of a law that is in no catalogue must hold; who writes another one is wrong.
 FORMULAS = {
     "stribeck_friction": r"exp\(.*sign\(\w+_dot\)",
@@ -161,7 +163,9 @@ def _of_parts(truth: Truth,
         return "silent", ""
     if not truth.effects:
         return "wrong", "nothing"
-    named, families = [*truth.effects, *truth.laws], [*truth.families, *truth.law_families]
+    named = [effect | {HELD[i] for i in effect & HELD.keys()}
+             for effect in (*truth.effects, *truth.laws)]
+    families = [*truth.families, *truth.law_families]
     for family, ids in present:
         hit = (any(ids & effect for effect in named) if ids
                else any(family in of_one for of_one in families))
