@@ -69,6 +69,17 @@ def test_what_is_missing_to_a_family_is_said(rivals: list[Any], why: str) -> Non
     assert isinstance(found, Doubtful) and why in found.why
 
 
+@pytest.mark.parametrize("left, sure", [(1.3, True), (3.0, False)])
+def test_a_family_needs_an_entry_that_explains_it(left: float, sure: bool) -> None:
+    """Of a law that nobody listed the family is a guess."""
+    fading = effect("fading_memory", "drag", known=False)
+    found = examined(weighed((fading,), 1.0, 0.995), weighed((DRAG,), left, 0.003),
+                     weighed((COULOMB,), 8.0, 0.002), family="drag")
+    assert isinstance(found, Present) is sure
+    if isinstance(found, Doubtful):
+        assert "only a law outside the catalogue" in found.why
+
+
 def test_nothing_is_sure_that_held_out_data_could_not_have_refuted() -> None:
     found = examined(weighed((COULOMB,), 1.0, 0.999, later=1.0),
                      weighed((DRAG,), 9.0, 0.001, later=1.2))
@@ -87,7 +98,8 @@ def test_without_a_name_the_family_is_said(lead: Any, rival: Any) -> None:
 
 def test_a_decoy_gives_no_name() -> None:
     stribeck = effect("stribeck_friction", "dry friction", known=False)
-    found = examined(weighed((stribeck,), 1.0, 0.999), weighed((DRAG,), 9.0, 0.001))
+    found = examined(weighed((stribeck,), 1.0, 0.998), weighed((COULOMB,), 1.5, 0.001),
+                     weighed((DRAG,), 9.0, 0.001))
     assert isinstance(found, Present) and found.names == ()
 
 
@@ -184,7 +196,7 @@ def test_friction_is_sure_beside_a_law_that_nobody_knows(diagnosed: pk.Diagnosis
 @pytest.mark.slow
 def test_standard_errors_count_the_remainder(diagnosed: pk.Diagnosis) -> None:
     found, left = diagnosed.present[0], diagnosed.remainder
-    assert left is not None and left.overdispersion > 3
+    assert left is not None and left.overdispersion > 2  # clearly more than noise leaves
     for name, value in found.parameters.items():
         assert found.std_with_remainder[name] == pytest.approx(
             value.std * np.sqrt(left.overdispersion))

@@ -256,6 +256,10 @@ def _examined(family: Family, lead: Weighed, found: Sequence[Weighed], rule: Par
     if smaller(kappa, rule.dominance):
         return Doubtful(family, effect, "without it the best explanation leaves "
                         f"{kappa:.2g} times as much, {rule.dominance:.2g} are asked")
+    if smaller(max((dominance(w, others, rule) for w in holders if any(
+            e.known and family in families_of(e, w.hypothesis, rule.dry)
+            for e in w.hypothesis.effects)), default=0.0), rule.dominance):
+        return Doubtful(family, effect, "only a law outside the catalogue explains so much of it")
     if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof):
         return Doubtful(family, effect, "the held-out recording could not have refuted it (it is "
                         f"worth {power:.2g} of chi-squared there, {proof:.2g} are asked)")
