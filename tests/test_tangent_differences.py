@@ -30,9 +30,8 @@ LIMITS = {
     "input_delay": 0.06, "sensor_delay": 0.06, "sensor_lag": 0.06, "actuator_lag": 0.06,
     # six states stand for the half-derivative over two decades
     "boundary_layer": 0.05,
-    # an input's jump inside a step counts for half of it: 7 % at the highest tone, of which plants
-    # of first order pass more
-    "velocity_coupled_drive": 0.055, "parameter_drift": 0.035, "input_hold": 0.03,
+    # an input's jump inside a step counts for half of it
+    "velocity_coupled_drive": 0.045, "parameter_drift": 0.035, "input_hold": 0.03,
     "rate_limited_input": 0.065,
     # where a motion turns round inside a step
     "stribeck_friction": 0.035, "one_way_friction": 0.03,
@@ -56,7 +55,7 @@ def motor() -> pk.Model:
     return pk.Model.from_dict({
         "name": "motor", "inputs": {"u": {"unit": "V"}}, "states": {"w": {"unit": "rad/s"}},
         "parameters": {"k": {"unit": "rad/(s^2*V)", "guess": 20.0},
-                       "b": {"unit": "1/s", "guess": 2.0, "bounds": [0.0, 100.0]}},
+                       "b": {"unit": "1/s", "guess": 8.0, "bounds": [0.0, 100.0]}},
         "equations": {"w": "k*u - b*w"}, "outputs": {"w": {"unit": "rad/s", "expression": "w"}}})
 
 
@@ -66,8 +65,8 @@ def cascade() -> pk.Model:
         "name": "cascade", "inputs": {"u": {"unit": "V"}},
         "states": {"x1": {"unit": "cm"}, "x2": {"unit": "cm"}},
         "parameters": {"k": {"unit": "cm/(s*V)", "guess": 3.0},
-                       "a": {"unit": "1/s", "guess": 2.0, "bounds": [0.01, 100.0]},
-                       "b": {"unit": "1/s", "guess": 1.0, "bounds": [0.01, 100.0]}},
+                       "a": {"unit": "1/s", "guess": 8.0, "bounds": [0.01, 100.0]},
+                       "b": {"unit": "1/s", "guess": 6.0, "bounds": [0.01, 100.0]}},
         "equations": {"x1": "k*u - a*x1", "x2": "a*x1 - b*x2"},
         "outputs": {"y": {"unit": "cm", "expression": "x2"}}})
 

@@ -184,9 +184,9 @@ def initial_state(site: Site) -> list[Candidate]:
     free = {p.name for p in site.model.parameters if p.free}
     if any(s.name in free for e in starts for s in e.free_symbols):
         return []
-    sizes = {n: Parameter(site.name(f"d_{n}"), 0.0, unit, scope="recording") for n, unit in zip(
-        reversed(site.moving), (site.speed_unit, site.unit), strict=False)}
-    sizes = {n: sizes[n] for n in site.moving}
+    own = dict(zip((site.q, site.v), (site.unit, site.speed_unit), strict=True))
+    sizes = {n: Parameter(site.name(f"d_{n}"), 0.0, own[n], scope="recording")
+             for n in site.moving}
 
     def extend(model: Model) -> Model:
         return model.with_initial(**{

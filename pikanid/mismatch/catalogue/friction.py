@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pikanid.formula import units
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import (
     Candidate,
@@ -56,9 +55,7 @@ def coulomb_friction(site: Site) -> list[Candidate]:
 
 def quadratic_drag(site: Site) -> list[Candidate]:
     """Drag that grows with the square of the speed."""
-    unit = f"1/({site.unit})" if site.q else units.product((site.force_unit, 1),
-                                                           (site.speed_unit, -2))
-    q = Parameter(site.name("q2"), 0.0, unit, (0.0, INF))
+    q = Parameter(site.name("q2"), 0.0, f"1/({site.unit})", (0.0, INF))
     law = term(site, "quadratic_drag", "quadratic drag", f"-{q.name}*abs({site.v})*{site.v}", q,
                lambda w: -np.abs(w.x[site.v]) * w.x[site.v], one_sided=True)
     return [replace(law, static=True, resistance=np.square, exponent=2.0, form="signed square",
