@@ -54,7 +54,7 @@ def linear_fit(y: np.ndarray, step: bool = False, rho: np.ndarray | None = None)
     """The fit of y [σ] in the linear problem."""
     J, smooth = design(step), smoothness(step)
     A, b = J.T @ J, J.T @ y
-    rho = smooth.choose(A, b, smooth.stiff)[0] if rho is None else rho
+    rho = smooth.choose(A, b, smooth.stiff) if rho is None else rho
     theta = np.linalg.solve(A + smooth.precision(rho), b)
     return PenalisedFit(theta, rho, A, b, np.ones(len(b), bool), 1.0, smooth, 0.0, True, ())
 
@@ -78,6 +78,33 @@ def test_evidence_is_the_marginal_likelihood_of_the_data(step: bool, pieces: int
     assert ours[0] - ours[1] == pytest.approx(dense(second) - dense(first), rel=1e-6, abs=1e-6)
 
 
+def test_what_all_structures_explain_alike_changes_no_evidence() -> None:
+    """A parameter that answers for 1e9 of χ² leaves two smoothnesses compared as they were."""
+    # precise data, of which edge and parameter share a part that only the prior divides
+    J, smooth = 1e3 * design(), smoothness()
+    noise = np.random.default_rng(0).normal(size=len(J))
+    large = 3e4 * J[:, 0] / np.linalg.norm(J[:, 0])
+    A, rhos = J.T @ J, (np.array([2.0]), np.array([6.0]))
+    differences = [smooth.cost(A, J.T @ y, rhos[0])[0] - smooth.cost(A, J.T @ y, rhos[1])[0]
+                   for y in (noise, noise + large)]
+    assert differences[0] == pytest.approx(differences[1], abs=1e-3)
+
+
+@pytest.mark.parametrize("y", ["noise", "bent"])
+def test_smoothness_is_integrated_out(y: str) -> None:
+    """Laplace's approximation against a quadrature over ρ with its prior N(5, 5)."""
+    J, smooth = design(), smoothness()
+    data = {"noise": np.random.default_rng(1).normal(size=len(J)),
+            "bent": np.sin(3 * visited().arguments[:, 0]) / SIGMA}[y]
+    A, b = J.T @ J, J.T @ data
+    rhos = np.linspace(-20.0, 30.0, 2001)
+    costs = np.array([smooth.cost(A, b, np.array([r]))[0] for r in rhos])
+    density = np.exp(costs.min() - costs) / (5.0 * np.sqrt(2.0 * np.pi))
+    wanted = np.log(np.sum(density) * (rhos[1] - rhos[0])) - costs.min()
+    assert smooth.evidence(A, b, smooth.choose(A, b, smooth.stiff)) == pytest.approx(
+        wanted, abs=0.5)
+
+
 def test_gradient_of_the_evidence() -> None:
     J, smooth = design(True), smoothness(True, 5)
     y = np.sin(3 * visited().arguments[:, 0]) / SIGMA
@@ -90,7 +117,7 @@ def test_gradient_of_the_evidence() -> None:
 def test_curvature_of_the_evidence() -> None:
     J, smooth = design(True), smoothness(True, 3)
     A, b = J.T @ J, J.T @ np.sin(3 * visited().arguments[:, 0]) / SIGMA
-    rho = smooth.choose(A, b, smooth.stiff)[0]
+    rho = smooth.choose(A, b, smooth.stiff)
     h = 0.05 * np.eye(len(rho))
 
     def cost(*moves: np.ndarray) -> float:
@@ -316,5 +343,5 @@ def test_smoothness_stays_within_its_limits() -> None:
     """However large, a curve without any smoothness asks for no more than the roughest."""
     J, smooth = design(), smoothness()
     c = 1e7 * np.random.default_rng(6).normal(size=plan().size)
-    rho, _ = smooth.choose(J.T @ J, J.T @ (J[:, 2:] @ c), smooth.stiff)
+    rho = smooth.choose(J.T @ J, J.T @ (J[:, 2:] @ c), smooth.stiff)
     assert rho == pytest.approx(ROUGHEST)

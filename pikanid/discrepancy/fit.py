@@ -75,7 +75,7 @@ def penalised_fit(shooting: Shooting, start: np.ndarray, smoothness: Smoothness,
         before, noise = noise, _noise(r, A, smoothness, rho, stated)
         A, b = A / noise**2, b / noise**2
         if not fixed:
-            rho = smoothness.choose(A, b, rho)[0]
+            rho = smoothness.choose(A, b, rho)
         H = A + smoothness.precision(rho)
         step = _bounded(H, b, theta, shooting)[0] - theta
         moved = float(np.sqrt(max(step @ H @ step, 0.0) / len(step)))
@@ -98,7 +98,7 @@ def penalised_fit(shooting: Shooting, start: np.ndarray, smoothness: Smoothness,
             break
     r, J = shooting.residual(theta), shooting.jacobian(theta)
     A, b = J.T @ J / noise**2, J.T @ (J @ theta - r) / noise**2
-    evidence = -smoothness.cost(A, b, rho)[0] - 0.5 * float(
+    evidence = smoothness.evidence(A, b, rho) - 0.5 * float(
         (J @ theta - r) @ (J @ theta - r)) / noise**2 - len(r) * np.log(noise)
     _, inside = _bounded(A + smoothness.precision(rho), b, theta, shooting)
     return PenalisedFit(theta, rho, A, b, inside, noise, smoothness, evidence, converged,

@@ -49,14 +49,14 @@ def relaxed_level(nominal: Estimate, problem: Problem, equation: str, plans: Seq
         theta = relaxed.theta[order]
         H = np.linalg.pinv(relaxed.naive_covariance[np.ix_(order, order)], hermitian=True)
         A = H - smoothness.precision(rho)
-        before, (rho, cost) = rho, smoothness.choose(A, H @ theta, rho)
+        before, rho = rho, smoothness.choose(A, H @ theta, rho)
         history.append({"lam": relaxed.lam, "change": float(np.max(np.abs(rho - before)))})
         if history[-1]["change"] < settings.settled_turns:
             break
     shooting = Shooting(bound)
     shooting.choose_steps(theta, "fine")
-    fit = PenalisedFit(theta, rho, A, H @ theta, np.ones(len(theta), bool), 1.0, smoothness, -cost,
-                       relaxed.converged, tuple(history))
+    fit = PenalisedFit(theta, rho, A, H @ theta, np.ones(len(theta), bool), 1.0, smoothness,
+                       smoothness.evidence(A, H @ theta, rho), relaxed.converged, tuple(history))
     return Level(bound, shooting, placed, fit, seen).visiting(problem, equation)
 
 

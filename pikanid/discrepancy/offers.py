@@ -45,7 +45,7 @@ def step_offers(level: Level, equation: str) -> list[Offer]:
             if not p.step and p.limits[0] < 0.0 < p.limits[1]]
     if not able:
         return []
-    base = fit.smoothness.choose(fit.information, fit.gain, fit.rho)[1]
+    base = _evidence(fit.smoothness, fit.information, fit.gain, fit.rho)
     answers = step_responses(level.shooting, fit.theta, equation, level.plans)
     J = level.shooting.jacobian(fit.theta)
     target = J @ fit.theta - level.shooting.residual(fit.theta)
@@ -64,7 +64,7 @@ def step_offers(level: Level, equation: str) -> list[Offer]:
 def variation_offers(level: Level) -> list[Offer]:
     """A smoothness that varies along the edge, for every edge where it does not yet."""
     fit, priors = level.fit, level.fit.smoothness.priors
-    base = fit.smoothness.choose(fit.information, fit.gain, fit.rho)[1]
+    base = _evidence(fit.smoothness, fit.information, fit.gain, fit.rho)
     found, pieces = [], fit.smoothness.settings.pieces
     for k, prior in enumerate(priors):
         if prior.pieces == 1:
@@ -83,7 +83,7 @@ def finer_gain(level: Level, equation: str, finer: Sequence[EdgePlan]) -> float:
     others = np.setdiff1d(np.arange(len(fit.theta)), np.concatenate(splines))
     coarse = spline_responses(level.shooting, fit.theta, equation, level.plans)
     target = coarse @ fit.theta[np.concatenate(splines)] + J[:, others] @ fit.theta[others] - r
-    costs = []
+    evidences = []
     for plans, answers in ((level.plans, coarse), (tuple(finer), spline_responses(
             level.shooting, fit.theta, equation, finer))):
         columns = np.hstack([J[:, others], answers]) / fit.noise
@@ -96,20 +96,26 @@ def finer_gain(level: Level, equation: str, finer: Sequence[EdgePlan]) -> float:
             priors.append(replace(prior, plan=plan, at=at))
         weak = np.append(fit.smoothness.weak[others], np.zeros(answers.shape[1]))
         smooth = replace(fit.smoothness, priors=tuple(priors), weak=weak)
-        costs.append(smooth.choose(columns.T @ columns, columns.T @ target / fit.noise, fit.rho)[1])
-    return costs[0] - costs[1]
+        evidences.append(_evidence(
+            smooth, columns.T @ columns, columns.T @ target / fit.noise, fit.rho))
+    return evidences[1] - evidences[0]
+
+
+def _evidence(smooth: Smoothness, A: np.ndarray, b: np.ndarray, start: np.ndarray) -> float:
+    return smooth.evidence(A, b, smooth.choose(A, b, start))
 
 
 def _offer(level: Level, base: float, plans: tuple[EdgePlan, ...], pieces: tuple[int, ...],
            smooth: Smoothness, A: np.ndarray, b: np.ndarray, inside: np.ndarray) -> Offer:
     fit = level.fit
-    rho, cost = smooth.choose(A, b, fit.smoothness.carry(fit.rho, smooth))
+    rho = smooth.choose(A, b, fit.smoothness.carry(fit.rho, smooth))
+    gain = smooth.evidence(A, b, rho) - base
     theta = np.append(fit.theta, np.zeros(len(b) - len(fit.theta)))
     held = b[inside] - A[np.ix_(inside, ~inside)] @ theta[~inside]
     theta[inside] = np.linalg.solve((A + smooth.precision(rho))[np.ix_(inside, inside)], held)
     wider = replace(fit, theta=theta, rho=rho, information=A, gain=b, inside=inside,
-                    smoothness=smooth, evidence=fit.evidence + base - cost)
-    return Offer(base - cost, plans, pieces, wider)
+                    smoothness=smooth, evidence=fit.evidence + gain)
+    return Offer(gain, plans, pieces, wider)
 
 
 def _with(items: tuple[T, ...], k: int, item: T) -> tuple[T, ...]:
