@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from pikanid.mismatch.diagnose import diagnose
     from pikanid.mismatch.report.diagnosis import Diagnosis
     from pikanid.mismatch.settings.settings import Settings
-    from pikanid.model import Input, Model, Output, Parameter, State, systems
+    from pikanid.model import Effect, Input, Model, Output, Parameter, State, systems
+    from pikanid.model.effects_file import read_effects
     from pikanid.recording import Channel, Recording, datasets, excitation
     from pikanid.simulation import simulate
     from pikanid.strategies import *  # noqa: F403 - all that are listed there
@@ -38,6 +39,8 @@ _HOMES = {
     "Input": "pikanid.model",
     "Parameter": "pikanid.model",
     "Output": "pikanid.model",
+    "Effect": "pikanid.model",
+    "read_effects": "pikanid.model.effects_file",
     "Recording": "pikanid.recording",
     "Channel": "pikanid.recording",
     "Estimate": "pikanid.estimate",
@@ -67,6 +70,8 @@ __all__ = [
     "Input",
     "Parameter",
     "Output",
+    "Effect",
+    "read_effects",
     "Recording",
     "Channel",
     "Estimate",

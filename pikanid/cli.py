@@ -26,6 +26,8 @@ from pikanid.commands.design import EXAMPLES as DESIGN
 from pikanid.commands.design import design
 from pikanid.commands.diagnose import EXAMPLES as DIAGNOSE
 from pikanid.commands.diagnose import diagnose
+from pikanid.commands.effects import EXAMPLES as EFFECTS
+from pikanid.commands.effects import effects
 from pikanid.commands.equivalence import EXAMPLES as EQUIVALENCE
 from pikanid.commands.equivalence import equivalence
 from pikanid.commands.extract import EXAMPLES as EXTRACT
@@ -61,6 +63,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
 app.command(epilog=IDENTIFY)(identify)
 app.command(epilog=DIAGNOSE)(diagnose)
+app.command(epilog=EFFECTS)(effects)
 app.command(epilog=CONFUSABLE)(confusable)
 app.command(epilog=DESIGN)(design)
 app.command(epilog=SIMULATE)(simulate)

@@ -32,6 +32,14 @@ FULL: dict[str, Any] = {
                       "offset": 0.0, "drift": "k", "function": "y + 1", "clip": [-1.0, "c"],
                       "delay": "k/10"}},
     "splines": {"edge": {"degree": 1, "knots": [0.0, 0.0, 1.0, 2.0, 2.0]}},
+    "effects": {"store": {
+        "name": "a hidden store", "family": "mode", "twins": ["second_mode"],
+        "parameters": {"e": {"unit": "1/s^2", "guess": 0.1, "bounds": [0.0, 9.0],
+                             "scope": "recording", "description": "exchange"}, "a": {"guess": 1.0}},
+        "null": {"e": 0.0}, "add": {"v": "e*(z - x)"}, "replace": {"x": "v", "c": "c + e"},
+        "states": {"z": {"unit": "m", "initial": "k", "equation": "x - z"}},
+        "inputs": {"u": {"gain": "1 + e"}}, "outputs": {"y": {"clip": [-1.0, "a"]}},
+        "initial": {"v": "k + e"}}},
 }
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from pikanid.commands.options import (
+    Catalogues,
     Duration,
     Excitation,
     Json,
@@ -32,6 +33,7 @@ def confusable(
     excitation: Excitation = "two_pulse",
     sigma: Sigma = [],  # noqa: B006
     set_: Values = [],  # noqa: B006
+    catalogue: Catalogues = [],  # noqa: B006
     duration: Duration = 5.0,
     rate: Rate = 100.0,
     strength: Annotated[float, typer.Option(
@@ -42,12 +44,12 @@ def confusable(
     quiet: Quiet = False,
 ) -> int:
     """Say which effects an experiment could detect, from which size, and which it confuses."""
-    check_outputs({"--json": (json_, [".json"])}, [model, excitation])
+    check_outputs({"--json": (json_, [".json"])}, [model, excitation, *catalogue])
     from pikanid.mismatch.design.confusable import confusable as run
     from pikanid.model import systems
     from pikanid.reporting.console import console, working
 
-    chosen = adjusted(systems.find(model), set_)
+    chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
     drive = excited(chosen, excitation, duration, rate, [])
     with working("looking", 28, quiet) as step:
         found = run(chosen, drive, sigmas(chosen, sigma) or None, strength=strength,

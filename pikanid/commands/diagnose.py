@@ -9,6 +9,7 @@ import typer
 
 from pikanid.commands.identify import prepared
 from pikanid.commands.options import (
+    Catalogues,
     Columns,
     Json,
     ModelName,
@@ -35,6 +36,8 @@ EXAMPLES = """Examples:
 
   pikanid diagnose run1.csv --model pendulum --quiet-until 2s
 
+  pikanid diagnose run1.csv --held-out run2.csv --model tanks.toml --catalogue hydraulics.toml
+
 Exit codes: 0 diagnosed, whatever was found; 2 bad input."""
 
 
@@ -58,6 +61,7 @@ def diagnose(
     alpha: Annotated[float | None, typer.Option(
         help="rate of false alarms, 0.01 by default", show_default=False)] = None,
     set_: Values = [],  # noqa: B006
+    catalogue: Catalogues = [],  # noqa: B006
     column: Columns = [],  # noqa: B006
     unit: Units = [],  # noqa: B006
     decimate: Stride = 1,
@@ -69,7 +73,7 @@ def diagnose(
     """Find out which physics a model leaves out, and prove it on another recording."""
     check_outputs({"--json": (json_, [".json"]),
                    "--report": (report, [".html"])}, 
-                  [*train, *held_out, model, *([settings] if settings else [])])
+                  [*train, *held_out, model, *catalogue, *([settings] if settings else [])])
     from pikanid.mismatch.diagnose import diagnose as run
     from pikanid.mismatch.settings.settings import Settings
     from pikanid.model import systems
@@ -77,7 +81,7 @@ def diagnose(
 
     taken = Settings() if settings is None else Settings.read(settings)
     taken = taken if alpha is None else taken.with_values({"alpha": alpha})
-    chosen = adjusted(systems.find(model), set_)
+    chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
     columns, units = assignments("--column", column, "theta=angle"), assignments(
         "--unit", unit, "theta=deg")
 

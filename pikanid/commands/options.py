@@ -24,6 +24,9 @@ Sigma = Annotated[list[str], typer.Option(
 Values = Annotated[list[str], typer.Option(
     "--set", metavar="NAME=VALUE", show_default=False,
     help="guess of a free parameter, or value of a fixed one")]
+Catalogues = Annotated[list[str], typer.Option(
+    "--catalogue", metavar="FILE.toml", show_default=False,
+    help="effects that the model may lack, beside those of pikanid and of the model file")]
 Columns = Annotated[list[str], typer.Option(
     "--column", metavar="NAME=COLUMN", show_default=False,
     help="column of the file that holds a signal; t=COLUMN for time")]
@@ -90,8 +93,9 @@ def by_output(model: Model, texts: Sequence[str]) -> dict[str, str]:
 
 
 def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),
-             free: Sequence[str] = ()) -> Model:
-    """The model with values set, parameters fixed or freed, and initial states freed.
+             free: Sequence[str] = (), catalogue: Sequence[str] = ()) -> Model:
+    """The model with values set, parameters fixed or freed, initial states freed, and the effects
+    of the files in `catalogue` listed as what it may lack.
 
     Raises:
         BadModel: If the model has no such parameter or state, or a value leaves its bounds.
@@ -101,6 +105,8 @@ def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),
     >>> adjusted(sloshing(), ["l_theta=50mm"], fix=["d_theta=0.1"], free=["theta"]).free_names
     ('l_theta', 'theta_0')
     """
+    from pikanid.model.effects_file import read_effects
+
     for name in free:
         if name in model.state_names:
             model = model.with_initial(**{name: "free"})
@@ -118,6 +124,8 @@ def adjusted(model: Model, set_: Sequence[str], fix: Sequence[str] = (),
         p = model.parameter(name)
         number = quantity(value, p.unit, f"--fix {name}") if value else p.value
         model = model.fix(**{name: number})
+    for path in catalogue:
+        model = model.with_candidates(*read_effects(path))
     values = assignments("--set", set_, "l_theta=0.05")
     return model.with_values({
         name: quantity(value, model.parameter(name).unit, f"--set {name}")

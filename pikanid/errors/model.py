@@ -64,6 +64,24 @@ def model_file_missing(path: str, where: str, wanted: str) -> str:
     return f"'{path}': {where} lacks {wanted}."
 
 
+def effect_twice(key: str) -> str:
+    return f"The effect '{key}' is there already: give it another id."
+
+
+def no_effects(model: str) -> str:
+    return (f"'{model}' lists no effects: write them under [effects] in its file, or name a file "
+            "of effects with --catalogue.")
+
+
+def effect_without_size(where: str, parameters: Sequence[str]) -> str:
+    return (f"{where}: 'null' must name one of its parameters ({listed(parameters)}) and the value "
+            "at which the effect is not there, as null = { k = 0.0 }.")
+
+
+def effect_changes_nothing(where: str, keys: Sequence[str]) -> str:
+    return f"{where} changes nothing: give at least one of {listed(keys)}."
+
+
 def unknown_system(name: str, known: Sequence[str], close: Sequence[str]) -> str:
     return (f"'{name}' is neither a ready-made model ({listed(known)}) nor a .toml file that "
             f"exists.{did_you_mean(close)}")

@@ -14,6 +14,7 @@ from pikanid import errors
 from pikanid.formula.expressions import TIME, check_name
 from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
 from pikanid.formula.limits import MAX_NAME
+from pikanid.model.effect import Effect
 from pikanid.model.lookup import Lookup
 from pikanid.storage.entries import Entry, is_integer
 
@@ -57,6 +58,10 @@ def check_types(model: Lookup) -> None:
             sigma = entry(o.sigma, f"The sigma of output '{o.name}'")
             if sigma.number() <= 0:
                 raise sigma.fail("positive (or left out)")
+    for effect in model.effects:
+        if not isinstance(effect, Effect):
+            raise errors.BadModel(errors.not_of_kind(
+                "An effect of the model", type(effect).__name__, "a pikanid.Effect"))
     for s in model.splines:
         degree = entry(s.degree, f"The degree of spline '{s.name}'")
         if not is_integer(s.degree) or not 1 <= s.degree <= MAX_DEGREE:

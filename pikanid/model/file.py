@@ -1,8 +1,9 @@
 """The model file: TOML in, `Model` out, and back without loss.
 
-Sections: ``name``, ``[states]``, ``[inputs]``, ``[parameters]``, ``[equations]``, ``[outputs]``
-and, for models with spline edges, ``[splines]``.  Inputs and outputs also take the keys of
-`pikanid.model.channel_maps` (``delay``, ``gain``, ``lag``, ...), each a formula of parameters.
+Sections: ``name``, ``[states]``, ``[inputs]``, ``[parameters]``, ``[equations]``, ``[outputs]``,
+for models with spline edges ``[splines]``, and ``[effects]`` (`pikanid.model.effects_file`).
+Inputs and outputs also take the keys of `pikanid.model.channel_maps` (``delay``, ``gain``, ``lag``,
+...), each a formula of parameters.
 """
 
 from __future__ import annotations
@@ -21,15 +22,18 @@ from pikanid.formula.expressions import check_name, parse, symbol, to_text
 from pikanid.formula.limits import Work
 from pikanid.model.channel_maps import INPUT_MAPS, OUTPUT_MAPS, map_input, map_output
 from pikanid.model.checks import MOST
+from pikanid.model.effects_file import from_table, to_table
 from pikanid.model.lookup import Lookup
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
+from pikanid.model.with_effect import with_candidates
 from pikanid.storage.entries import Entry
 from pikanid.storage.limits import toml_content
 from pikanid.storage.outputs import atomically
 
 M = TypeVar("M", bound=Operations)
-SECTIONS = ("name", "states", "inputs", "parameters", "equations", "outputs", "splines")
+SECTIONS = ("name", "states", "inputs", "parameters", "equations", "outputs", "splines",
+            "effects")
 KEYS = {
     "states": ("unit", "initial", "guess", "bounds", "scope", "description"),
     "inputs": ("unit", "hold", "default", *INPUT_MAPS),
@@ -110,7 +114,7 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
     for name, entry in tables["outputs"].items():
         if maps := _maps(entry, OUTPUT_MAPS, f"of output '{name}'", formula, (name,)):
             model = map_output(model, name, **maps)
-    return model
+    return with_candidates(model, *from_table(content.get("effects", {}), source))
 
 
 def to_dict(model: Lookup) -> dict[str, Any]:
@@ -138,6 +142,8 @@ def to_dict(model: Lookup) -> dict[str, Any]:
     if model.splines:
         content["splines"] = {s.name: {"degree": s.degree, "knots": [float(k) for k in s.knots]}
                               for s in model.splines}
+    if model.effects:
+        content["effects"] = to_table(model.effects)
     return content
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 
 from pikanid import errors
+from pikanid.model.effect import Effect
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
 
 
@@ -36,6 +37,7 @@ class Lookup:
     equations: Mapping[str, sp.Expr]
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...]
+    effects: tuple[Effect, ...]
 
     @property
     def symbols(self) -> frozenset[str]:

@@ -24,9 +24,11 @@ from pikanid.model import channel_maps
 from pikanid.model import file as model_file
 from pikanid.model import units as model_units
 from pikanid.model.checks import check_types, validate
+from pikanid.model.effect import Effect
 from pikanid.model.half_derivative import with_half_derivative
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Formula, Input, Output, Parameter, Spline, State
+from pikanid.model.with_effect import with_candidates, with_effect
 
 __all__ = ["Formula", "Input", "Model", "Output", "Parameter", "Spline", "State"]
 
@@ -46,6 +48,8 @@ class Model(Operations):
     >>> model.with_term("x", "-q*x**2", [Parameter("q", 0.1)]).equations["x"]
     -k*x - q*x**2
 
+    `effects` are kinds of physics that it may lack, for `pikanid.diagnose` to look for.
+
     Raises:
         BadModel: Names used twice, unknown symbols, guesses outside their bounds.
     """
@@ -57,6 +61,7 @@ class Model(Operations):
     equations: Mapping[str, sp.Expr]
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...] = ()
+    effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -74,6 +79,7 @@ class Model(Operations):
                                 delay=_constant(o.delay, f"The delay of '{o.name}'"))
             for o in self.outputs))
         put(self, "splines", tuple(self.splines))
+        put(self, "effects", tuple(self.effects))
         order = [s.name for s in self.states]
         for name in self.equations:
             if name not in order:
@@ -101,6 +107,14 @@ class Model(Operations):
     def map_output(self, name: str, parameters: Sequence[Parameter] = (), **maps: Any) -> Model:
         """Pass an output through gain, drift, clipping ...: see `pikanid.model.channel_maps`."""
         return channel_maps.map_output(self, name, parameters, **maps)
+
+    def with_effect(self, effect: Effect, nominal: Model | None = None) -> Model:
+        """Add an effect that is described as text: see `pikanid.model.with_effect`."""
+        return with_effect(self, effect, nominal)
+
+    def with_candidates(self, *effects: Effect) -> Model:
+        """List effects that the model may lack; `pikanid.diagnose` looks for them."""
+        return with_candidates(self, *effects)
 
     def with_half_derivative(self, of: Formula, name: str, band: tuple[float, float],
                              order: int = 10) -> tuple[Model, sp.Expr]:

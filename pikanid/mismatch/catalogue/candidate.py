@@ -120,6 +120,8 @@ class Candidate:
         instead_of: Ids of effects in whose place it is tried, once they are given.
         beside: Ids of effects, one of which has to be there: without them it is a twin of another
             entry.
+        probes: Values of its parameters but the size, at each of which its sign is found by
+            simulation; its `directions` then say no more than where a fit begins.
     """
 
     ids: tuple[str, ...]
@@ -153,6 +155,7 @@ class Candidate:
     instead_of: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     other: Callable[[Model], Model] | None = None
+    probes: tuple[Mapping[str, float], ...] = ()
 
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these."""

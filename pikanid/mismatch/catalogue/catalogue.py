@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
 from pikanid.mismatch.catalogue.neighbouring_forms import neighbouring_forms
+from pikanid.mismatch.catalogue.own_effects import own_effects, with_twins
 from pikanid.mismatch.catalogue.second_mode import second_mode
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Effect
 
 Make = Callable[[Site], list[Candidate]]
 # each with the families of physics that it belongs to
@@ -58,9 +60,12 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
 )
 
 
-def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
-    """Everything that can be missing in a model, entries first; equal keys once.  What is an
-    explanation of its own `beside` others only is there as well.
+def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[Candidate, ...]:
+    """Everything that can be missing in a model, users' own effects first, then entries; equal keys
+    once.  What is an explanation of its own `beside` others only is there as well.
+
+    Raises:
+        BadModel: An effect that does not suit the model or the catalogue.
 
     >>> from pikanid.recording import excitation
     >>> from pikanid.model import systems
@@ -81,4 +86,6 @@ def candidates(sites: Sequence[Site]) -> tuple[Candidate, ...]:
                         made.setdefault(candidate.key, replace(candidate, families=families))
     for entry in [*made.values()]:
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
-    return tuple(made.values())
+    effects = tuple(effects)
+    own = own_effects(effects, sites, made)
+    return tuple(with_twins([*own, *made.values()], effects))

@@ -154,8 +154,9 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
     separated = settings.separated
     if not separated < strength < inf:
         raise errors.BadSetting(errors.bad_value("strength", strength, f"above {separated:g}"))
-    nothing = recorded(a_model(model), one_recording(excitation), sigma, settings)
-    catalogue = tuple(c for c in catalogue_of(sites(model, nothing.recordings))
+    effects, model = a_model(model).effects, model.replace(effects=())
+    nothing = recorded(model, one_recording(excitation), sigma, settings)
+    catalogue = tuple(c for c in catalogue_of(sites(model, nothing.recordings), effects)
                       if c.known and c.fits and c.suits() and not c.refines)
     base = fitted(model, (), nothing, [{}], len(catalogue))
     if base is None:

@@ -16,6 +16,7 @@ import numpy as np
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.detect.simulated_signs import simulated_signs
 from pikanid.model import Model
 from pikanid.problem.evaluated import paths
 from pikanid.problem.held import HeldInput
@@ -56,6 +57,7 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
     known: dict[tuple[int, int], TangentDirection] = {}
     several = len(whitened.simulators) > 1
     chosen = [c for c in candidates if not (several and c.per_recording)]
+    simulated = {k: simulated_signs(whitened, theta, c) for k, c in enumerate(chosen) if c.probes}
     for r, response in enumerate(whitened.responses(theta, states=True)):
         line = Tangent(whitened, theta, r, response.states)
         with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
@@ -63,6 +65,9 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
                 c.directions(line.view))}
             blocks.append(line.columns([(chosen[k], s) for (k, _), s in listed.items()],
                                        partial(whitened.whiten, r)))
+        for column, (k, n) in enumerate(listed):
+            if k in simulated:
+                blocks[-1][:, column] = simulated[k][r][:, n]
         places.append(list(listed))
         # what they do along the motion is as large as the columns, and not needed again
         known = {**{at: replace(s, force=None, push={}, seen=None) for at, s in listed.items()},

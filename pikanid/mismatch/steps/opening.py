@@ -56,8 +56,9 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     train = beginnings(model, train, "the recording", notes, settings.budget)
     if later is None:
         train, later = set_aside(train, model, notes, settings.noise)
-    model = held_as_recorded(model, train)
-    sites(model, train)  # a model in which nothing can be looked for is refused before any fit
+    effects, model = model.effects, held_as_recorded(model.replace(effects=()), train)
+    # a model in which nothing can be looked for is refused before any fit, as a wrong effect is
+    catalogue_of(sites(model, train), effects)
     tell("nominal fit")
     together = oversampling(model, train, settings.budget)
     if together > 1:
@@ -88,7 +89,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         records = records.with_levels(again.levels)
         held = None if held is None else held.with_levels(again.levels)
     found = sites(nominal, records.recordings)
-    listed = catalogue_of(found)
+    listed = catalogue_of(found, effects)
     search = Search(nominal, records, listed, tell,
                     guess={n: model.parameter(n).value for n in model.free_names})
     base = search.base()

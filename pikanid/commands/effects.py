@@ -1,0 +1,72 @@
+"""`pikanid effects`: what a model may lack, in the words of its file, checked and shown."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import typer
+
+from pikanid import errors
+from pikanid.commands.options import (
+    Catalogues,
+    Duration,
+    Excitation,
+    ModelName,
+    Quiet,
+    Rate,
+    Values,
+    adjusted,
+)
+from pikanid.commands.outputs import check_outputs
+from pikanid.commands.simulate import excited
+
+EXAMPLES = """Examples:
+
+  pikanid effects --model tanks.toml
+
+  pikanid effects --model tanks.toml --catalogue hydraulics.toml --excitation run.csv --plot e.png
+
+Exit codes: 0 all is well; 2 bad input."""
+
+
+def effects(
+    model: ModelName,
+    catalogue: Catalogues = [],  # noqa: B006
+    excitation: Excitation = "two_pulse",
+    set_: Values = [],  # noqa: B006
+    duration: Duration = 5.0,
+    rate: Rate = 100.0,
+    plot: Annotated[str | None, typer.Option(
+        metavar="FILE", show_default=False,
+        help="draw what each effect does at its guess (.png, .svg, .pdf)")] = None,
+    quiet: Quiet = False,
+) -> int:
+    """Check the effects that a model file lists: symbols, units, derivatives; show what they do."""
+    check_outputs({"--plot": (plot, [".png", ".svg", ".pdf"])}, [model, excitation, *catalogue])
+    from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown
+    from pikanid.model import systems
+    from pikanid.reporting.console import console
+    from pikanid.reporting.tables import row, table
+
+    chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
+    if not chosen.effects:
+        raise errors.BadModel(errors.no_effects(chosen.name))
+    shown = effects_shown(chosen, excited(chosen, excitation, duration, rate, []))
+    if plot is not None:
+        from pikanid.estimate.plots import save_figure
+
+        save_figure(effects_figure(shown, chosen), plot)
+    if quiet:
+        return 0
+    made = table("effect", "what it adds", "shown at", "changes outputs by", "derivative")
+    for one in shown:
+        size = one.effect.size
+        largest = ", ".join(f"{o}: {v:.3g} {chosen.output(o).unit}".strip()
+                            for o, v in one.largest.items())
+        row(made, one.effect.key, one.effect.expression,
+            f"{size.name} = {one.size:.3g} {size.unit}".strip(), largest,
+            "reaches no output" if math.isnan(one.derivative) else
+            f"agrees to {100 * one.derivative:.1g} %")
+    console().print(made)
+    return 0

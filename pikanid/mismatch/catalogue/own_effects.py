@@ -1,0 +1,127 @@
+"""Catalogue: effects that users describe as text, in the names of their model."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import get_args
+
+from pikanid import errors
+from pikanid.mismatch.catalogue.candidate import Candidate, Channel, Family, TangentDirection, View
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Effect, Model
+from pikanid.model.parts import Parameter
+
+WITHIN = (0.1, 0.3, 0.5, 0.7, 0.9)  # numerical: shares of a range at which a parameter is tried
+AROUND = (1.0, 0.3, 3.0)  # numerical: times a positive guess without a range
+MOST_PROBES = 25  # limit: values at which one effect's sign is taken
+
+
+def own_effects(effects: Iterable[Effect], sites: Sequence[Site],
+                taken: Mapping[str, Candidate]) -> list[Candidate]:
+    """One candidate for each effect.
+
+    Args:
+        effects: In the names of the sites' model.
+        sites: Of the model.
+        taken: The catalogue's own candidates, by key.
+
+    Raises:
+        BadModel: An id that the catalogue has already, an unknown family or twin, or a symbol that
+            the model does not have.
+    """
+    made: dict[str, Candidate] = {}
+    effects = list(effects)
+    ids = {*(i for c in taken.values() for i in c.ids), *(e.key for e in effects)}
+    for effect in effects:
+        where = f"effect '{effect.key}'"
+        if effect.key in made or any(effect.key in c.ids for c in taken.values()):
+            raise errors.BadModel(errors.effect_twice(effect.key))
+        if effect.family and effect.family not in get_args(Family):
+            raise errors.BadModel(errors.bad_value(
+                f"The family of {where}", effect.family, f"one of {', '.join(get_args(Family))}"))
+        for twin in effect.twins:
+            if twin not in ids:
+                raise errors.BadModel(errors.not_in_catalogue(twin, sorted(ids)))
+        made[effect.key] = _candidate(effect, sites)
+    return [*made.values()]
+
+
+def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
+    site, nominal = _site(effect, sites), sites[0].model
+    nominal.with_effect(effect)  # which is refused before anything is fitted
+    size = effect.size
+    others = tuple(p for p in effect.parameters if p.name != size.name)
+    probes = tuple(_probes(others))
+    start = _start_of(effect, size)
+
+    def extend(model: Model) -> Model:
+        return model.with_effect(effect, nominal)
+
+    def directions(view: View) -> list[TangentDirection]:
+        return [TangentDirection({size.name: 1.0, **probe}, null=size.value, scales=True,
+                                 one_sided=size.bounds[0] >= size.value) for probe in probes]
+
+    return Candidate(
+        (effect.key,), effect.name, effect.expression, _channel(effect), site, (size, *others),
+        extend, directions, families=(effect.family,) if effect.family else (),  # type: ignore[arg-type]  # checked
+        probes=probes, levels=tuple({size.name: start, **probe} for probe in probes))
+
+
+def _site(effect: Effect, sites: Sequence[Site]) -> Site:
+    """Where it acts: the first equation that it names, else the first site."""
+    named = [*effect.add, *effect.replace, *effect.initial]
+    return next((s for n in named for s in sites if n in s.moving), sites[0])
+
+
+def _channel(effect: Effect) -> Channel:
+    if effect.add or effect.replace or effect.states or effect.initial:
+        return "dynamics"
+    return "input" if effect.inputs else "sensor"
+
+
+def _start_of(effect: Effect, size: Parameter) -> float:
+    """The guess of the size, where that is another value than at no effect."""
+    guess = next(p.value for p in effect.parameters if p.name == size.name)
+    if guess != size.value:
+        return guess
+    high = size.bounds[1]
+    if math.isfinite(high) and high > size.value:
+        return size.value + WITHIN[0] * (high - size.value)
+    return size.value + 1.0
+
+
+def _probes(parameters: Sequence[Parameter]) -> list[dict[str, float]]:
+    """Values of the parameters but the size at which the effect's sign is taken: about each guess,
+    all together where they are few, else one after the other.
+    """
+    tried = {p.name: _values(p) for p in parameters}
+    if math.prod(map(len, tried.values())) <= MOST_PROBES:
+        return [dict(zip(tried, values, strict=True))
+                for values in itertools.product(*tried.values())]
+    usual = {p.name: p.value for p in parameters}
+    found = [usual, *({**usual, n: v} for n, values in tried.items() for v in values[1:])]
+    return found[:MOST_PROBES]
+
+
+def _values(p: Parameter) -> list[float]:
+    low, high = p.bounds
+    if math.isfinite(low) and math.isfinite(high):
+        return [p.value, *(low + share * (high - low) for share in WITHIN)]
+    return [v for share in AROUND if low <= (v := share * p.value) <= high] or [p.value]
+
+
+def with_twins(candidates: Iterable[Candidate], effects: Iterable[Effect]) -> list[Candidate]:
+    """The candidates, with effects and all that these name as twins in one group."""
+    listed, groups = list(candidates), dict[str, str]()
+    for c in listed:
+        groups |= dict.fromkeys(c.ids, c.twin)
+    for effect in effects:
+        if effect.twins:
+            one = (effect.key, *effect.twins)
+            joined = {groups[i] for i in one if groups[i]}
+            name = min(joined, default=effect.key)
+            groups |= {i: name for i, group in groups.items() if i in one or group in joined}
+    return [replace(c, twin=groups[c.ids[0]]) for c in listed]

@@ -1,0 +1,74 @@
+"""An effect that a user describes as text: physics that a model may leave out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pikanid.model.parts import Parameter
+
+
+@dataclass(frozen=True)
+class NewState:
+    """A state that an effect brings along: unit, initial value and equation, as text."""
+
+    unit: str
+    initial: str
+    equation: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One kind of physics that a model may lack, in the model's own names.
+
+    Attributes:
+        key: Its id: short, as a name.
+        name: For people.
+        parameters: Added, all estimated; `value` is the guess around which they are looked for.
+        null: Name of the one parameter that measures the size, and its value at no effect.
+        add: Terms added to the right-hand sides of states.
+        replace: New right-hand sides of states; of other symbols, formulas put in their place.
+        states: Further states.
+        inputs: Maps of inputs (gain, saturation, delay, ...: `Model.map_input`).
+        outputs: Maps of outputs (`Model.map_output`).
+        initial: New initial values of states.
+        family: Of physics, as in the catalogue; may be empty.
+        twins: Ids of effects that no experiment of this kind tells from it.
+
+    >>> from pikanid.model import systems
+    >>> drag = Effect("rotor_drag", "drag of the rotor", (Parameter("c2", 0.1, "1/rad"),),
+    ...               ("c2", 0.0), add={"theta_dot": "-c2*theta_dot*abs(theta_dot)"})
+    >>> systems.sloshing().with_effect(drag).parameter_names[-1]
+    'c2'
+    """
+
+    key: str
+    name: str
+    parameters: tuple[Parameter, ...]
+    null: tuple[str, float]
+    add: Mapping[str, str] = field(default_factory=dict)
+    replace: Mapping[str, str] = field(default_factory=dict)
+    states: Mapping[str, NewState] = field(default_factory=dict)
+    inputs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    outputs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    initial: Mapping[str, str] = field(default_factory=dict)
+    family: str = ""
+    twins: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> Parameter:
+        """The parameter that measures the effect, its value that at no effect."""
+        found = next(p for p in self.parameters if p.name == self.null[0])
+        return dataclasses.replace(found, value=self.null[1])
+
+    @property
+    def expression(self) -> str:
+        """All that it changes, in one line."""
+        said = [f"{n}' += {t}" for n, t in self.add.items()]
+        said += [f"{n} -> {t}" for n, t in self.replace.items()]
+        said += [f"{n}' = {s.equation}" for n, s in self.states.items()]
+        said += [f"{what} of {n}: {t}" for maps in (self.inputs, self.outputs)
+                 for n, table in maps.items() for what, t in table.items()]
+        return ", ".join(said + [f"{n}(0) = {t}" for n, t in self.initial.items()])
