@@ -81,6 +81,19 @@ def test_long_sums_are_not_nested() -> None:
     assert read(" - ".join(["x"] * 300)) == -298 * X
 
 
+@pytest.mark.parametrize("text", [
+    "(x + 2*y)*(k + y) - (x + y)*(k + 1)", "(k + x + y)*(y - x**2) - (x + k)*(y + k)",
+    "-(x + y)/(k - x)*y", "-(x + y)*2", "-2*(x + y)", "(-x - y)*k", "(-x)**2", "-x**2*(x + y)",
+    "(-(x + y)*k)**3", "(-x + y)*k - x"])
+def test_the_minus_of_a_product_stays_where_it_is(text: str) -> None:
+    """SymPy would carry it into the first factor, were it read as a part of that."""
+    found = read(text)
+    assert read(to_text(found)) == found
+    values = {"x": 0.7, "y": -1.3, "k": 2.1}
+    assert float(found.subs({symbol(n): v for n, v in values.items()})) == pytest.approx(
+        eval(text, {}, values), rel=1e-12)
+
+
 def test_messages_say_what_and_where() -> None:
     with pytest.raises(errors.BadModel, match=r"'\^' .* write '\*\*'"):
         read("x^2")

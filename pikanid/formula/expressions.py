@@ -175,18 +175,22 @@ class _Reader:
             rest.append(rest[-1].left)
         self.afford(self.work.product(
             sum(isinstance(step.op, ast.Mult | ast.Div) for step in rest)))
-        terms = [self.read(rest[-1].left, depth + 1)]
+        first, sign = rest[-1].left, 1
+        # a minus before a product is not its first factor's: SymPy would carry it into a sum there
+        if isinstance(first, ast.UnaryOp) and isinstance(first.op, ast.USub) and isinstance(
+                rest[-1].op, ast.Mult | ast.Div):
+            first, sign = first.operand, -1
+        terms = [self.read(first, depth + 1)]
         for step in reversed(rest):
             right = self.read(step.right, depth + 1)
-            match step.op:
-                case ast.Add():
-                    terms.append(right)
-                case ast.Sub():
-                    terms.append(-right)
-                case _:
-                    terms = [self.binary(step, step.op, sp.Add(*terms), right)]
-                    self.finite(step, terms[0])
-        return self.real(node, sp.Add(*terms))
+            if not isinstance(step.op, ast.Mult | ast.Div):
+                terms[0], sign = sign * terms[0], 1
+            if isinstance(step.op, ast.Add | ast.Sub):
+                terms.append(right if isinstance(step.op, ast.Add) else -right)
+            else:
+                terms = [self.binary(step, step.op, sp.Add(*terms), right)]
+                self.finite(step, terms[0])
+        return self.real(node, sp.Add(sign * terms[0], *terms[1:]))
 
     def real(self, node: ast.AST, result: sp.Expr) -> sp.Expr:
         """The expression, if every part of it is real; a number must also be finite."""
@@ -230,8 +234,7 @@ class _Reader:
         raise self.fail(node)
 
     def number(self, value: int | float, node: ast.AST) -> sp.Expr:
-        found = to_number(value)
-        if found is None:
+        if (found := to_number(value)) is None:
             raise self.fail(node)
         return found
 
