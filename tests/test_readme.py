@@ -51,3 +51,8 @@ def test_every_strategy_and_every_format_is_named() -> None:
     assert re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) == list(STRATEGIES.values())
     reads = README.split("reads your own file:")[1].split("\n\n")[0]
     assert [f.title for f in FORMATS if f.title not in reads] == []
+
+
+def test_every_ready_made_model_is_named() -> None:
+    listed = README.split("Ready-made are ")[1].split(";")[0]
+    assert re.findall(r"`(\w+)`", listed) == list(pk.systems.SYSTEMS)
