@@ -228,7 +228,19 @@ def test_steps_after_an_escape_are_not_foretold() -> None:
     def refuse(steps: Steps, _: bool) -> Response:
         raise AssertionError(steps)
 
-    assert _foretold(refuse, 4e-7, Steps("explicit", 1e-3, 1.5e83)) is None
+    assert _foretold(refuse, 4e-7, Steps("explicit", 1e-3, 1.5e83), 0.0, 1.0) is None
+
+
+def test_steps_below_the_finest_are_not_foretold() -> None:
+    """One start of many that asks for far shorter steps would take most of a fit's time."""
+    def steps(finest: float) -> Steps | None:
+        return _foretold(lambda s, _: Response(np.array([1.0 + s.longest**4]), *[np.empty(0)] * 3),
+                         1e-13, Steps("explicit", 1e-2, 1e-8), finest, 1.0)
+
+    found = steps(0.0)
+    assert found is not None and 1e-4 < found.longest < 1e-3
+    assert steps(0.99 * found.longest) == found
+    assert steps(1.01 * found.longest) is None
 
 
 def test_trajectory_that_escapes_is_a_bad_step_not_a_crash(

@@ -199,7 +199,7 @@ class Simulator:
         grid = self.grid(p)
         unit = 1.0 if scale is None else scale
         if known is not None and tolerance:
-            foretold = _foretold(trial, tolerance, known, unit)
+            foretold = _foretold(trial, tolerance, known, finest, unit)
             if foretold is not None:
                 return foretold
         spacing, usual = grid.spacings
@@ -249,10 +249,10 @@ def _largest(y: np.ndarray, unit: np.ndarray | float) -> float:
     return float(np.abs(y / unit).max(initial=0.0))
 
 
-def _foretold(trial: Trial, tolerance: float, known: Steps, unit: np.ndarray | float = 1.0
-              ) -> Steps | None:
+def _foretold(trial: Trial, tolerance: float, known: Steps, finest: float,
+              unit: np.ndarray | float) -> Steps | None:
     """Steps for `tolerance` by the known order, checked, or the known ones where these do; None
-    where that does not hold.
+    where that does not hold, or asks for steps below `finest`.
     """
     if not known.error > 0:
         return None
@@ -262,7 +262,7 @@ def _foretold(trial: Trial, tolerance: float, known: Steps, unit: np.ndarray | f
         enough = rough.finished and fine.finished and error <= tolerance
         return Steps(known.method, known.longest, error) if enough else None
     ratio = min((tolerance / (4 * known.error)) ** 0.25, 0.5)
-    if ratio < 1.0 / FORETOLD:
+    if ratio < 1.0 / FORETOLD or known.longest * ratio < finest:
         return None
     finer = Steps(known.method, known.longest * ratio)
     rough, fine = trial(known, False), trial(finer, True)
