@@ -9,6 +9,7 @@ import pytest
 import pikanid as pk
 from pikanid import errors
 from pikanid.model import Model, Parameter, systems
+from pikanid.objective import shooting
 from pikanid.objective.settings import AdequacySettings
 from pikanid.recording import Recording, excitation
 from pikanid.uncertainty.settings import UncertaintySettings
@@ -249,3 +250,23 @@ def test_simulations_of_a_start_are_limited() -> None:
     free, few = (pk.NLS(starts=1, max_evaluations=n).fit(START, NOISY) for n in (100, 3))
     assert free.converged and free.history[0]["evaluations"] > 8
     assert not few.converged and few.history[0]["evaluations"] <= 2 * (3 + 3)
+
+
+def test_the_best_start_gets_the_steps_that_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limit that other starts keep to is not for it."""
+    model = systems.pendulum().with_values(theta_0=1.2)
+    swing = excitation.free_decay(8.0, channels=["u"])
+    recording = pk.simulate(model, swing, sigma=0.01, seed=0).without("u")
+    chosen: list[tuple[bool, np.ndarray]] = []
+    choose = shooting.Shooting.choose_steps
+
+    def noted(self: shooting.Shooting, theta: np.ndarray, accuracy: shooting.Accuracy) -> bool:
+        changed = choose(self, theta, accuracy)
+        chosen.append((not self.limits, theta))
+        return changed
+
+    monkeypatch.setattr(shooting.Shooting, "choose_steps", noted)
+    found = pk.NLS(starts=4).fit(model, recording)
+    free, theta = chosen[-1]
+    assert free and not all(other for other, _ in chosen)
+    np.testing.assert_array_equal(theta, found.theta)

@@ -73,12 +73,13 @@ class Shooting:
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
 
-    def hurry(self) -> None:
+    def hurry(self, on: bool = True) -> None:
         """From now on refuse steps much shorter than the present ones, and other methods.
 
         A far-off starting point can ask for steps a thousand times shorter than the optimum does.
+        Not `on`: from now on refuse none, as the best point may have whatever steps it needs.
         """
-        self.limits = list(self.steps)
+        self.limits = list(self.steps) if on else []
 
     def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
         """Simulate every recording at θ with sensitivities of its own parameters."""

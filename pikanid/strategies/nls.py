@@ -99,7 +99,8 @@ class NLS:
                 best = found
         if best is None:
             raise errors.SimulationFailed(errors.bad_start())
-        if best is not found:
+        if best is not found or len(history) > 1:
+            shooting.hurry(False)
             shooting.choose_steps(best.theta, "fine")
         settings: dict[str, Any] = {
             "starts": self.starts, "protocol": self.protocol, "tolerance": self.tolerance,
