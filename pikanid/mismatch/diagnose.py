@@ -105,8 +105,7 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
     if shape is not None and answer.verdict == "unnamed":
         tell("laws outside the catalogue")
         answer = with_laws_outside(case, answer, shape, site)
-        if answer.verdict == "unnamed" and case.later is not None:
-            mend = patch(case.base, case.model, shape, site, case.records, case.later,
-                         case.predicted)
     answer = with_sure_part(case, answer, site)
+    if shape is not None and answer.verdict == "unnamed" and case.later is not None:
+        mend = patch(case.base, case.model, shape, site, case.records, case.later, case.predicted)
     return replace(reported(case, detection, answer, site, shape), patch=mend)

@@ -13,8 +13,9 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 Channel = Literal["dynamics", "input", "sensor"]
-Family = Literal["dry friction", "drag", "restoring force", "constant force", "timing", "gain",
-                 "input curve", "sensor curve", "mode", "slow change", "other axis", "once"]
+FAMILIES = ("dry friction", "drag", "restoring force", "constant force", "timing", "gain",
+            "input curve", "sensor curve", "mode", "slow change", "other axis", "once")
+Family = str  # one of these, or a kind of its own that a user names
 Array = np.ndarray
 Resistance = Callable[..., Array]  # (speed (N,), each parameter but the size) -> (N,)
 Parts = Callable[[Sequence[float]], Sequence[Mapping[str, Sequence[float]]]]

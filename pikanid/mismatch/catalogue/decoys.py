@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Candidate, Parts, TangentDirection, View
 from pikanid.mismatch.catalogue.forces import BOTH, INF, term, wall_impact
 from pikanid.mismatch.catalogue.friction import STICKING, sense
@@ -144,13 +145,16 @@ def _with_term(v: str, text: str) -> Callable[[Model], Model]:
 
 
 def velocity_coupled_drive(site: Site) -> list[Candidate]:
-    """κ u v: the drive acts according to the speed."""
+    """κ u v: the drive acts according to the speed, or to the state."""
     found = []
     for u in site.inputs:
-        k = Parameter(site.name("k_uv"), 0.0, "s")
-        found.append(term(site, "velocity_coupled_drive", "a drive that depends on speed",
-                          f"{k.name}*{u}*{site.v}", k,
-                          _product(u, site.v), one_sided=False, known=False))
+        drive = site.model.input(u).unit
+        k = Parameter(site.name("k_uv"), 0.0, units.product(
+            (site.force_unit, 1), (drive, -1), (site.speed_unit, -1)) if drive else "")
+        found.append(term(
+            site, "velocity_coupled_drive",
+            f"a drive that depends on {'speed' if site.q else site.v}", f"{k.name}*{u}*{site.v}", k,
+            _product(u, site.v), one_sided=False, known=False))
     return found
 
 

@@ -6,10 +6,9 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import get_args
 
 from pikanid import errors
-from pikanid.mismatch.catalogue.candidate import Candidate, Channel, Family, TangentDirection, View
+from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Effect, Model
 from pikanid.model.parts import Parameter
@@ -36,12 +35,8 @@ def own_effects(effects: Iterable[Effect], sites: Sequence[Site],
     effects = list(effects)
     ids = {*(i for c in taken.values() for i in c.ids), *(e.key for e in effects)}
     for effect in effects:
-        where = f"effect '{effect.key}'"
         if effect.key in made or any(effect.key in c.ids for c in taken.values()):
             raise errors.BadModel(errors.effect_twice(effect.key))
-        if effect.family and effect.family not in get_args(Family):
-            raise errors.BadModel(errors.bad_value(
-                f"The family of {where}", effect.family, f"one of {', '.join(get_args(Family))}"))
         for twin in effect.twins:
             if twin not in ids:
                 raise errors.BadModel(errors.not_in_catalogue(twin, sorted(ids)))
@@ -66,14 +61,23 @@ def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
 
     return Candidate(
         (effect.key,), effect.name, effect.expression, _channel(effect), site, (size, *others),
-        extend, directions, families=(effect.family,) if effect.family else (),  # type: ignore[arg-type]  # checked
-        probes=probes, levels=tuple({size.name: start, **probe} for probe in probes))
+        extend, directions, families=(effect.family or effect.name,), probes=probes,
+        argument=_argument(effect, site, nominal),
+        levels=tuple({size.name: start, **probe} for probe in probes))
 
 
 def _site(effect: Effect, sites: Sequence[Site]) -> Site:
-    """Where it acts: the first equation that it names, else the first site."""
-    named = [*effect.add, *effect.replace, *effect.initial]
-    return next((s for n in named for s in sites if n in s.moving), sites[0])
+    """Where it acts: the first equation, input or output that it names, else the first site."""
+    named = [*effect.add, *effect.replace, *effect.initial, *effect.inputs, *effect.outputs]
+    return next((s for n in named for s in sites
+                 if n in (*s.moving, *s.inputs, s.output.name)), sites[0])
+
+
+def _argument(effect: Effect, site: Site, nominal: Model) -> str:
+    """The one state of the site that its own equation then depends on by it, if there is one."""
+    before, after = nominal.equations[site.v], nominal.with_effect(effect).equations[site.v]
+    used = {s.name for s in (after - before).free_symbols} & {*site.moving}
+    return used.pop() if len(used) == 1 else ""
 
 
 def _channel(effect: Effect) -> Channel:

@@ -178,8 +178,12 @@ def surely_there(explained: Explanations, scale: float, settings: Settings) -> P
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Without those that hold a formula, or what happens once, which swallows remainders."""
-    return [h for h in ranked if not h.symbolic
-            and not any("once" in e.families for e in h.effects)]
+    return [h for h in ranked if not h.symbolic and all(lasts(e) for e in h.effects)]
+
+
+def lasts(effect: Candidate) -> bool:
+    """Whether it is more than what happens once."""
+    return "once" not in effect.families
 
 
 def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:

@@ -63,7 +63,9 @@ class Present:
         """In words."""
         unsure = f"; its form is not sure, compared with {', '.join(self.compared)}" * bool(
             self.compared)
-        within = "" if self.ids else f" (here as {self.name}{unsure})"
+        here = "" if self.name == self.family else f"here as {self.name}"
+        said = (here + unsure).removeprefix("; ")
+        within = "" if self.ids or not said else f" ({said})"
         if self.dominance is None:
             return f"{self.title}{within}: no explanation does without it"
         return (f"{self.title}{within}: without it the best explanation leaves "

@@ -22,6 +22,7 @@ from pikanid.mismatch.judge.partial import (
     explanations,
     families_of,
     lasting,
+    lasts,
     left_over,
     surely_there,
 )
@@ -56,6 +57,11 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
                              case.ahead)
         return found, None if found is None else surely_there(found, search.scale(), settings)
 
+    # a search that what happens once has led leaves what lasts half explained
+    for _ in range(settings.budget.effects):
+        lead = lasting(search.ranked())[0]
+        if not search.further(lead, lasts) or lasting(search.ranked())[0] is lead:
+            break
     explained, part = weighed()
     for _ in range(settings.budget.rechecked):
         if not _compared(search, part.hypothesis if part else lasting(search.ranked())[0]):
@@ -117,7 +123,8 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
 def _argument(p: Present) -> str:
     """The state that a family's members depend on; empty where it is none, or several."""
     site = p.effect.site
-    return {"dry friction": site.v, "drag": site.v, "restoring force": site.q}.get(p.family, "")
+    states = {"dry friction": site.v, "drag": site.v, "restoring force": site.q}
+    return states.get(p.family, p.effect.argument)
 
 
 def _left_with_curve(case: Case, h: Hypothesis, effects: Sequence[Candidate], argument: str,
