@@ -70,7 +70,7 @@ def test_an_effect_is_added_and_no_longer_missing(tanks: Path) -> None:
     assert extended.effects == () and extended.parameter_names[-2:] == ("k_o", "h")
     difference = extended.equations["x1"] - model.equations["x1"]
     assert float(difference.subs({symbol("k_o"): 2, symbol("x1"): 10, symbol("h"): 9})) == -2
-    with pytest.raises(errors.BadModel, match="'overflow' is there already"):
+    with pytest.raises(errors.BadModel, match="'overflow'"):
         model.with_candidates(model.effects[0])
 
 
@@ -94,6 +94,16 @@ def test_replaced_symbols_act_everywhere(tanks: Path) -> None:
                                    "null": {"r": 0.0}, "replace": {"k1": "k1*(1 + r*t)"}}}, "test")
     found = model.with_effect(drift).equations
     assert symbol("r") in found["x1"].free_symbols & found["x2"].free_symbols
+
+
+def test_names_are_no_others(tanks: Path) -> None:
+    model = pk.Model.load(tanks)
+    loss = {"null": {"k_o": 0.0}, "parameters": {"k_o": {"guess": 1.0}}, "add": {"x1": "-k_o*x1"}}
+    with pytest.raises(errors.BadModel, match="'k_o', which effect 'overflow' has already"):
+        model.with_candidates(*from_table({"loss": loss}, "test"))
+    own = {"null": {"b": 0.0}, "parameters": {"b": {"guess": 1.0}}, "add": {"x1": "-b*x1"}}
+    with pytest.raises(errors.BadModel, match="'b', which the model has already"):
+        model.with_candidates(*from_table({"loss": own}, "test"))
 
 
 @pytest.mark.parametrize(("change", "said"), [
@@ -147,7 +157,7 @@ def test_command(tanks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     (tmp_path / "more.toml").write_text(OVERFLOW)
     assert read_effects(tmp_path / "more.toml") == pk.Model.load(tanks).effects
     assert main([*usual, "--catalogue", str(tmp_path / "more.toml")]) == 2
-    assert "there already" in capsys.readouterr().err
+    assert "has already" in capsys.readouterr().err
     (tmp_path / "more.toml").write_text(OVERFLOW.replace("h, 0)", "hh, 0)"))
     plain = tmp_path / "plain.toml"
     plain.write_text(TANKS)

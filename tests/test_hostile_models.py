@@ -39,7 +39,12 @@ FULL: dict[str, Any] = {
         "null": {"e": 0.0}, "add": {"v": "e*(z - x)"}, "replace": {"x": "v", "c": "c + e"},
         "states": {"z": {"unit": "m", "initial": "k", "equation": "x - z"}},
         "inputs": {"u": {"gain": "1 + e"}}, "outputs": {"y": {"clip": [-1.0, "a"]}},
-        "initial": {"v": "k + e"}}},
+        "initial": {"v": "k + e"}},
+        "leak": {
+            "name": "a leak of {x}", "for": {"x": "state"}, "family": "drag", "twins": [],
+            "parameters": {"l": {"unit": "1/s", "guess": "1/duration", "bounds": [0.0, "x_high"]}},
+            "null": {"l": 0.0}, "add": {"x": "-l*x"},
+            "states": {"w": {"unit": "{x}", "initial": "x_start", "equation": "x"}}}},
 }
 
 

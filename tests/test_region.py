@@ -15,6 +15,7 @@ from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.report.findings import Where
 from pikanid.mismatch.report.locate import locate
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
@@ -124,6 +125,16 @@ def test_windows_a_gap_apart_are_several() -> None:
     acts = np.zeros(1000, bool)
     acts[100:150] = acts[160:200] = acts[700:710] = True
     assert moving(acts, theta=np.zeros(1000)).windows(0.5) == ((1.0, 1.99), (7.0, 7.09))
+    # without a period neighbouring samples still are one window
+    assert moving(acts, theta=np.zeros(1000)).windows(0.0) == (
+        (1.0, 1.49), (1.6, 1.99), (7.0, 7.09))
+
+
+def test_a_long_list_of_windows_is_cut() -> None:
+    several = tuple((float(k), k + 0.5) for k in range(9))
+    assert Where(("input",), "v", (), several[:2], None).seconds == "0 to 0.5 s, 1 to 1.5 s"
+    assert Where(("input",), "v", (), several, None).seconds.endswith("5 to 5.5 s, and 3 more")
+    assert Where(("input",), "v", (), (), None).seconds == ""
 
 
 def effect(known: dict[str, Candidate], *keys: str) -> tuple[Candidate, ...]:

@@ -53,7 +53,7 @@ def effects(
     if not chosen.effects:
         raise errors.BadModel(errors.no_effects(chosen.name))
     shown = effects_shown(chosen, excited(chosen, excitation, duration, rate, []))
-    if plot is not None:
+    if plot is not None and not all(one.failure for one in shown):
         from pikanid.estimate.plots import save_figure
 
         save_figure(effects_figure(shown, chosen), plot)
@@ -64,9 +64,11 @@ def effects(
         size = one.effect.size
         largest = ", ".join(f"{o}: {v:.3g} {chosen.output(o).unit}".strip()
                             for o, v in one.largest.items())
-        row(made, one.effect.key, one.effect.expression,
-            f"{size.name} = {one.size:.3g} {size.unit}".strip(), largest,
-            "reaches no output" if math.isnan(one.derivative) else
+        key = f"{one.effect.key} ({one.effect.variant})" if one.effect.variant else one.effect.key
+        row(made, key, one.effect.expression,
+            f"{size.name} = {one.size:.3g} {size.unit}".strip(),
+            "cannot be simulated there" if one.failure else largest,
+            "" if one.failure else "reaches no output" if math.isnan(one.derivative) else
             f"agrees to {100 * one.derivative:.1g} %")
     console().print(made)
     return 0

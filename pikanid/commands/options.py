@@ -25,8 +25,9 @@ Values = Annotated[list[str], typer.Option(
     "--set", metavar="NAME=VALUE", show_default=False,
     help="guess of a free parameter, or value of a fixed one")]
 Catalogues = Annotated[list[str], typer.Option(
-    "--catalogue", metavar="FILE.toml", show_default=False,
-    help="effects that the model may lack, beside those of pikanid and of the model file")]
+    "--catalogue", metavar="NAME|FILE.toml", show_default=False,
+    help="effects that the model may lack besides: hydraulics, thermal, kinetics, electrical, or a "
+    "file of your own")]
 Columns = Annotated[list[str], typer.Option(
     "--column", metavar="NAME=COLUMN", show_default=False,
     help="column of the file that holds a signal; t=COLUMN for time")]

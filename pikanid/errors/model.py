@@ -68,9 +68,17 @@ def effect_twice(key: str) -> str:
     return f"The effect '{key}' is there already: give it another id."
 
 
+def unknown_catalogue(name: str, known: Sequence[str]) -> str:
+    return f"'{name}' is neither a catalogue of pikanid ({listed(known)}) nor a .toml file."
+
+
 def no_effects(model: str) -> str:
     return (f"'{model}' lists no effects: write them under [effects] in its file, or name a file "
             "of effects with --catalogue.")
+
+
+def effect_name_taken(key: str, name: str, by: str) -> str:
+    return f"The effect '{key}' adds '{name}', which {by} has already: give it another name."
 
 
 def effect_without_size(where: str, parameters: Sequence[str]) -> str:

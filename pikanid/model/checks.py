@@ -15,6 +15,7 @@ from pikanid.formula.expressions import TIME, check_name
 from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
 from pikanid.formula.limits import MAX_NAME
 from pikanid.model.effect import Effect
+from pikanid.model.effect_form import EffectForm
 from pikanid.model.lookup import Lookup
 from pikanid.storage.entries import Entry, is_integer
 
@@ -59,7 +60,7 @@ def check_types(model: Lookup) -> None:
             if sigma.number() <= 0:
                 raise sigma.fail("positive (or left out)")
     for effect in model.effects:
-        if not isinstance(effect, Effect):
+        if not isinstance(effect, Effect | EffectForm):
             raise errors.BadModel(errors.not_of_kind(
                 "An effect of the model", type(effect).__name__, "a pikanid.Effect"))
     for s in model.splines:

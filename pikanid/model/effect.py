@@ -34,8 +34,10 @@ class Effect:
         inputs: Maps of inputs (gain, saturation, delay, ...: `Model.map_input`).
         outputs: Maps of outputs (`Model.map_output`).
         initial: New initial values of states.
+        channels: Recorded channels that it takes as inputs, each with its unit.
         family: Of physics, as in the catalogue; may be empty.
         twins: Ids of effects that no experiment of this kind tells from it.
+        variant: Distinguishes effects of one key, as where a form was bound several times.
 
     >>> from pikanid.model import systems
     >>> drag = Effect("rotor_drag", "drag of the rotor", (Parameter("c2", 0.1, "1/rad"),),
@@ -54,8 +56,15 @@ class Effect:
     inputs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     outputs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     initial: Mapping[str, str] = field(default_factory=dict)
+    channels: Mapping[str, str] = field(default_factory=dict)
     family: str = ""
     twins: tuple[str, ...] = ()
+    variant: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters and states that it adds."""
+        return (*(p.name for p in self.parameters), *self.states)
 
     @property
     def size(self) -> Parameter:

@@ -6,148 +6,75 @@
     parameters.h = { unit = "cm", guess = 9.0, bounds = [5, 15] }
     add = { x1 = "-k_o*max(x1 - h, 0)", x2 = "k_o*max(x1 - h, 0)" }
     null = { k_o = 0.0 }
+
+With ``for = { x = "state" }`` it is a form for any model (`pikanid.model.effect_form`).
 """
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from pikanid import errors
-from pikanid.formula.expressions import check_name
-from pikanid.model.channel_maps import INPUT_MAPS, OUTPUT_MAPS
-from pikanid.model.effect import Effect, NewState
-from pikanid.model.parts import Parameter
+from pikanid.model.effect import Effect
+from pikanid.model.effect_form import EffectForm, form_of
+from pikanid.model.effect_table import content_of, effect_of
 from pikanid.storage.entries import Entry
 from pikanid.storage.limits import toml_content
 
+FOLDER = Path(__file__).with_name("catalogues")
 MOST = 200  # limit: effects in one file
-MOST_PARTS = 50  # limit: entries of one table of an effect
-_FORMULAS = ("add", "replace", "initial")
-_KEYS = ("name", "states", "inputs", "outputs", "family", "twins", *_FORMULAS)
 
 
-def read_effects(path: str | os.PathLike[str]) -> tuple[Effect, ...]:
-    """The effects in a TOML file.
+def catalogues() -> tuple[str, ...]:
+    """Names of the catalogues that come with the package.
+
+    >>> catalogues()
+    ('electrical', 'hydraulics', 'kinetics', 'thermal')
+    """
+    return tuple(sorted(p.stem for p in FOLDER.glob("*.toml")))
+
+
+def read_effects(path: str | os.PathLike[str]) -> tuple[Effect | EffectForm, ...]:
+    """The effects in a TOML file, or in the catalogue of that name (`catalogues`).
 
     Raises:
         BadModel: Not such a file; the sentence says what is wrong, and where.
+
+    >>> read_effects("hydraulics")[0].key
+    'overflow'
     """
     def wrong(detail: str) -> errors.BadModel:
         return errors.BadModel(errors.unreadable("file of effects", str(path), detail))
 
-    content = toml_content(path, wrong)
+    if not isinstance(path, str | os.PathLike):
+        raise errors.BadModel(errors.no_path(type(path).__name__))
+    shipped = str(path) in catalogues()
+    if not shipped and not Path(path).suffix:
+        raise errors.BadModel(errors.unknown_catalogue(str(path), catalogues()))
+    content = toml_content(FOLDER / f"{path}.toml" if shipped else path, wrong)
     top = Entry(content, f"The file '{path}'", errors.BadModel).table(["effects"])
     return from_table(top["effects"].value, str(path))
 
 
-def from_table(content: Any, source: str) -> tuple[Effect, ...]:
+def from_table(content: Any, source: str) -> tuple[Effect | EffectForm, ...]:
     """Effects from the table under ``[effects]``; `source` is named in error messages.
 
     Raises:
         BadModel: Anything in it is of another type, unknown or missing.
     """
     top = Entry(content, f"'{source}': [effects]", errors.BadModel).table(optional=None, most=MOST)
-    return tuple(_effect(key, entry.called(f"'{source}': effect '{key}'"))
-                 for key, entry in top.items())
+    made = []
+    for key, entry in top.items():
+        entry = entry.called(f"'{source}': effect '{key}'")
+        plain = isinstance(entry.value, Mapping) and "for" not in entry.value
+        made.append(effect_of(key, entry) if plain else form_of(key, entry, source))
+    return tuple(made)
 
 
-def to_table(effects: Sequence[Effect]) -> dict[str, Any]:
+def to_table(effects: Sequence[Effect | EffectForm]) -> dict[str, Any]:
     """What stands under ``[effects]`` in a file."""
-    return {e.key: _content(e) for e in effects}
-
-
-def _content(effect: Effect) -> dict[str, Any]:
-    usual = Parameter("", math.nan)
-    parameters = {p.name: {
-        "guess": float(p.value),
-        **{k: list(v) if k == "bounds" else v for k in ("unit", "bounds", "scope", "description")
-           if (v := getattr(p, k)) != getattr(usual, k)}} for p in effect.parameters}
-    content: dict[str, Any] = {
-        "name": effect.name, "parameters": parameters, "null": dict([effect.null]),
-        **{key: dict(getattr(effect, key)) for key in _FORMULAS},
-        "states": {n: {"unit": s.unit, "initial": s.initial, "equation": s.equation}
-                   for n, s in effect.states.items()},
-        "inputs": {n: dict(maps) for n, maps in effect.inputs.items()},
-        "outputs": {n: dict(maps) for n, maps in effect.outputs.items()},
-        "family": effect.family, "twins": list(effect.twins)}
-    return {k: v for k, v in content.items() if v}
-
-
-def _effect(key: str, entry: Entry) -> Effect:
-    check_name(key, "effect")
-    table = entry.table(["parameters", "null"], _KEYS)
-    where = entry.where
-
-    def part(name: str) -> dict[str, Entry]:
-        if name not in table:
-            return {}
-        return table[name].called(f"{where}: '{name}'").table(optional=None, most=MOST_PARTS)
-
-    def texts(name: str) -> dict[str, str]:
-        return {n: _formula(e.called(f"{where}: '{name}' of '{n}'")) for n, e in part(name).items()}
-
-    parameters = tuple(_parameter(n, e.called(f"{where}: parameter '{n}'"))
-                       for n, e in part("parameters").items())
-    null = part("null")
-    if len(null) != 1 or (size := next(iter(null))) not in [p.name for p in parameters]:
-        raise errors.BadModel(errors.effect_without_size(where, [p.name for p in parameters]))
-    states = {check_name(n, "state"): _state(e.called(f"{where}: state '{n}'"))
-              for n, e in part("states").items()}
-
-    def maps(section: str, known: Sequence[str]) -> dict[str, dict[str, Any]]:
-        return {n: _maps(e.called(f"{where}: {section[:-1]} '{n}'"), known)
-                for n, e in part(section).items()}
-
-    made = Effect(
-        key, (table["name"].text() if "name" in table else "") or key.replace("_", " "), parameters,
-        (size, null[size].called(f"{where}: null of '{size}'").number()),
-        texts("add"), texts("replace"), states, maps("inputs", INPUT_MAPS),
-        maps("outputs", OUTPUT_MAPS), texts("initial"),
-        table["family"].text() if "family" in table else "",
-        tuple(e.text() for e in table["twins"].items(most=MOST_PARTS)) if "twins" in table else ())
-    low, high = made.size.bounds
-    if not low <= made.size.value <= high:
-        raise errors.BadModel(errors.bad_bounds(size, made.size.value, (low, high)))
-    if not made.expression:
-        raise errors.BadModel(errors.effect_changes_nothing(
-            where, [*_FORMULAS, "states", "inputs", "outputs"]))
-    return made
-
-
-def _formula(entry: Entry) -> str:
-    """Text of a formula; a number counts as one."""
-    return entry.text() if isinstance(entry.value, str) else repr(entry.number())
-
-
-def _parameter(name: str, entry: Entry) -> Parameter:
-    check_name(name, "parameter")
-    table = entry.table(["guess"], ["unit", "bounds", "scope", "description"])
-    bounds = (-math.inf, math.inf)
-    if "bounds" in table:
-        low, high = table["bounds"].pair()
-        bounds = (low.number(finite=False), high.number(finite=False))
-    unit, scope, description = (table[k].text() if k in table else usual for k, usual in (
-        ("unit", ""), ("scope", "shared"), ("description", "")))
-    if scope not in ("shared", "recording"):
-        raise table["scope"].fail("'shared' or 'recording'")
-    value = table["guess"].number()
-    if not bounds[0] <= value <= bounds[1] or not bounds[0] < bounds[1]:
-        raise errors.BadModel(errors.bad_bounds(name, value, bounds))
-    return Parameter(name, value, unit, bounds, scope=scope,  # type: ignore[arg-type]  # checked
-                     description=description)
-
-
-def _state(entry: Entry) -> NewState:
-    table = entry.table(["equation"], ["unit", "initial"])
-    return NewState(table["unit"].text() if "unit" in table else "",
-                    _formula(table["initial"]) if "initial" in table else "0",
-                    _formula(table["equation"]))
-
-
-def _maps(entry: Entry, known: Sequence[str]) -> dict[str, Any]:
-    table = entry.table(optional=known)
-    return {what: [_formula(part) for part in e.pair()] if what == "clip" else _formula(e)
-            for what, e in table.items()}
+    return {e.key: content_of(e) if isinstance(e, Effect) else
+            {"for": dict(e.places), **e.content} for e in effects}

@@ -10,6 +10,7 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.model.effect import Effect
+from pikanid.model.effect_form import EffectForm
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
 
 
@@ -37,7 +38,7 @@ class Lookup:
     equations: Mapping[str, sp.Expr]
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...]
-    effects: tuple[Effect, ...]
+    effects: tuple[Effect | EffectForm, ...]
 
     @property
     def symbols(self) -> frozenset[str]:

@@ -25,6 +25,7 @@ from pikanid.model import file as model_file
 from pikanid.model import units as model_units
 from pikanid.model.checks import check_types, validate
 from pikanid.model.effect import Effect
+from pikanid.model.effect_form import EffectForm
 from pikanid.model.half_derivative import with_half_derivative
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Formula, Input, Output, Parameter, Spline, State
@@ -61,7 +62,7 @@ class Model(Operations):
     equations: Mapping[str, sp.Expr]
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...] = ()
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[Effect | EffectForm, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -112,7 +113,7 @@ class Model(Operations):
         """Add an effect that is described as text: see `pikanid.model.with_effect`."""
         return with_effect(self, effect, nominal)
 
-    def with_candidates(self, *effects: Effect) -> Model:
+    def with_candidates(self, *effects: Effect | EffectForm) -> Model:
         """List effects that the model may lack; `pikanid.diagnose` looks for them."""
         return with_candidates(self, *effects)
 

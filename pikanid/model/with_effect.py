@@ -12,8 +12,9 @@ from pikanid import errors
 from pikanid.formula.expressions import symbol
 from pikanid.model.channel_maps import map_input, map_output
 from pikanid.model.effect import Effect
+from pikanid.model.effect_form import EffectForm
 from pikanid.model.operations import Operations
-from pikanid.model.parts import State
+from pikanid.model.parts import Input, State
 
 M = TypeVar("M", bound=Operations)
 
@@ -33,6 +34,8 @@ def with_effect(model: M, effect: Effect, nominal: M | None = None) -> M:
     nominal, known = nominal or model, {*model.parameter_names}
     model = model.with_parameters(*(p for p in effect.parameters if p.name not in known)).replace(
         effects=tuple(e for e in model.effects if e.key != effect.key))
+    model = model.replace(inputs=(*model.inputs, *(
+        Input(n, unit) for n, unit in effect.channels.items() if n not in model.input_names)))
     where, own = f"effect '{effect.key}'", [*effect.states]
     terms: dict[str, sp.Expr] = {}
     for name, text in effect.add.items():
@@ -65,16 +68,23 @@ def with_effect(model: M, effect: Effect, nominal: M | None = None) -> M:
     return model
 
 
-def with_candidates(model: M, *effects: Effect) -> M:
+def with_candidates(model: M, *effects: Effect | EffectForm) -> M:
     """The model that lists further effects as what it may lack.
 
     Raises:
         BadModel: An effect that is listed already, or does not suit the model.
     """
-    known = {e.key for e in model.effects}
+    keys = {e.key for e in model.effects}
+    names = {n: "the model" for n in (*model.symbols, *model.output_names)}
+    for effect in (*model.effects, *effects):
+        for name in effect.names if isinstance(effect, Effect) else ():
+            if name in names:
+                raise errors.BadModel(errors.effect_name_taken(effect.key, name, names[name]))
+            names[name] = f"effect '{effect.key}'"
     for effect in effects:
-        if effect.key in known:
+        if effect.key in keys:
             raise errors.BadModel(errors.effect_twice(effect.key))
-        known.add(effect.key)
-        with_effect(model, effect)  # which is refused here, not in the middle of a diagnosis
+        keys.add(effect.key)
+        if isinstance(effect, Effect):
+            with_effect(model, effect)  # which is refused here, not in the middle of a diagnosis
     return model.replace(effects=(*model.effects, *effects)) if effects else model

@@ -51,7 +51,7 @@ def page(dx: Diagnosis, title: str) -> str:
 
 
 def _where(dx: Diagnosis) -> str:
-    spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time) or "spread over the recording"
+    spans = dx.where.seconds or "spread over the recording"
     channel = " and ".join(f"the {c}" for c in dx.where.channels) or (
         "undecided between input, sensor and dynamics")
     region = f" It acts at {', '.join(map(str, dx.where.region))}." if dx.where.region else ""

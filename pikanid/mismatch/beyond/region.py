@@ -19,6 +19,7 @@ from pikanid.simulation.input_paths import combined
 from pikanid.simulation.vectorfield import VectorField
 
 ROUNDING = 1e-9  # numerical: of the largest force: less is a zero that was computed
+NEIGHBOURS = 1.5  # numerical: intervals between samples, above which two are no neighbours
 MOST = 2  # limit: intervals of one state
 
 
@@ -74,9 +75,11 @@ class Course:
         return best
 
     def windows(self, gap: float) -> tuple[tuple[float, float], ...]:
-        """Seconds in which the law acts; what lies less than a gap [s] apart is one."""
-        at = self.t[self.acts]
-        cuts = np.flatnonzero(np.diff(at) > gap) + 1
+        """Seconds in which the law acts; what lies less than a gap [s] apart is one, and so are
+        neighbouring samples.
+        """
+        at, between = self.t[self.acts], float(np.median(np.diff(self.t)))
+        cuts = np.flatnonzero(np.diff(at) > max(gap, NEIGHBOURS * between)) + 1
         return tuple((round(float(part[0]), 3), round(float(part[-1]), 3))
                      for part in np.split(at, cuts) if len(part))
 

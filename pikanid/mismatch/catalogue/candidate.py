@@ -51,12 +51,14 @@ class TangentDirection:
     starts at `null + amplitude * size`, with the amplitude that suits the residual best, and the
     parameter's own value as null unless given.
     `one_sided`: the amplitude must be positive.
+    `forces` (L, n) are added to the rates of all states.
     """
 
     start: Mapping[str, float]
     force: Array | None = None
     push: Mapping[str, Array] = field(default_factory=dict)
     seen: Array | None = None
+    forces: Array | None = None
     initial: Mapping[str, float] = field(default_factory=dict)
     one_sided: bool = False
     scales: bool = True
@@ -121,8 +123,8 @@ class Candidate:
         instead_of: Ids of effects in whose place it is tried, once they are given.
         beside: Ids of effects, one of which has to be there: without them it is a twin of another
             entry.
-        probes: Values of its parameters but the size, at each of which its sign is found by
-            simulation; its `directions` then say no more than where a fit begins.
+        probes: Values of its parameters but the size, at each of which its sign is derived from
+            what it adds to the model; its `directions` then say no more than where a fit begins.
     """
 
     ids: tuple[str, ...]
@@ -161,6 +163,11 @@ class Candidate:
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these."""
         return not self.beside or any(i in self.beside for e in others for i in e.ids)
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it is more than what happens once."""
+        return "once" not in self.families
 
     @property
     def refines(self) -> bool:

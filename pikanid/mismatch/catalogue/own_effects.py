@@ -35,12 +35,13 @@ def own_effects(effects: Iterable[Effect], sites: Sequence[Site],
     effects = list(effects)
     ids = {*(i for c in taken.values() for i in c.ids), *(e.key for e in effects)}
     for effect in effects:
-        if effect.key in made or any(effect.key in c.ids for c in taken.values()):
+        known = effect.key + effect.variant
+        if known in made or any(effect.key in c.ids for c in taken.values()):
             raise errors.BadModel(errors.effect_twice(effect.key))
         for twin in effect.twins:
             if twin not in ids:
                 raise errors.BadModel(errors.not_in_catalogue(twin, sorted(ids)))
-        made[effect.key] = _candidate(effect, sites)
+        made[known] = _candidate(effect, sites)
     return [*made.values()]
 
 
@@ -61,7 +62,7 @@ def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
 
     return Candidate(
         (effect.key,), effect.name, effect.expression, _channel(effect), site, (size, *others),
-        extend, directions, families=(effect.family or effect.name,), probes=probes,
+        extend, directions, effect.variant, families=(effect.family or effect.name,), probes=probes,
         argument=_argument(effect, site, nominal),
         levels=tuple({size.name: start, **probe} for probe in probes))
 

@@ -32,6 +32,7 @@ class Site:
         half_range: Half the range of the output there, in its unit.
         interval: Between its samples, as a rule [s].
         suffix: Distinguishes names where a model has several coordinates.
+        taken: Names that users' own effects have.
     """
 
     model: Model
@@ -46,6 +47,7 @@ class Site:
     half_range: float
     interval: float
     suffix: str = ""
+    taken: frozenset[str] = frozenset()
 
     @property
     def acceleration(self) -> sp.Expr:
@@ -90,9 +92,9 @@ class Site:
         return -_at_rest(self.model, self.acceleration.diff(symbol(self.q)))
 
     def name(self, wanted: str) -> str:
-        """A parameter or state name that the model does not use yet."""
+        """A parameter or state name that neither the model nor an effect of a user uses yet."""
         name = wanted + self.suffix
-        while name in self.model.symbols:
+        while name in self.model.symbols or name in self.taken:
             name += "_x"
         return name
 

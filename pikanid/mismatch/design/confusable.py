@@ -15,6 +15,7 @@ from math import inf
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.catalogue.bound_effects import bound_to, ranges_along, reserved
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
@@ -156,7 +157,9 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
         raise errors.BadSetting(errors.bad_value("strength", strength, f"above {separated:g}"))
     effects, model = a_model(model).effects, model.replace(effects=())
     nothing = recorded(model, one_recording(excitation), sigma, settings)
-    catalogue = tuple(c for c in catalogue_of(sites(model, nothing.recordings), effects)
+    found = sites(model, nothing.recordings)
+    given = bound_to(effects, found, nothing.recordings, lambda: ranges_along(model, nothing))
+    catalogue = tuple(c for c in catalogue_of(reserved(found, given), given)
                       if c.known and c.fits and c.suits() and not c.refines)
     base = fitted(model, (), nothing, [{}], len(catalogue))
     if base is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,9 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.estimate.plots import COLOURS, DPI, new_figure
+from pikanid.mismatch.catalogue.bound_effects import Ranges, bound_to
 from pikanid.mismatch.catalogue.candidate import Array
+from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Effect, Model
 from pikanid.problem.arguments import a_model, one_recording
 from pikanid.problem.problem import bind
@@ -35,6 +37,7 @@ class ShownEffect:
         size: At which it is shown: its guess, or a step from no effect.
         without, with_it: By output, values (N,) at the output's times.
         times: By output (N,) [s].
+        failure: Why the model with the effect cannot be simulated at that size, if it cannot.
         derivative: Relative difference of the derivative by the size at no effect, as it is
             integrated with the model and as simulations on both sides show it; NaN where nothing
             reaches an output.
@@ -46,6 +49,7 @@ class ShownEffect:
     without: Mapping[str, Array]
     with_it: Mapping[str, Array]
     derivative: float
+    failure: str = ""
 
     @property
     def largest(self) -> dict[str, float]:
@@ -63,7 +67,7 @@ def effects_shown(model: Model, excitation: Recording) -> tuple[ShownEffect, ...
 
     Raises:
         BadModel: An effect does not suit the model.
-        SimulationFailed: The model, or the model with an effect, cannot be simulated.
+        SimulationFailed: The model cannot be simulated.
 
     >>> import pikanid as pk
     >>> drag = pk.Effect("drag", "drag", (pk.Parameter("c2", 0.1, "1/rad"),), ("c2", 0.0),
@@ -76,7 +80,15 @@ def effects_shown(model: Model, excitation: Recording) -> tuple[ShownEffect, ...
     effects, model = a_model(model).effects, model.replace(effects=())
     drive = one_recording(excitation)
     nominal = simulate(model, drive)
-    return tuple(_shown(model, e, drive, nominal) for e in effects)
+    own = bound_to(effects, sites(model, (nominal,)), [nominal], lambda: _ranges(model, nominal))
+    return tuple(_shown(model, e, drive, nominal) for e in own)
+
+
+def _ranges(model: Model, recording: Recording) -> Ranges:
+    p = np.array([*model.values.values()])
+    states = Simulator(model, bind(model, recording)).run(p, states=True).states
+    return dict(zip(model.state_names, zip(states.min(axis=0), states.max(axis=0), strict=True),
+                    strict=True))
 
 
 def _shown(model: Model, effect: Effect, drive: Recording, nominal: Recording) -> ShownEffect:
@@ -87,7 +99,7 @@ def _shown(model: Model, effect: Effect, drive: Recording, nominal: Recording) -
         there = simulate(extended.with_values({size.name: guess}), drive)
         derivative = _derivative(extended, size.name, size.value, guess, nominal)
     except errors.SimulationFailed as failure:
-        raise errors.SimulationFailed(f"Effect '{effect.key}': {failure}") from None
+        return ShownEffect(effect, guess, {}, {}, {}, float("nan"), str(failure))
     names = model.output_names
     return ShownEffect(effect, guess, {o: nominal[o].time for o in names},
                        {o: nominal[o].values for o in names}, {o: there[o].values for o in names},
@@ -112,8 +124,11 @@ def _derivative(extended: Model, name: str, null: float, guess: float, recording
     return float(np.abs(own - wanted).max() / np.abs(wanted).max())
 
 
-def effects_figure(shown: tuple[ShownEffect, ...], model: Model) -> Figure:
-    """Each output without and with each effect: effects below each other, outputs beside."""
+def effects_figure(effects: Sequence[ShownEffect], model: Model) -> Figure:
+    """Each output without and with each effect that can be simulated: effects below each other,
+    outputs beside.
+    """
+    shown = [one for one in effects if not one.failure]
     outputs = [model.output(o) for o in model.output_names]
     width, height = PANEL
     figure = new_figure(width * len(outputs), height * len(shown), dpi=DPI)

@@ -1,16 +1,53 @@
-"""How an effect of any form would show: its derivative by simulation, about a fit without it.
+"""How an effect that was described as text would show, about a fit without it.
 
-The analytic signs of the catalogue are faster; this one asks nothing of an effect but that it can
-be added to the model.
+What it adds to equations is a force along the motion, the derivative of the right-hand sides by the
+effect's size.  Where it changes more than equations (states, inputs, outputs, initial values) the
+derivative is simulated, which asks nothing of an effect but that it can be added to the model.
 """
 
 from __future__ import annotations
+
+from typing import Protocol
 
 import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Whitened
+from pikanid.model import Model
+from pikanid.simulation.input_paths import with_parts
+from pikanid.simulation.vectorfield import VectorField
+
+
+class Along(Protocol):
+    """A motion: t (L,), states x (L, n), inputs u (L, m), and the parameters p (P,) behind it."""
+
+    t: np.ndarray
+    x: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+
+
+def equations_alone(model: Model, candidate: Candidate) -> bool:
+    """Whether an effect changes right-hand sides, and nothing else."""
+    extended = candidate.applied(model)
+    return (extended.states, extended.inputs, extended.outputs) == (
+        model.states, model.inputs, model.outputs)
+
+
+def added_forces(model: Model, candidate: Candidate, at: Along) -> list[np.ndarray]:
+    """∂f/∂size (L, n) at no effect, at each of the candidate's probes."""
+    extended = with_parts(candidate.applied(model))
+    size, rows = candidate.parameters[0], range(len(extended.states))
+    field = VectorField(extended)
+    found = []
+    for probe in candidate.probes:
+        values = {**extended.values, **dict(zip(model.parameter_names, at.p, strict=True)),
+                  **probe, size.name: size.value}
+        p = np.array([values[n] for n in extended.parameter_names])
+        found.append(field.rhs_jacobians(at.t, at.x, at.u, p)[1][
+            :, rows, extended.parameter_names.index(size.name)])
+    return found
 
 
 def simulated_signs(whitened: Whitened, theta: np.ndarray, candidate: Candidate

@@ -16,7 +16,11 @@ import numpy as np
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.detect.simulated_signs import simulated_signs
+from pikanid.mismatch.detect.simulated_signs import (
+    added_forces,
+    equations_alone,
+    simulated_signs,
+)
 from pikanid.model import Model
 from pikanid.problem.evaluated import paths
 from pikanid.problem.held import HeldInput
@@ -57,12 +61,18 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
     known: dict[tuple[int, int], TangentDirection] = {}
     several = len(whitened.simulators) > 1
     chosen = [c for c in candidates if not (several and c.per_recording)]
-    simulated = {k: simulated_signs(whitened, theta, c) for k, c in enumerate(chosen) if c.probes}
+    model = whitened.problem.model
+    simulated = {k: simulated_signs(whitened, theta, c) for k, c in enumerate(chosen)
+                 if c.probes and not equations_alone(model, c)}
     for r, response in enumerate(whitened.responses(theta, states=True)):
         line = Tangent(whitened, theta, r, response.states)
         with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
             listed = {(k, n): s for k, c in enumerate(chosen) for n, s in enumerate(
                 c.directions(line.view))}
+            for k, c in enumerate(chosen):
+                if c.probes and k not in simulated:
+                    for n, force in enumerate(added_forces(model, c, line)):
+                        listed[k, n] = replace(listed[k, n], forces=force)
             blocks.append(line.columns([(chosen[k], s) for (k, _), s in listed.items()],
                                        partial(whitened.whiten, r)))
         for column, (k, n) in enumerate(listed):
@@ -70,8 +80,8 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
                 blocks[-1][:, column] = simulated[k][r][:, n]
         places.append(list(listed))
         # what they do along the motion is as large as the columns, and not needed again
-        known = {**{at: replace(s, force=None, push={}, seen=None) for at, s in listed.items()},
-                 **known}
+        known = {**{at: replace(s, force=None, forces=None, push={}, seen=None)
+                    for at, s in listed.items()}, **known}
     every = {place: column for column, place in enumerate(sorted(known))}
     return Directions(blocks[0] if len(blocks) == 1 else _below(blocks, places, every),
                       tuple(chosen), np.array([k for k, _ in every], int),
@@ -184,6 +194,8 @@ class Tangent:
         for k, (candidate, sign) in enumerate(listed):
             if sign.force is not None:
                 force[:, places[candidate.site.v], k] += sign.force
+            if sign.forces is not None:
+                force[:, :, k] += sign.forces
             if sign.seen is not None:
                 o = self.model.output_names.index(candidate.site.output.name)
                 seen[:, o, k] += sign.seen

@@ -178,12 +178,7 @@ def surely_there(explained: Explanations, scale: float, settings: Settings) -> P
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Without those that hold a formula, or what happens once, which swallows remainders."""
-    return [h for h in ranked if not h.symbolic and all(lasts(e) for e in h.effects)]
-
-
-def lasts(effect: Candidate) -> bool:
-    """Whether it is more than what happens once."""
-    return "once" not in effect.families
+    return [h for h in ranked if not h.symbolic and all(e.lasts for e in h.effects)]
 
 
 def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:

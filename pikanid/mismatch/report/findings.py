@@ -20,6 +20,8 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
+SHOWN = 6  # layout: windows of time that are listed
+
 
 @dataclass(frozen=True)
 class NamedEffect:
@@ -86,6 +88,13 @@ class Where:
         if len(self.channels) == 1:
             return self.channels[0]
         return "several" if self.channels else "undecided"
+
+    @property
+    def seconds(self) -> str:
+        """The first windows of time, in words; empty where there are none."""
+        told = ", ".join(f"{a:g} to {b:g} s" for a, b in self.time[:SHOWN])
+        more = len(self.time) - SHOWN
+        return f"{told}, and {more} more" if more > 0 else told
 
 
 @dataclass(frozen=True)

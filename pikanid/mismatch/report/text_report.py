@@ -11,10 +11,9 @@ def lines_of(dx: DiagnosisData) -> list[str]:
     lines = [dx.sentence()]
     if dx.mismatch:
         place = " and ".join(dx.where.channels) or "channel undecided"
-        spans = ", ".join(f"{a:g} to {b:g} s" for a, b in dx.where.time[:6])
         region = ", ".join(map(str, dx.where.region))
         lines.append(f"Where: {place}" + (f"; at {region}" if region else "")
-                     + (f"; in time at {spans}" if spans else ""))
+                     + (f"; in time at {dx.where.seconds}" if dx.where.time else ""))
         if dx.where.parameters:
             lines.append("  with a free force there: " + ", ".join(
                 f"{name} = {rounded(v.value, v.std)} {v.unit}".rstrip()

@@ -77,11 +77,6 @@ def nothing(c: Candidate) -> bool:
     return False
 
 
-def everything(c: Candidate) -> bool:
-    """Any candidate."""
-    return True
-
-
 def best_level(h: Hypothesis, candidate: Candidate, point: Mapping[str, float]) -> Start:
     """The level of a candidate that leaves the least χ² beside a hypothesis' effects at `point`."""
     whitened = Whitened(candidate.applied(h.model), h.whitened.records)

@@ -20,7 +20,7 @@ from pikanid.mismatch.fitting.progressive_horizon import hits, lost
 from pikanid.mismatch.search import neighbours
 from pikanid.mismatch.search.neighbours import Job
 from pikanid.mismatch.search.overdispersion import overdispersion
-from pikanid.mismatch.search.screen import Screen, drag, entry, everything, fixed, law, nothing
+from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, law, nothing
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
@@ -204,12 +204,6 @@ class Search:
             self._exchange(h, anyway=True)
         return {h.fit for h in self.fits.values()} != before
 
-    def further(self, h: Hypothesis, allowed: Callable[[Candidate], bool]) -> bool:
-        """Fit one more of the allowed effects beside its own; whether that found anything."""
-        before = {h.fit for h in self.fits.values()}
-        self._extend(h, self.settings.budget.beside_one, anyway=True, allowed=allowed)
-        return {h.fit for h in self.fits.values()} != before
-
     def refine(self, jobs: Iterable[Job]) -> bool:
         """Fit these effects from these starts, known or not; whether that found anything."""
         before = {h.fit for h in self.fits.values()}
@@ -244,12 +238,10 @@ class Search:
         return overdispersion(self.fits.values())
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
-                always: Callable[[Candidate], bool] = nothing, anyway: bool = False,
-                allowed: Callable[[Candidate], bool] = everything) -> None:
+                always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
         if len(hypothesis.effects) >= self.settings.budget.effects:
             return
-        screen = Screen(hypothesis, [c for c in neighbours.beside(hypothesis, self.candidates)
-                                     if allowed(c)])
+        screen = Screen(hypothesis, neighbours.beside(hypothesis, self.candidates))
         needs, bent = self.settings.search, any(e.channel == "input" for e in hypothesis.effects)
         least = needs.much * hypothesis.minimum.chi2 if hypothesis.far else least
         jobs: list[Job] = [((*hypothesis.effects, candidate), starts)

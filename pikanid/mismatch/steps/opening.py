@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pikanid.mismatch.case import Case, note_outliers
+from pikanid.mismatch.catalogue.bound_effects import bound_to, ranges_along, reserved
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import (
@@ -23,7 +24,7 @@ from pikanid.mismatch.data.preparation import (
 from pikanid.mismatch.fitting.repeats import repeats
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import Settings
-from pikanid.model import Model
+from pikanid.model import Effect, Model
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
@@ -58,7 +59,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         train, later = set_aside(train, model, notes, settings.noise)
     effects, model = model.effects, held_as_recorded(model.replace(effects=()), train)
     # a model in which nothing can be looked for is refused before any fit, as a wrong effect is
-    catalogue_of(sites(model, train), effects)
+    catalogue_of(sites(model, train), [e for e in effects if isinstance(e, Effect)])
     tell("nominal fit")
     together = oversampling(model, train, settings.budget)
     if together > 1:
@@ -89,7 +90,9 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         records = records.with_levels(again.levels)
         held = None if held is None else held.with_levels(again.levels)
     found = sites(nominal, records.recordings)
-    listed = catalogue_of(found, effects)
+    own = bound_to(effects, found, records.recordings, lambda: ranges_along(nominal, records))
+    found = reserved(found, own)
+    listed = catalogue_of(found, own)
     search = Search(nominal, records, listed, tell,
                     guess={n: model.parameter(n).value for n in model.free_names})
     base = search.base()

@@ -22,12 +22,12 @@ from pikanid.mismatch.judge.partial import (
     explanations,
     families_of,
     lasting,
-    lasts,
     left_over,
     surely_there,
 )
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.search.neighbours import with_next_form, with_relatives
+from pikanid.mismatch.search.neighbours import beside, with_next_form, with_relatives
+from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.search.search import Search
 
 
@@ -60,7 +60,8 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
     # a search that what happens once has led leaves what lasts half explained
     for _ in range(settings.budget.effects):
         lead = lasting(search.ranked())[0]
-        if not search.further(lead, lasts) or lasting(search.ranked())[0] is lead:
+        _one_more(search, lead)
+        if lasting(search.ranked())[0] is lead:
             break
     explained, part = weighed()
     for _ in range(settings.budget.rechecked):
@@ -68,6 +69,14 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
             break
         explained, part = weighed()
     return explained, None if part is None else _against_curves(case, part, noise)
+
+
+def _one_more(search: Search, lead: Hypothesis) -> None:
+    """Fit the most promising effects that last beside an explanation's own."""
+    if len(lead.effects) < search.settings.budget.effects:
+        screen = Screen(lead, [c for c in beside(lead, search.candidates) if c.lasts])
+        search.refine(((*lead.effects, c), starts) for c, starts in screen.singles(
+            search.settings.budget.beside_one, search.settings.search.much * lead.minimum.chi2))
 
 
 def _compared(search: Search, lead: Hypothesis) -> bool:

@@ -1,0 +1,75 @@
+"""Forms of effects, bound to a model in every way that its states, inputs and recordings allow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.model import Effect, EffectForm, Model
+from pikanid.model.binding import Surroundings, bound
+from pikanid.recording import Recording
+
+Ranges = Mapping[str, tuple[float, float]]  # lowest and highest value of each state
+
+
+def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
+             recordings: Sequence[Recording], ranges: Callable[[], Ranges]) -> list[Effect]:
+    """The effects, with every form bound in each way in which that can be done and units fit.
+
+    Args:
+        effects: In the names of the sites' model, and forms for any model.
+        sites: Of the model.
+        recordings: With the model's inputs.
+        ranges: Asked where there are forms.
+
+    Raises:
+        BadModel: A form that says something that no effect can.
+    """
+    effects = list(effects)
+    forms = [e for e in effects if isinstance(e, EffectForm)]
+    own = [e for e in effects if isinstance(e, Effect)]
+    if not forms:
+        return own
+    site, first = sites[0], recordings[0]
+    names = [*(i for i in site.model.input_names if i in first), *site.extra]
+    around = Surroundings(
+        site.model, tuple(dict.fromkeys(s.v for s in sites)), ranges(),
+        {n: float(np.abs(first[n].values).max(initial=0.0)) for n in names},
+        {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings))
+    for form in forms:
+        around = replace(around, taken=frozenset(n for e in own for n in e.names))
+        own += [e for e in bound(form, around) if _fits(site.model, e)]
+    return own
+
+
+def _fits(model: Model, effect: Effect) -> bool:
+    """Whether the units of an effect are those of a model."""
+    try:
+        model.with_effect(effect)
+    except errors.BadUnit:
+        return False
+    return True
+
+
+def reserved(sites: Iterable[Site], effects: Iterable[Effect]) -> tuple[Site, ...]:
+    """The sites, whose own candidates then keep off the names of these effects' parameters."""
+    taken = frozenset(n for e in effects for n in e.names)
+    return tuple(replace(site, taken=taken) for site in sites)
+
+
+def ranges_along(model: Model, records: Records) -> Ranges:
+    """Of each state along the recordings, at the model's guesses.
+
+    Raises:
+        SimulationFailed: The model cannot be simulated there.
+    """
+    whitened = Whitened(model, records)
+    if not whitened.choose_steps(whitened.problem.guess):
+        raise errors.SimulationFailed(errors.too_rough_to_diagnose(model.name))
+    found = whitened.motion(whitened.problem.guess)
+    return {name: (float(x.min()), float(x.max())) for name, x in found.items()}

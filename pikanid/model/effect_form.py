@@ -1,0 +1,65 @@
+"""Effects written for any model: placeholders stand for states, inputs, parameters and channels.
+
+    [effects.overflow]
+    name = "overflow of {x}"
+    for = { x = "state" }
+    parameters.k = { unit = "1/s", guess = "10/duration", bounds = [0, inf] }
+    parameters.h = { unit = "{x}", guess = "0.3*x_low + 0.7*x_high", bounds = ["x_low", "x_high"] }
+    add = { x = "-k*max(x - h, 0)" }
+    null = { k = 0 }
+
+Texts in braces become the unit of what a placeholder stands for, in names its name.  Guesses and
+bounds may be formulas of the range that a state covers, of the largest size of an input or a
+channel (``u_size``), of a parameter's value (``p_value``) and of the recordings' duration [s].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pikanid.formula.expressions import check_name
+from pikanid.storage.entries import Entry
+
+MOST_PLACES = 4  # limit: of placeholders in one form
+FIRST = ("state", "input")
+KINDS = ("state", "other state", "input", "channel", "parameter")
+
+
+@dataclass(frozen=True)
+class EffectForm:
+    """An effect for any model: its table, and what each placeholder may stand for.
+
+    Attributes:
+        key: Its id.
+        places: Placeholder -> kind (one of `KINDS`).
+        content: Its table in a file, without the placeholders' kinds.
+        source: Of the table, for messages.
+    """
+
+    key: str
+    places: Mapping[str, str]
+    content: Mapping[str, Any]
+    source: str
+
+
+def form_of(key: str, entry: Entry, source: str) -> EffectForm:
+    """The form that a table describes; what depends on a model is checked when it is bound.
+
+    Raises:
+        BadModel: It has no placeholders, or one of no kind.
+    """
+    check_name(key, "effect")
+    table = entry.table(["for", "parameters", "null"], optional=None)
+    entry.plain()  # tables, texts and numbers, not too deep
+    for section in ("parameters", "states"):
+        for part in table[section].table(optional=None).values() if section in table else ():
+            part.table(optional=None)
+    if "name" in table:
+        table["name"].text()
+    places = {check_name(n, "placeholder"): e.text(KINDS) for n, e in table["for"].table(
+        optional=None, most=MOST_PLACES).items()}
+    if next(iter(places.values()), "") not in FIRST:
+        raise table["for"].fail(f"a table whose first entry is one of {', '.join(FIRST)}")
+    return EffectForm(key, places, {k: v for k, v in entry.value.items() if k != "for"}, source)
