@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from pikanid import errors
+from pikanid.formula import units
 from pikanid.formula.expressions import parse, symbol, to_text
 from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm
@@ -133,8 +134,11 @@ def _filled(text: str, words: Mapping[str, str]) -> str:
 
 
 def _unit(text: Any, words: Mapping[str, str]) -> Any:
-    """A unit with those of placeholders put in."""
-    return _filled(text, words) if isinstance(text, str) else text
+    """A unit with those of placeholders put in, simplified; what is none stays as it is."""
+    if not isinstance(text, str) or "{" not in text:
+        return text
+    filled = _filled(text, words)
+    return units.product((filled, 1)) if units.is_unit(filled) else filled
 
 
 def _number(value: Any, values: Mapping[str, float], where: str) -> Any:
