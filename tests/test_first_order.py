@@ -112,3 +112,24 @@ def test_a_leak_of_the_tank_that_is_not_seen_is_found_there() -> None:
     answer = pk.diagnose(tanks(), run(1), run(2))
     assert answer.verdict in ("named", "set") and answer.where.equation == "x1"
     assert any("quadratic_drag" in e.ids for h in answer.hypotheses for e in h.effects)
+
+
+def test_no_law_is_looked_for_that_units_forbid() -> None:
+    """In degC a temperature has no square and no sign; in K it has both."""
+    def offered(unit: str) -> set[str]:
+        room = pk.Model.from_dict({
+            "name": "room", "states": {"T": {"unit": unit, "initial": 20.0}},
+            "inputs": {"T_a": {"unit": unit}},
+            "parameters": {"a": {"unit": "1/s", "guess": 1e-3, "bounds": [0.0, 1.0]}},
+            "equations": {"T": "a*(T_a - T)"},
+            "outputs": {"T": {"unit": unit, "expression": "T"}}})
+        t = np.arange(100) * 10.0
+        run = pk.Recording.from_arrays(t, {"T_a": 5 + np.sin(t)}, units={"T_a": unit})
+        found = candidates(sites(room, (run,)))
+        for c in found:
+            c.applied(room)
+        return {c.ids[0] for c in found}
+
+    forbidden = offered("K") - offered("degC")
+    assert {"coulomb_friction", "quadratic_drag", "stribeck_friction"} <= forbidden
+    assert {"static_bias", "sensor_offset", "parameter_drift"} <= offered("degC")

@@ -228,6 +228,16 @@ def is_coherent(text: str) -> bool:
     return True
 
 
+def begins_elsewhere(text: str) -> bool:
+    """Whether it is a temperature scale whose zero is not that of its differences.
+
+    >>> begins_elsewhere("degC"), begins_elsewhere("K"), begins_elsewhere("W/degC")
+    (True, False, False)
+    """
+    found = powers(parse(text), _symbol)
+    return len(found) == 1 and any(found.get(name) == 1 for name in _OFFSET)
+
+
 def product(*factors: tuple[str, int | Fraction]) -> str:
     """The unit of a product of powers: what a sensitivity or a covariance is measured in.
 

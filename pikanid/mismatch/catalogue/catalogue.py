@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
+from pikanid import errors
+from pikanid.formula import units
 from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
@@ -12,7 +14,7 @@ from pikanid.mismatch.catalogue.neighbouring_forms import neighbouring_forms
 from pikanid.mismatch.catalogue.own_effects import own_effects, with_twins
 from pikanid.mismatch.catalogue.second_mode import second_mode
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.model import Effect
+from pikanid.model import Effect, Model
 
 Make = Callable[[Site], list[Candidate]]
 # each with the families of physics that it belongs to
@@ -88,4 +90,20 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
     effects = tuple(effects)
     own = own_effects(effects, sites, made)
+    model = sites[0].model
+    measured = [*(s.unit for s in model.states), *(o.unit for o in model.outputs)]
+    if any(map(units.begins_elsewhere, measured)):
+        made = {key: c for key, c in made.items() if _has_meaning(c, model)}
     return tuple(with_twins([*own, *made.values()], effects))
+
+
+def _has_meaning(candidate: Candidate, model: Model) -> bool:
+    """Whether the model's units allow its formula: in degC no temperature has a power or a sign."""
+    of_state = candidate.powers is not None or candidate.resistance is not None
+    if of_state and units.begins_elsewhere(candidate.site.speed_unit):
+        return False
+    try:
+        candidate.applied(model)
+    except errors.BadUnit:
+        return False
+    return True
