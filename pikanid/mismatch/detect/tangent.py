@@ -60,8 +60,10 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
     places: list[list[tuple[int, int]]] = []
     known: dict[tuple[int, int], TangentDirection] = {}
     several = len(whitened.simulators) > 1
-    chosen = [c for c in candidates if not (several and c.per_recording)]
+    # what is described as text and in the model already shows as a column of its Jacobian
     model = whitened.problem.model
+    chosen = [c for c in candidates if not (several and c.per_recording)
+              and not (c.probes and c.parameters[0].name in model.parameter_names)]
     simulated = {k: simulated_signs(whitened, theta, c) for k, c in enumerate(chosen)
                  if c.probes and not equations_alone(model, c)}
     for r, response in enumerate(whitened.responses(theta, states=True)):
