@@ -212,3 +212,14 @@ def test_sloshing_runs_have_motion_and_heights(name: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(attitude, axis=0), 1, atol=1e-9)
     idle = rec.window(0, 0.9)
     assert np.ptp(idle["x"].values) < 1e-3
+
+
+def test_tanks_are_those_of_the_benchmark(recordings_folder: Path) -> None:
+    train, held_out = (datasets.cascaded_tanks(part) for part in ("train", "held_out"))
+    assert train.names == ("u", "h") and len(train.t) == len(held_out.t) == 1024
+    assert (train["u"].unit, train["u"].hold, train.stop) == ("V", "zero", 4092.0)
+    assert (train["u"].values[0], train["h"].values[0]) == (3.2567, 5.205)
+    assert (held_out["u"].values[0], held_out["h"].values[0]) == (0.97619, 4.9728)
+    assert train["h"].values.max() <= 10.0 and recordings_folder.is_dir()
+    with pytest.raises(BadSetting, match="train"):
+        datasets.cascaded_tanks("all")  # type: ignore[arg-type]  # what is no part

@@ -167,8 +167,8 @@ def test_effects_of_a_catalogue_are_simulated_and_their_derivatives_right() -> N
 @pytest.mark.slow
 def test_real_tanks_run_over(recordings_folder: Path) -> None:
     """Nothing but the nominal model and the catalogue is given; 0.23 V were reached by hand."""
-    train, held_out = (pk.Recording.read(recordings_folder / "cascaded_tanks" / name)
-                       for name in ("train.csv", "heldout.csv"))
+    assert recordings_folder.is_dir()
+    train, held_out = (pk.datasets.cascaded_tanks(part) for part in ("train", "held_out"))
     model = pk.systems.cascaded_tanks().per_recording("x1_0", "x2_0").with_candidates(
         *read_effects("hydraulics"))
     dx = pk.diagnose(model, train, held_out)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import io
 import os
 import zlib
 from dataclasses import replace
@@ -31,9 +32,9 @@ from pikanid.recording.reading.table import Options
 from pikanid.recording.recording import Recording
 
 __all__ = [
-    "BALLS", "SLOSH_MOTIONS", "falling_balls", "falling_balls_excerpt", "silverbox",
-    "single_pendulum", "single_pendulum_excerpt", "single_pendulum_free_swing", "slosh_lar",
-    "slosh_lar_forced",
+    "BALLS", "SLOSH_MOTIONS", "cascaded_tanks", "falling_balls", "falling_balls_excerpt",
+    "silverbox", "single_pendulum", "single_pendulum_excerpt", "single_pendulum_free_swing",
+    "slosh_lar", "slosh_lar_forced",
 ]
 
 FOLDER = "PIKANID_DATA"
@@ -48,6 +49,9 @@ _SILVERBOX_PARTS = {
     "arrow_no_extrapolation": (100, 32100),
     "all": (0, 131072),
 }  # definition: official split of the benchmark
+
+_TANKS_INTERVAL = 4.0  # definition: [s], of the benchmark
+_TANKS_PARTS = {"train": (0, 2), "held_out": (1, 3)}  # definition: columns of input and output
 
 BALLS = origins.BALLS
 SLOSH_MOTIONS = tuple(origins.SLOSH_CHECKSUMS)
@@ -125,6 +129,28 @@ def silverbox(
         np.arange(stop - start) / _SILVERBOX_RATE,
         {"u": arrays["V1"].ravel()[start:stop], "y": arrays["V2"].ravel()[start:stop]},
         {"u": "V", "y": "V"}, name=f"Silverbox, {part.replace('_', ' ')}")
+
+
+def cascaded_tanks(part: Literal["train", "held_out"] = "train") -> Recording:
+    """Two tanks above each other and a pump, which run over at times; 1024 samples, one in 4 s.
+
+    Channels: ``u`` [V], the pump, held from sample to sample, and ``h`` [V], the sensor of the
+    lower level, which is clipped at 10 V.  Both parts begin in the same unknown state.
+    M. Schoukens and J. P. Noël, Three benchmarks addressing open challenges in nonlinear system
+    identification, IFAC-PapersOnLine 50-1 (2017).
+
+    Args:
+        part: Of the benchmark's split.
+
+    Raises:
+        DatasetUnavailable: If the file is neither at hand nor to be had.
+    """
+    origins.check_known("part", part, tuple(_TANKS_PARTS))
+    content = _content(origins.CASCADED_TANKS)
+    columns = np.loadtxt(io.BytesIO(content), delimiter=",", skiprows=1, usecols=_TANKS_PARTS[part])
+    return Recording.from_arrays(
+        _TANKS_INTERVAL * np.arange(len(columns)), {"u": columns[:, 0], "h": columns[:, 1]},
+        {"u": "V", "h": "V"}, hold={"u": "zero"}, name=f"cascaded tanks, {part.replace('_', ' ')}")
 
 
 def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:

@@ -55,6 +55,10 @@ FREE_SWING = Origin(SINGLE_PENDULUM.repository, SINGLE_PENDULUM.commit,
 SILVERBOX = Origin("biaslab/nsi-silverbox", "728f07e4539d4f7da76a4778b52a756260b488ac",
                    "data/Silverbox/SNLS80mV.mat", "silverbox/SNLS80mV.mat",
                    "5c7413a52255af0cb4e2f93fb6903beb92b08965ba1e6ad0a6ffedfed8477ed4")
+CASCADED_TANKS = Origin("forgi86/sysid-neural-continuous",
+                        "956aa7ecd73061b0321c6f6098d74c9e4a7ce67a",
+                        "examples/CTS/data/dataBenchmark.csv", "cascaded_tanks/dataBenchmark.csv",
+                        "ef2388ed822f3aef4aa80d6b0f2b466dd80b361786b3eafc7a2957c31ea323a7")
 FALLING_BALLS = Origin("briandesilva/discovery-of-physics-from-data",
                        "b79c34317f049c9b47aaf2cc4c54c5ec7219f3d7", "data/Ball_drops_data.xls",
                        "falling_balls/Ball_drops_data.xls",
