@@ -68,13 +68,15 @@ def test_a_loop_may_be_a_spring_that_gives_way(by_key: dict[str, Candidate]) -> 
 
 @pytest.mark.parametrize(("entry", "expected"), [
     ("sensor_gain", {1.1 * 0.3 + 0.5 * 0.3**2, 1.1 * 0.3 + 0.5 * 0.3**3}),
-    ("sensor_nonlinearity", {0.3 + 0.5 * 0.3**2, 0.3 + 0.5 * 0.3**4})])
+    ("sensor_nonlinearity", {0.3 + 0.5 * 0.3**2, 0.3 + 0.5 * 0.3**4}),
+    ("sensor_saturation", {0.2 * float(np.tanh(1.5))})])
 def test_a_sensor_may_bend_otherwise(by_key: dict[str, Candidate], entry: str,
                                      expected: set[float]) -> None:
     seen = set()
     for law in (c for c in by_key.values() if c.next_to == entry):
         shown = law.applied(pk.systems.sloshing()).output("theta").expression
-        values = {"theta": 0.3, "k_out": 1.1, "b_2": 0.5, "b_3": 0.5, "b_4": 0.5}
+        values = {"theta": 0.3, "k_out": 1.1, "b_2": 0.5, "b_3": 0.5, "b_4": 0.5,
+                  "limit_soft": 0.2}
         seen.add(round(float(shown.subs({symbol(n): v for n, v in values.items()})), 9))
         assert law.channel == "sensor" and not law.known
     assert seen == {round(v, 9) for v in expected}

@@ -13,12 +13,13 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.as_estimate import widened
-from pikanid.mismatch.judge.partial import Doubtful, Present, Weighed, _examined
+from pikanid.mismatch.judge.partial import Doubtful, Part, Present, Weighed, _examined
 from pikanid.mismatch.report import part as reported_as
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.findings import Where, values_of
 from pikanid.mismatch.report.part import Remainder, Value
 from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps.surely import _without_scale
 from pikanid.reporting.diagnosis_page import page
 
 RULE = DEFAULTS.part
@@ -115,6 +116,19 @@ def test_a_law_that_contains_another_does_not_take_its_name(wider: Candidate) ->
     found = examined(weighed((COULOMB,), 1.0, 0.97), weighed((wider,), 1.0, 0.029),
                      weighed((DRAG,), 9.0, 0.001))
     assert isinstance(found, Present) and found.names == ()
+
+
+@pytest.mark.parametrize(("names", "sure"), [((), {"sensor curve"}),
+                                             (("sensor_saturation",), {"sensor curve", "gain"})])
+def test_a_curve_without_a_name_has_a_slope_of_its_own(names: tuple[str, ...], sure: set[str]
+                                                       ) -> None:
+    curve, scale = effect("sensor_saturation", "sensor curve"), effect("sensor_gain", "gain")
+    present = tuple(Present(e.families[0], e, own, {}, 1.0, 1.0, 9.0, 1.0, 0.95)
+                    for e, own in ((curve, names), (scale, ("sensor_gain",))))
+    h: Any = SimpleNamespace(effects=(curve, scale))
+    found = _without_scale(Part(present, (), h, 1.0, 0.95))
+    assert {p.family for p in found.present} == sure
+    assert {d.family for d in found.doubtful} == {"sensor curve", "gain"} - sure
 
 
 def test_what_noise_hides_is_no_remainder() -> None:

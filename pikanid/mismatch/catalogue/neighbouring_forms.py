@@ -28,6 +28,7 @@ from pikanid.model.parts import Parameter, State
 EASED = (0.75, 0.88, 1.0)  # numerical: of a wall's distance, where fits of one that stiffens begin
 MEMORIES = (0.3, 1.0, 3.0)  # numerical: of the time to swing, where fits of a memory begin
 SETTLED = (0.1, 0.3, 1.0)  # numerical: of the recording, where fits of what settles begin
+ROUNDED = (1.0, 1.5)  # numerical: of a sensor's limit, where fits of a rounded one begin
 BENT = (2, 3)  # definition: powers of a curve beside its straight part
 Starts = list[dict[str, float]]
 
@@ -48,6 +49,8 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
         return [_bent(entry, entry.site.output.name, n) for n in BENT]
     if entry.ids == ("sensor_nonlinearity",):
         return [_bent_otherwise(entry, n) for n in (2, 4)]
+    if entry.ids == ("sensor_saturation",):
+        return [_rounded(entry)]
     if entry.powers is None or not entry.site.rate:
         return []
     return [_power_law(entry, near) for near in _next(entry.powers)]
@@ -187,6 +190,15 @@ def _bent_otherwise(cubic: Candidate, n: int) -> Candidate:
 
     return _curve(cubic, o, f"sensor_power_{n}", f"{o} + {b.name}*abs({o})*{o}**{n - 1}", (b,),
                   starts)
+
+
+def _rounded(clipped: Candidate) -> Candidate:
+    """L tanh(y/L), in place of a limit that y keeps to and is not bent by below."""
+    site, o, old = clipped.site, clipped.site.output.name, clipped.parameters[0]
+    limit = Parameter(site.name("limit_soft"), 1e6, _unit(clipped, o), old.bounds)
+    return _curve(clipped, o, "sensor_rounded", f"{limit.name}*tanh({o}/{limit.name})", (limit,),
+                  lambda values, states: [{limit.name: share * values[old.name]}
+                                          for share in ROUNDED])
 
 
 def _unit(entry: Candidate, channel: str) -> str:

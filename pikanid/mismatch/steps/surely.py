@@ -30,6 +30,8 @@ from pikanid.mismatch.search.neighbours import beside, with_next_form, with_rela
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.search.search import Search
 
+CURVES = ("input curve", "sensor curve")  # definition: families of laws of one channel
+
 
 def with_sure_part(case: Case, answer: Answer, site: Site) -> Answer:
     """The answer, where not everything is explained, with what is surely there nevertheless, and
@@ -126,7 +128,20 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
             if not smaller(own_left / max(beside, rule.floor), rule.form):
                 p = replace(p, names=())
         present.append(replace(p, dominance=min(p.dominance, float(kappa))))
-    return replace(part, present=tuple(present), doubtful=tuple(doubtful))
+    return _without_scale(replace(part, present=tuple(present), doubtful=tuple(doubtful)))
+
+
+def _without_scale(part: Part) -> Part:
+    """The part without errors of scale beside a curve of an input or sensor whose form is not sure:
+    it has a slope of its own.
+    """
+    curves = [p for p in part.present if p.family in CURVES and not p.names]
+    scales = [p for p in part.present if p.family == "gain" and curves]
+    return replace(
+        part, present=tuple(p for p in part.present if p not in scales),
+        doubtful=(*part.doubtful, *(Doubtful(
+            p.family, p.effect, f"the {curves[0].family}, whose form is not sure, has a slope of "
+            "its own") for p in scales)))
 
 
 def _argument(p: Present) -> str:
