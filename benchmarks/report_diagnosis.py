@@ -56,13 +56,13 @@ class Set:
 
 
 SETS = (
-    Set("rich", "rich", 0.1 * DEGREE, 20631),
-    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20632),
-    Set("rich_1deg", "rich", 1.0 * DEGREE, 20633),
-    Set("remainder", "mixed", 0.1 * DEGREE, 20634, {"remainder": 1.0}, 1.5),
-    Set("unforeseen", "mixed", 0.1 * DEGREE, 20635, {"unforeseen": 1.0}, 1.5),
-    Set("outside", "mixed", 0.1 * DEGREE, 20636, {"outside": 1.0}, 1.5),
-    Set("nothing", "mixed", 0.1 * DEGREE, 20637, {"nothing": 1.0}, 2.5),
+    Set("rich", "rich", 0.1 * DEGREE, 20641),
+    Set("two_pulse", "two_pulse", 0.1 * DEGREE, 20642),
+    Set("rich_1deg", "rich", 1.0 * DEGREE, 20643),
+    Set("remainder", "mixed", 0.1 * DEGREE, 20644, {"remainder": 1.0}, 1.5),
+    Set("unforeseen", "mixed", 0.1 * DEGREE, 20645, {"unforeseen": 1.0}, 1.5),
+    Set("outside", "mixed", 0.1 * DEGREE, 20646, {"outside": 1.0}, 1.5),
+    Set("nothing", "mixed", 0.1 * DEGREE, 20647, {"nothing": 1.0}, 2.5),
 )
 LATER = 100  # from the seed of one round to that of the next
 
@@ -71,7 +71,7 @@ def rounds(chosen: Sequence[Set], count: int) -> list[Set]:
     """All sets; those of the default mix once for every round, with a seed of its own.
 
     >>> [(s.name, s.seed) for s in rounds(SETS[2:4], 2)]
-    [('rich_1deg', 20633), ('rich_1deg_2', 20733), ('remainder', 20634)]
+    [('rich_1deg', 20643), ('rich_1deg_2', 20743), ('remainder', 20644)]
     """
     return [replace(one, name=one.name + (f"_{k + 1}" if k else ""), seed=one.seed + LATER * k)
             for one in chosen for k in range(1 if one.mix else count)]

@@ -173,8 +173,7 @@ def test_real_tanks_run_over(recordings_folder: Path) -> None:
         *read_effects("hydraulics"))
     dx = pk.diagnose(model, train, held_out)
     assert dx.verdict == "partial" and "overflow" in [p.family for p in dx.present]
-    assert dx.proof is not None
-    error = dx.proof.outputs["h"]
+    error = dx.held_out.outputs["h"]
     assert error.before > 0.65 and error.after < 0.30
 
 
