@@ -102,3 +102,10 @@ def test_npz_lengths(tmp_path: Path) -> None:
     assert rec.names == ("y",)
     with pytest.raises(BadRecording, match="'z' has 3 values but its time column has 5"):
         Recording.read(tmp_path / "run.npz", columns={"t": "clock", "z": "z"})
+
+
+@pytest.mark.parametrize(("written", "unit"), [
+    ("Nm", "N*m"), ("U/min", "rpm"), ("Grad", "deg"), ("m s-2", "m/s^2"), ("Volts", "V")])
+def test_units_as_benches_write_them(tmp_path: Path, written: str, unit: str) -> None:
+    (tmp_path / "run.csv").write_text(f"t,y [{written}]\n0,1\n1,2\n")
+    assert Recording.read(tmp_path / "run.csv")["y"].converted(unit).values.tolist() == [1.0, 2.0]

@@ -64,6 +64,48 @@ def no_vectors(where: str) -> str:
     return f"'{where}' holds no numeric vector of two or more values."
 
 
+def no_signals(where: str) -> str:
+    return f"'{where}' holds no signals: no channel in it has samples."
+
+
+def damaged_signal(where: str, path: str) -> str:
+    return (f"'{where}': the samples of '{path}' cannot be read: they are damaged, or of a kind "
+            "that is none of numbers.")
+
+
+def no_number_signal(where: str, path: str) -> str:
+    return f"'{where}': '{path}' holds text or bytes, not numbers."
+
+
+def too_much_at_once(where: str, most: int, known: Sequence[str]) -> str:
+    return (f"'{where}' holds more than {most / 2**20:.4g} MiB of samples: name those that you "
+            "need (--column NAME=CHANNEL, in Python columns={'name in the model': 'its name'}); it "
+            f"has: {listed(known)}.")
+
+
+def several_columns(where: str, wanted: str, names: Sequence[str]) -> str:
+    return (f"'{where}': '{wanted}' fits several channels: {listed(names)}; give one of these "
+            "names, or a pattern that fits one.")
+
+
+def note_cut_off(where: str) -> str:
+    return f"'{where}' is cut off: its last samples are missing."
+
+
+def note_other_stamps(seconds: float) -> str:
+    return (f"Stamps of messages are of another clock than the recorder's: {seconds:.9g} s were "
+            "added to them.")
+
+
+def note_two_clocks(topics: Sequence[str]) -> str:
+    return ("Messages without a stamp are on the recorder's clock, which counts delays in: "
+            f"{listed(topics)}.")
+
+
+def too_slow(where: str, kind: str) -> str:
+    return f"'{where}' takes too long to read as {kind}: it is damaged, or far too large."
+
+
 def too_many_cells(where: str, most: int) -> str:
     return f"'{where}' holds more than {most} cells: save what you need as CSV or Parquet."
 

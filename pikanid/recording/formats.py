@@ -26,6 +26,7 @@ class Format:
         recognised: Whether bytes are of this format; None for text, which nothing tells.
         written: Endings under which recordings can be written.
         packed: Whether a file may be gzipped, with another ending ``.gz``.
+        members: Endings of the files in a folder that stands for one file of this format.
     """
 
     title: str
@@ -35,6 +36,7 @@ class Format:
     recognised: Callable[[bytes], bool] | None = None
     written: tuple[str, ...] = ()
     packed: bool = False
+    members: tuple[str, ...] = ()
 
 
 def _starts(*marks: bytes) -> Callable[[bytes], bool]:
@@ -64,13 +66,21 @@ FORMATS = (
            _starts(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")),
     Format("Parquet", "a Parquet file", (".parquet", ".pq"), "parquet", _starts(b"PAR1"),
            written=(".parquet", ".pq")),
+    Format("MDF", "an MDF file", (".mf4", ".mdf", ".mf3"), "mdf",
+           _starts(b"MDF     ", b"UnFinMF ")),
+    Format("ROS bag", "a bag of ROS 1", (".bag",), "ros", _starts(b"#ROSBAG V")),
+    Format("ROS bag", "a bag of ROS 2 (MCAP)", (".mcap",), "ros", _starts(b"\x89MCAP0\r\n"),
+           members=(".mcap", ".mcap.zstd")),
+    Format("ROS bag", "a bag of ROS 2 (SQLite)", (".db3",), "ros", _starts(b"SQLite format 3\0"),
+           members=(".db3", ".db3.zstd")),
+    Format("TDMS", "a TDMS file", (".tdms",), "tdms", _starts(b"TDSm")),
+    Format("HDF5", "an HDF5 file", (".h5", ".hdf5", ".hdf", ".nc"), "hdf5", _starts(HDF5)),
     Format("MAT", "a MAT file", (".mat",), "mat", _matlab),
     Format("NPZ", "an NPZ archive", (".npz",), "npz", _arrays),
 )
 GZIPPED = Format("gzip", "gzip-compressed", (), "", _starts(b"\x1f\x8b"))
 # What else is told apart, to say what a file is.
-_KNOWN = (GZIPPED, Format("HDF5", "an HDF5 file", (), "", _starts(HDF5)), *FORMATS,
-          Format("ZIP", "a ZIP archive", (), "", _starts(ZIP)))
+_KNOWN = (GZIPPED, *FORMATS, Format("ZIP", "a ZIP archive", (), "", _starts(ZIP)))
 
 
 def by_ending(name: str) -> Format | None:
@@ -102,7 +112,7 @@ def readable() -> str:
     """The formats that can be read, for people.
 
     >>> readable()
-    'CSV, Excel, Parquet, MAT or NPZ'
+    'CSV, Excel, Parquet, MDF, ROS bag, TDMS, HDF5, MAT or NPZ'
     """
     *most, last = dict.fromkeys(f.title for f in FORMATS)
     return f"{', '.join(most)} or {last}"

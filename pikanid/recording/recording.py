@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
@@ -36,6 +36,7 @@ class Recording(Leaving):
         notes: What reading or preparing it left out or changed, one sentence each.
         unreadable: Columns of the file that could not be used, and why; asking for one of them
             raises that sentence.
+        began: POSIX time [s] of t = 0, where the file tells it.
 
     >>> rec = Recording.from_arrays([0.0, 0.1, 0.2], {"theta": [0.0, 1.0, 0.5]}, {"theta": "deg"})
     >>> rec["theta"].unit, rec.names, rec.stop
@@ -46,6 +47,7 @@ class Recording(Leaving):
     name: str = "recording"
     notes: tuple[str, ...] = ()
     unreadable: Mapping[str, str] = field(default_factory=dict)
+    began: float | None = None
 
     def __post_init__(self) -> None:
         given: object = self.channels
@@ -132,7 +134,8 @@ class Recording(Leaving):
             raise errors.BadRecording(errors.no_recording(type(frame).__name__))
         request = made_of.Request(columns or {}, None, units or {})
         found = made_of.channels(frames.read(frame, name), request, name)
-        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable)
+        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
+                  found.began)
         return rec.with_sigma(sigma) if sigma else rec
 
     @classmethod
@@ -140,14 +143,15 @@ class Recording(Leaving):
              rate: float | None = None, sheet: str | int | None = None,
              units: Mapping[str, str] | None = None, sigma: Mapping[str, ArrayLike] | None = None,
              delimiter: str | None = None, decimal: str | None = None,
-             name: str | None = None) -> Recording:
+             name: str | None = None, also: Iterable[str] = ()) -> Recording:
         """Read a file of a format in `pikanid.recording.formats`: CSV, Excel, Parquet, ...
 
         Args:
             path: The file; its kind is known by its ending, checked against its content.
             columns: Channel name -> column in the file; ``"t"`` (or ``"time"``) names the time
-                column.  A column may be given by its header with or without unit, or by its
-                number counted from 1 where the file has no header.
+                column.  A column may be given by its header with or without unit, by its number
+                counted from 1 where the file has no header, by its whole path in a file with
+                groups or topics, or by a pattern (``"*/theta"``) that fits one.
             rate: Sampling rate [Hz] of a file without a time column.
             sheet: Excel sheet by name or number counted from 0; the first by default.
             units: Channel name -> unit, in place of what the header says (``"t"`` for time).
@@ -155,6 +159,8 @@ class Recording(Leaving):
             delimiter: Of a CSV; found out by default.
             decimal: Decimal sign of a CSV, ``"."`` or ``","``; found out by default.
             name: Of the recording; the file's stem by default.
+            also: Channels that are wanted beside those of `columns` where the file has them, under
+                their own names; a table is read as a whole, of other files only what is named.
 
         Raises:
             BadRecording: With one sentence that says what is wrong, and in which row.
@@ -168,9 +174,9 @@ class Recording(Leaving):
         """
         from pikanid.recording import reading
 
-        found = reading.read(path, columns, rate, sheet, units, delimiter, decimal)
+        found = reading.read(path, columns, rate, sheet, units, delimiter, decimal, also)
         rec = cls({ch.name: ch for ch in found.channels}, name or found.stem, found.notes,
-                  found.unreadable)
+                  found.unreadable, found.began)
         return rec.with_sigma(sigma) if sigma else rec
 
     @classmethod
@@ -223,7 +229,8 @@ class Recording(Leaving):
 
     def __reduce__(self) -> tuple[type[Recording], tuple[object, ...]]:
         # A read-only mapping cannot be sent to another process; what it shows can.
-        return Recording, (dict(self.channels), self.name, self.notes, dict(self.unreadable))
+        return Recording, (dict(self.channels), self.name, self.notes, dict(self.unreadable),
+                           self.began)
 
     @property
     def t(self) -> Array:

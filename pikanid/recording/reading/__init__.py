@@ -7,12 +7,13 @@ channels of the table.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
 from pikanid.recording.channel import Channel
+from pikanid.recording.formats import Format
 from pikanid.recording.reading.columns import Request, channels
 from pikanid.recording.reading.door import opened
 from pikanid.recording.reading.table import Options, Table
@@ -22,18 +23,19 @@ __all__ = ["Found", "read"]
 
 @dataclass(frozen=True)
 class Found:
-    """What a file holds: channels, notes, unusable columns, and the stem of its name."""
+    """What a file holds: channels, notes, unusable columns, when t = 0 was, its name's stem."""
 
     channels: tuple[Channel, ...]
     notes: tuple[str, ...]
     unreadable: Mapping[str, str]
+    began: float | None
     stem: str
 
 
 def read(path: str | os.PathLike[str], columns: Mapping[str, str | int] | None = None,
          rate: float | None = None, sheet: str | int | None = None,
          units: Mapping[str, str] | None = None, delimiter: str | None = None,
-         decimal: str | None = None) -> Found:
+         decimal: str | None = None, also: Iterable[str] = ()) -> Found:
     """Read a file; the arguments are those of `Recording.read`.
 
     Raises:
@@ -43,7 +45,13 @@ def read(path: str | os.PathLike[str], columns: Mapping[str, str | int] | None =
     """
     found, content, stem = opened(path)
     where = Path(path).name
-    reader = import_module(f"pikanid.recording.reading.{found.file}")
-    table: Table = reader.read(content, where, Options(sheet, delimiter, decimal))
-    result = channels(table, Request(columns or {}, rate, units or {}), where)
-    return Found(result.channels, result.notes, result.unreadable, stem)
+    request = Request(columns or {}, rate, units or {}, tuple(also))
+    table = _reader(found)(content, where, Options(sheet, delimiter, decimal, request.wanted))
+    result = channels(table, request, where)
+    return Found(result.channels, result.notes, result.unreadable, result.began, stem)
+
+
+def _reader(found: Format) -> Callable[[bytes, str, Options], Table]:
+    read: Callable[[bytes, str, Options], Table] = import_module(
+        f"pikanid.recording.reading.{found.file}").read
+    return read

@@ -11,29 +11,41 @@ from pikanid import errors
 from pikanid.formula import units
 from pikanid.recording.channel import LARGEST, Array, Channel
 from pikanid.recording.reading.headers import Named, find, named
+from pikanid.recording.reading.signals import TIME_NAMES
 from pikanid.recording.reading.table import Table
 
-_TIME_NAMES = ("t", "time", "times", "timestamp", "timestamps", "zeit")
 OWN_TIME = "t:"  # "t:theta" holds the times of theta alone
 OWN_SIGMA = "sigma:"  # "sigma:theta" holds its noise sample by sample
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the caller says about the columns: mapping, sampling rate [Hz], units."""
+    """What the caller says about the columns: mapping, sampling rate [Hz], units, and signals that
+    are wanted under their own names where the file has them.
+    """
 
     columns: Mapping[str, str | int]
     rate: float | None
     units: Mapping[str, str]
+    also: tuple[str, ...] = ()
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """Names and patterns of all that is asked for; empty if that is everything."""
+        if not self.columns:
+            return ()
+        return (*map(str, self.columns.values()), *self.also,
+                *(f"{mark}{name}" for mark in (OWN_TIME, OWN_SIGMA) for name in self.also))
 
 
 @dataclass(frozen=True)
 class Result:
-    """Channels, notes on the file, and why some of its columns are unusable."""
+    """Channels, notes on the file, why some of its columns are unusable, and when t = 0 was."""
 
     channels: tuple[Channel, ...]
     notes: tuple[str, ...]
     unreadable: Mapping[str, str]
+    began: float | None
 
 
 def channels(table: Table, request: Request, where: str) -> Result:
@@ -53,15 +65,17 @@ def channels(table: Table, request: Request, where: str) -> Result:
     clock = mapped.pop("t", None) or mapped.pop("time", None)
     bases = _TimeBases(table, request, where, available, clock)
     signals = [(key, found, True) for key, found in mapped.items()]
-    if table.shared_time or not request.columns:
-        # Variables of a workspace are unrelated: a mapping then names all that are wanted.
+    # Variables of a workspace are unrelated: a mapping then names all that are wanted.
+    every = table.shared_time or not request.columns
+    if every or request.also:
         taken = [*mapped.values(), *bases.clocks()]
         signals += [
             (found.name, found, False)
             for found in available
             if found not in taken
+            and (every or found.name in request.also)
             and found.name not in mapped
-            and found.name.casefold() not in _TIME_NAMES
+            and found.name.casefold() not in TIME_NAMES
             and not found.name.startswith((OWN_TIME, OWN_SIGMA))
         ]
     made: list[Channel] = []
@@ -85,7 +99,7 @@ def channels(table: Table, request: Request, where: str) -> Result:
         raise errors.BadRecording(
             errors.missing_channel(where, key, [channel.name for channel in made]))
     notes = tuple(f"Column '{key}' is left out: {why}" for key, why in unreadable.items())
-    return Result(tuple(made), notes, unreadable)
+    return Result(tuple(made), (*table.notes, *notes), unreadable, bases.began())
 
 
 def _defect(table: Table, where: str, found: Named) -> str:
@@ -132,6 +146,11 @@ class _TimeBases:
             [self.mapped] if self.mapped else []
         )
 
+    def began(self) -> float | None:
+        """POSIX time of t = 0: of the file, or of the dates that all of its clocks are."""
+        starts = {clock.column.began for clock in self.clocks()}
+        return starts.pop() if self.table.began is None and len(starts) == 1 else self.table.began
+
     def times(self, found: Named) -> tuple[Array | None, str, bool]:
         """(times [s], "", False), or None, what is wrong, and whether there simply are none."""
         source = self._source(found)
@@ -158,7 +177,7 @@ class _TimeBases:
         for other in self.available:
             if found.column.time is not None and other.column.header == found.column.time:
                 return other
-        for name in _TIME_NAMES:
+        for name in TIME_NAMES:
             for other in self.available:
                 if other.name.casefold() == name and other is not found and self._fits(other, n):
                     return other

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import os
+import zipfile
+from functools import partial
 from pathlib import Path
 
 from pikanid import errors
-from pikanid.recording.formats import GZIPPED, ZIP, Format, by_content, by_ending, read_endings
+from pikanid.recording.formats import (
+    FORMATS,
+    GZIPPED,
+    ZIP,
+    Format,
+    by_content,
+    by_ending,
+    read_endings,
+)
 from pikanid.storage.limits import file_bytes, gunzipped, unpacked_size
 
 
@@ -14,8 +25,8 @@ def opened(path: str | os.PathLike[str]) -> tuple[Format, bytes, str]:
     """The format of a file, its bytes (unpacked if gzipped text) and its stem.
 
     Raises:
-        BadRecording: If it is missing, a directory, empty, unreadable, of unknown ending, or
-            something else than its ending says.
+        BadRecording: If it is missing, a folder that is no bag, empty, unreadable, of unknown
+            ending, or something else than its ending says.
     """
     if not isinstance(path, str | os.PathLike):
         raise errors.BadRecording(errors.no_path(type(path).__name__))
@@ -28,11 +39,11 @@ def opened(path: str | os.PathLike[str]) -> tuple[Format, bytes, str]:
     if missing:
         raise errors.BadRecording(errors.no_file(str(path)))
     if folder:
-        raise errors.BadRecording(errors.is_folder(str(path)))
+        return _gathered(file, str(path))
     told = by_ending(where)
     if told is None:
         raise errors.BadRecording(errors.unknown_ending(where, read_endings()))
-    content = file_bytes(file, lambda why: errors.BadRecording(errors.cannot_open(where, why)))
+    content = file_bytes(file, partial(_closed, where))
     if content and told.packed and by_content(content) is GZIPPED:
         content = gunzipped(content, lambda why: errors.BadRecording(
             errors.cannot_unpack(where, why)))
@@ -43,6 +54,25 @@ def opened(path: str | os.PathLike[str]) -> tuple[Format, bytes, str]:
         unpacked_size(content, lambda why: errors.BadRecording(errors.cannot_unpack(where, why)))
     stem = Path(file.stem).stem if file.suffix.lower() == ".gz" else file.stem
     return found, content, stem or where
+
+
+def _gathered(folder: Path, shown: str) -> tuple[Format, bytes, str]:
+    """The format that keeps its files in a folder, these files as one archive, and its name."""
+    for found in FORMATS:
+        names = sorted(p.name for p in folder.iterdir() if found.members
+                       and p.name.lower().endswith(found.members))
+        if not names:
+            continue
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w") as archive:  # stored: nothing is compressed
+            for name in names:
+                archive.writestr(name, file_bytes(folder / name, partial(_closed, name)))
+        return found, packed.getvalue(), folder.name or folder.resolve().name
+    raise errors.BadRecording(errors.is_folder(shown))
+
+
+def _closed(where: str, why: str) -> errors.BadRecording:
+    return errors.BadRecording(errors.cannot_open(where, why))
 
 
 def _checked(told: Format, content: bytes, where: str) -> Format:

@@ -8,12 +8,11 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.recording.reading.headers import named
+from pikanid.recording.reading.signals import TIME_NAMES
 from pikanid.recording.reading.table import Column, Table, from_cells
 
 if TYPE_CHECKING:
     import pandas as pd
-
-TIMES = ("t", "time", "times", "timestamp", "timestamps", "zeit")
 
 
 def read(frame: pd.DataFrame, where: str) -> Table:
@@ -29,12 +28,12 @@ def read(frame: pd.DataFrame, where: str) -> Table:
     if not len(frame):
         raise errors.BadRecording(errors.no_rows(where))
     columns = [_column(str(name), frame.iloc[:, k], where) for k, name in enumerate(frame.columns)]
-    clocked = any(n.name.casefold() in TIMES for n in named(columns, where))
+    clocked = any(n.name.casefold() in TIME_NAMES for n in named(columns, where))
     index = frame.index
     if not clocked and (index.name is not None or not isinstance(index, pd.RangeIndex)):
         header = str(index.name or "t")
         times = _column(header, pd.Series(index), where)
-        columns.insert(0, times if named([times], where)[0].name.casefold() in TIMES
+        columns.insert(0, times if named([times], where)[0].name.casefold() in TIME_NAMES
                        else _column("t", pd.Series(index), where))
     return Table(tuple(columns))
 

@@ -10,11 +10,20 @@ from dataclasses import dataclass
 
 from pikanid import errors
 from pikanid.formula import units
+from pikanid.recording.reading.signals import asked
 from pikanid.recording.reading.table import Column
 
 # "theta [deg]" or "theta (deg)"; the unit itself may hold one pair of parentheses.
 _HEADER = re.compile(
     r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>(?:[^()]|\([^()]*\))*)\))")
+
+# What test benches write and units are not called, or where it would be read as another one: "Grad"
+# as a thousand million radians, "Nm" as something that is no torque.
+_BENCH = {"Nm": "N*m", "mNm": "mN*m", "kNm": "kN*m", "Ncm": "N*cm", "Nms": "N*m*s", "U/min": "rpm",
+          "RPM": "rpm", "Rpm": "rpm", "Grad": "deg", "Deg": "deg", "Degrees": "deg",
+          "Deg C": "degC", "deg C": "degC", "DegC": "degC", "Celsius": "degC", "Volt": "V",
+          "Volts": "V", "Amp": "A", "Amps": "A", "Ampere": "A", "Newton": "N", "Meter": "m",
+          "Ohm": "ohm", "Ohms": "ohm", "Sec": "s", "Seconds": "s", "Hertz": "Hz", "none": ""}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +43,7 @@ def named(columns: Iterable[Column], where: str) -> list[Named]:
     Raises:
         BadRecording: If two headers are the same.
     """
-    split = [(*_split(column.header, k + 1), column) for k, column in enumerate(columns)]
+    split = [(*_split(column, k + 1), column) for k, column in enumerate(columns)]
     whole = Counter(column.header for *_, column in split if column.header)
     for header, count in whole.items():
         if count > 1:
@@ -48,27 +57,41 @@ def named(columns: Iterable[Column], where: str) -> list[Named]:
 
 
 def find(wanted: str, available: list[Named], where: str) -> Named:
-    """The column with this header, written with or without its unit.
+    """The column with this header, with or without its unit, or the one that a pattern fits.
 
     Raises:
-        BadRecording: If there is none; the message lists those that there are.
+        BadRecording: If there is none, or several; the message lists those that there are.
     """
     for found in available:
-        if wanted in (found.column.header, found.name):
+        if wanted in (found.column.header, found.name, found.column.path):
             return found
+    fits = [found for found in available
+            if asked(wanted, found.name, found.column.header, found.column.path)]
+    if len(fits) > 1:
+        raise errors.BadRecording(errors.several_columns(
+            where, wanted, [found.column.path or found.column.header for found in fits]))
+    if fits:
+        return fits[0]
     headers = [found.column.header or found.name for found in available]
     close = difflib.get_close_matches(wanted, headers, n=1, cutoff=0.5)
     raise errors.BadRecording(errors.missing_channel(where, wanted, headers, close))
 
 
-def _split(header: str, number: int) -> tuple[str, str]:
-    match = _HEADER.fullmatch(header.strip())
+def _split(column: Column, number: int) -> tuple[str, str]:
+    header = column.header.strip()
+    match = _HEADER.fullmatch(header)
     if match is None:
-        return header.strip() or f"column {number}", ""
+        return header or f"column {number}", ""
     unit = (match["square"] if match["square"] is not None else match["round"]).strip()
+    # "force[0]" is an element of an array where names are more than the heads of a table
+    if column.path and (column.unit is not None or unit.isdecimal() or not units.is_unit(unit)):
+        return header, ""
     return match["name"].strip(), _normal(unit)
 
 
 def _normal(unit: str) -> str:
-    # An unknown unit matters only once the channel is used: the model may not need it.
-    return units.parse(unit) if units.is_unit(unit) else units.Unread(unit)
+    """The unit of a header; an unknown one matters only once its channel is used, if at all."""
+    text = _BENCH.get(unit.strip(), unit)
+    if not units.is_unit(text):
+        text = re.sub(r"(?<=[A-Za-z])(-?\d+)", r"^\1", text)  # "m s-2", as CF conventions have it
+    return units.parse(text) if units.is_unit(text) else units.Unread(unit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from numbers import Real
 from typing import Any
 
@@ -26,11 +26,15 @@ class Options:
         sheet: By name, or number counted from 0; the first if None.
         delimiter: One character; found out if None.
         decimal: ``"."`` or ``","``; found out if None.
+        wanted: Names, whole names or patterns of the signals that are asked for; all if empty.
+        listed: Whether only names, units, times and numbers of samples are asked for.
     """
 
     sheet: str | int | None = None
     delimiter: str | None = None
     decimal: str | None = None
+    wanted: tuple[str, ...] = ()
+    listed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,9 @@ class Column:
         unit: Where the format itself carries one (Parquet metadata); None: look in the header.
         time: Header of the column that holds its times, where the file's structure says so.
         sigma, hold: Where the format itself carries them.
+        is_clock: Whether it holds times in seconds, whatever its header says.
+        path: Its whole name, where the header is the short one of a channel in a group.
+        began: POSIX time [s] of the zero of a clock that was made of dates.
     """
 
     header: str
@@ -56,6 +63,8 @@ class Column:
     sigma: float | None = None
     hold: str | None = None
     is_clock: bool = False
+    path: str = ""
+    began: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +76,15 @@ class Table:
         rows: Number of each row as an editor shows it, or None where there are none to see
             (MAT, NPZ), and messages count samples instead.
         shared_time: Whether all columns are rows of one table, sharing one time base.
+        began: POSIX time [s] of t = 0, where the file as a whole tells.
+        notes: What the reader had to decide.
     """
 
     columns: tuple[Column, ...]
     rows: Sequence[int] | None = None
     shared_time: bool = True
+    began: float | None = None
+    notes: tuple[str, ...] = ()
 
     def place(self, k: int) -> str:
         """How to call the k-th data row in a message."""
@@ -121,9 +134,10 @@ def from_cells(where: str, header: str, cells: Sequence[object], rows: Sequence[
     quick = _quick(cells, decimal)
     if quick is not None:
         return Column(header, quick)
-    clock = _clock(cells)
-    if clock is not None:
-        return Column(header, clock, unit="s", is_clock=True)
+    stamps = _stamps(cells)
+    if stamps is not None:
+        seconds = np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])
+        return Column(header, seconds, unit="s", is_clock=True, began=posix(stamps[0]))
     parsed = [_number(cell, decimal) for cell in cells]
     bad = [k for k, value in enumerate(parsed) if value is None]
     values = np.array([np.nan if value is None else value for value in parsed])
@@ -175,8 +189,8 @@ def _number(cell: object, decimal: str = ".") -> float | None:
         return None
 
 
-def _clock(cells: Sequence[object]) -> Array | None:
-    """Seconds since the first of a column of dates, None if it is not one."""
+def _stamps(cells: Sequence[object]) -> list[datetime] | None:
+    """The dates in a column, None if it is not one of dates."""
     stamps: list[datetime] = []
     for cell in cells:
         try:
@@ -186,6 +200,13 @@ def _clock(cells: Sequence[object]) -> Array | None:
         if not isinstance(stamp, datetime):
             return None
         stamps.append(stamp)
-    if len({stamp.tzinfo is None for stamp in stamps}) != 1:
-        return None
-    return np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])
+    return stamps if len({stamp.tzinfo is None for stamp in stamps}) == 1 else None
+
+
+def posix(stamp: datetime) -> float:
+    """POSIX time [s] of a date; one without a time zone counts as UTC.
+
+    >>> posix(datetime(1970, 1, 2))
+    86400.0
+    """
+    return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()

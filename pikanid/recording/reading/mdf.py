@@ -1,0 +1,122 @@
+"""Measurement data of ASAM (MDF 3 and 4, asammdf), channel by channel on the clock of its group.
+
+A channel group has a master channel, the times of its samples [s], counted from the start of the
+measurement.  Formulas that a file gives to turn counts into physical values are read by the
+whitelist of `pikanid.formula`, never evaluated as code.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.recording.channel import Array
+from pikanid.recording.formats import called
+from pikanid.recording.reading import foreign
+from pikanid.recording.reading.signals import Clock, Contents, Signal
+from pikanid.recording.reading.table import Options, Table
+
+# What formulas of conversions are made of.
+_KNOWN = {"X", "X1", "P1", "P2", "P3", "P4", "P5", "P6", "P7"}
+_TIME = (0, 1)  # definition: kinds of master channels that hold times, of the MDF 4 format
+_NUMBERS = range(6)  # definition: types of data that are numbers, of the MDF 4 format
+
+
+def read(content: bytes, where: str, options: Options) -> Table:
+    """The channels of a measurement.
+
+    Raises:
+        BadRecording: If the file is damaged or holds no channels.
+        BadSetting: If asammdf is not installed.
+    """
+    return foreign.table("mdf", "asammdf", "mdf", called(".mf4"), content, where, options)
+
+
+def contents(content: bytes, where: str) -> Contents:
+    """Every channel of every group."""
+    from asammdf import MDF
+    from asammdf.blocks import v2_v3_blocks, v4_blocks
+
+    # asammdf has numexpr evaluate the text of a formula and, where that fails, SymPy.  This process
+    # reads one file and ends: here neither is asked.
+    for module in (v2_v3_blocks, v4_blocks):
+        module.__dict__.update(evaluate=_formula, lambdify=_refused)
+    # A file by name: what a logger that lost its power left is finished in a copy of it.
+    path = Path("measurement.mf4")
+    path.write_bytes(content)
+    measurement: Any = MDF  # which passes arguments on that its annotations leave out
+    file = measurement(path, process_bus_logging=False)
+    began = file.header.start_time.timestamp()
+    return Contents([s for k in range(len(file.groups)) for s in _group(file, k, where)],
+                    began if began > 0 else None)
+
+
+def _group(file: Any, k: int, where: str) -> Iterator[Signal]:
+    group = file.groups[k]
+    master = file.masters_db.get(k)
+    count = int(group.channel_group.cycles_nr)
+    label = _label(file, k)
+    clock = None
+    if master is not None and _measures_time(group.channels[master]):
+        clock = Clock(f"{label}/{group.channels[master].name or 'time'}",
+                      lambda: np.array(file.get_master(k), float), count)
+    for index, channel in enumerate(group.channels):
+        if index == master:
+            continue
+        name = str(channel.name)
+        is_number = getattr(channel, "data_type", 0) in _NUMBERS
+        yield Signal(f"{label}/{name}", name, count, _samples(file, k, index),
+                     str(file.get_channel_unit(group=k, index=index)).strip() or None, clock,
+                     "" if is_number else errors.no_number_signal(where, f"{label}/{name}"))
+
+
+def _label(file: Any, k: int) -> str:
+    """What the file calls a group, or its number."""
+    group = file.groups[k].channel_group
+    source = getattr(group, "acq_source", None)
+    given = str(getattr(group, "acq_name", "") or getattr(source, "name", "") or "").strip()
+    known = [str(getattr(g.channel_group, "acq_name", "") or "").strip() for g in file.groups]
+    return given if given and known.count(given) <= 1 else f"{given or 'group'} {k + 1}"
+
+
+def _measures_time(channel: Any) -> bool:
+    # a measurement may run over an angle or a distance; MDF 3 knows times only
+    return getattr(channel, "sync_type", 1) in _TIME
+
+
+def _samples(file: Any, group: int, index: int) -> Callable[[], Array]:
+    def load() -> Array:
+        found = file.get(group=group, index=index, ignore_invalidation_bits=True)
+        values = np.asarray(found.samples)
+        if values.dtype.kind not in "fiub":  # numbers that stand for texts: the numbers
+            found = file.get(group=group, index=index, raw=True, ignore_invalidation_bits=True)
+            values = np.asarray(found.samples)
+        values = values.astype(float)
+        if found.invalidation_bits is not None:
+            values[np.asarray(found.invalidation_bits, bool)] = np.nan
+        return values
+
+    return load
+
+
+def _formula(text: str) -> Array:
+    """What asammdf asks numexpr for: the value of a text, at the variables of its caller."""
+    import sympy as sp
+
+    from pikanid.formula.expressions import parse, symbol
+
+    known = sys._getframe(1).f_locals
+    names = sorted(_KNOWN & known.keys())
+    expression = parse(text, names, "a conversion formula")
+    value = sp.lambdify([symbol(n) for n in names], expression, "numpy")(*(
+        np.asarray(known[n], float) for n in names))
+    return np.broadcast_to(np.asarray(value, float), np.shape(known["X"]))
+
+
+def _refused(*_: object, **__: object) -> None:
+    raise ValueError("a formula outside the grammar")

@@ -1,0 +1,95 @@
+"""What a file with channels of its own holds: signals with names, units and clocks, read on demand.
+
+A file of a test bench holds thousands of channels, of which a few are wanted: a reader lists them
+all and fetches the samples of those that are asked for.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from pikanid.recording.channel import Array
+
+TIME_NAMES = ("t", "time", "times", "timestamp", "timestamps", "zeit")
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Sample times that signals share.
+
+    Attributes:
+        path: Where the file has them.
+        load: Makes the (N,) times [s].
+        count: N.
+    """
+
+    path: str
+    load: Callable[[], Array]
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One signal.
+
+    Attributes:
+        path: Its whole name, such as ``"Rig/theta"``; two signals of one file may share it.
+        name: Its short name, used where no other signal of the file has it.
+        count: Number of samples.
+        load: Makes the (count,) samples; any failure is one of this signal alone.
+        unit: As the file says it; None if it says none.
+        clock: Its times; None if the file has none.
+        defect: Why it is no signal of numbers, "" if it is one.
+    """
+
+    path: str
+    name: str
+    count: int
+    load: Callable[[], Array]
+    unit: str | None = None
+    clock: Clock | None = None
+    defect: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """The signals of a file, and when its time 0 was.
+
+    Attributes:
+        signals: In the order of the file.
+        began: POSIX time [s] of t = 0; None if the file does not tell.
+        notes: What the reader had to decide, one sentence each.
+    """
+
+    signals: Sequence[Signal]
+    began: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+def asked(text: str, *names: str) -> bool:
+    """Whether a text is one of the names of a signal, or a pattern that fits one of them.
+
+    >>> asked("Rig/*", "Rig/theta", "theta"), asked("x[0]", "x[0]"), asked("phi", "theta")
+    (True, True, False)
+    """
+    return text in names or any(fnmatchcase(name, text) for name in names)
+
+
+def distinct(signals: Sequence[Signal]) -> list[tuple[str, str]]:
+    """(path, name) of every signal, no two of them alike.
+
+    >>> one, two = (Signal(f"{g}/y", "y", 0, lambda: None) for g in "ab")
+    >>> distinct([one, two]), distinct([one])
+    ([('a/y', 'a/y'), ('b/y', 'b/y')], [('a/y', 'y')])
+    """
+    seen: Counter[str] = Counter()
+    paths = []
+    for signal in signals:
+        seen[signal.path] += 1
+        paths.append(signal.path if seen[signal.path] == 1
+                     else f"{signal.path} ({seen[signal.path]})")
+    short = Counter(signal.name for signal in signals)
+    return [(path, signal.name if short[signal.name] == 1 else path)
+            for path, signal in zip(paths, signals, strict=True)]
