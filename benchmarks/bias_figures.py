@@ -9,7 +9,7 @@ import numpy as np
 from bias_descent import Stop
 from bias_grid import GRIDS, SHOWN_GRID, Series, physics_residual, switches
 
-from pikanid.estimate.plots import COLOURS, MEASURED, new_figure, tidy
+from pikanid.figures import COLOURS, MEASURED, new_figure, tidy
 from pikanid.strategies.ipda import PAPER_LAMBDA
 from pikanid.strategies.kan_paper import STAGES
 from pikanid.uncertainty import cramer_rao

@@ -28,7 +28,7 @@ from bias_grid import (
 from bias_table2 import COLUMNS, HEADERS, PUBLISHED, choices, estimate
 from provenance import provenance
 
-from pikanid.estimate.plots import save_figure
+from pikanid.figures import save_figure
 from pikanid.reporting.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.strategies.kan_paper import COLLOCATION, STAGES

@@ -30,7 +30,7 @@ import numpy as np
 from provenance import provenance
 
 from pikanid.errors import DatasetUnavailable
-from pikanid.estimate.plots import new_figure, save_figure
+from pikanid.figures import new_figure, save_figure
 from pikanid.storage.outputs import atomically
 from pikanid.validation.concealed.generate import generate
 from pikanid.validation.concealed.score import Score, Share, judge, reliability, tally

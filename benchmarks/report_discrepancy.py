@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from provenance import provenance
 
 from pikanid.discrepancy.api import GRID
-from pikanid.estimate.plots import new_figure, save_figure, tidy
+from pikanid.figures import new_figure, save_figure, tidy
 from pikanid.reporting.sheet import Sheet
 from pikanid.storage.outputs import atomically
 

@@ -33,7 +33,7 @@ from symbolic_friction import NAMES, run_friction
 from symbolic_networks import INPUTS, NETWORKS, NOISE, data, run_network, run_pykan_network, train
 from symbolic_store import collected as collected_or_stored
 
-from pikanid.estimate.plots import new_figure, save_figure, tidy
+from pikanid.figures import new_figure, save_figure, tidy
 from pikanid.reporting.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.symbolic import extract

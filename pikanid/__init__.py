@@ -18,6 +18,7 @@ from pikanid.storage.version import __version__
 
 if TYPE_CHECKING:
     from pikanid import symbolic, uncertainty
+    from pikanid.comparison import Validation, validate
     from pikanid.discrepancy import kan_discrepancy
     from pikanid.estimate import Estimate
     from pikanid.mismatch.design.confusable import confusable
@@ -45,6 +46,8 @@ _HOMES = {
     "Channel": "pikanid.recording",
     "Estimate": "pikanid.estimate",
     **dict.fromkeys(strategies.__all__, "pikanid.strategies"),
+    "validate": "pikanid.comparison",
+    "Validation": "pikanid.comparison",
     "kan_discrepancy": "pikanid.discrepancy",
     "diagnose": "pikanid.mismatch.diagnose",
     "Diagnosis": "pikanid.mismatch.report.diagnosis",
@@ -75,6 +78,8 @@ __all__ = [
     "Recording",
     "Channel",
     "Estimate",
+    "validate",
+    "Validation",
     "kan_discrepancy",
     "diagnose",
     "Diagnosis",

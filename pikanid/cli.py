@@ -40,6 +40,8 @@ from pikanid.commands.simulate import EXAMPLES as SIMULATE
 from pikanid.commands.simulate import simulate
 from pikanid.commands.study import EXAMPLES as STUDY
 from pikanid.commands.study import study
+from pikanid.commands.validate import EXAMPLES as VALIDATE
+from pikanid.commands.validate import validate
 
 EXIT_UNFORESEEN = 70  # definition: EX_SOFTWARE of sysexits.h
 EXIT_INTERRUPTED = 130  # definition: 128 + SIGINT, as shells have it
@@ -62,6 +64,7 @@ app = typer.Typer(
     name="pikanid", add_completion=False, rich_markup_mode="rich",
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
 app.command(epilog=IDENTIFY)(identify)
+app.command(epilog=VALIDATE)(validate)
 app.command(epilog=DIAGNOSE)(diagnose)
 app.command(epilog=EFFECTS)(effects)
 app.command(epilog=CONFUSABLE)(confusable)

@@ -12,7 +12,8 @@ import pytest
 
 from pikanid import errors
 from pikanid.estimate.data import Fit
-from pikanid.estimate.plots import ENDINGS, image, plot_fits, plot_strategies, save_figure
+from pikanid.estimate.plots import plot_fits, plot_strategies
+from pikanid.figures import ENDINGS, image, save_figure
 
 T = np.linspace(0.0, 2.0, 81)
 FIT = Fit("run", "theta", "rad", T, np.sin(T), np.sin(T) + 0.01, np.full(81, 0.02))
@@ -92,7 +93,8 @@ import sys, matplotlib
 before = dict(matplotlib.rcParams)
 import numpy as np
 from pikanid.estimate.data import Fit
-from pikanid.estimate.plots import image, plot_fits
+from pikanid.estimate.plots import plot_fits
+from pikanid.figures import image
 t = np.linspace(0, 1, 20)
 image(plot_fits([Fit('run', 'y', 'm', t, t, t)]))
 assert 'matplotlib.pyplot' not in sys.modules

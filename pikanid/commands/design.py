@@ -54,7 +54,7 @@ def design(
     check_outputs({"--out": (out, written_endings()),
                    "--plot": (plot, [".png", ".svg", ".pdf"])}, [*models, *recorded, *candidate])
     from pikanid import errors
-    from pikanid.estimate.plots import image_for
+    from pikanid.figures import image_for
     from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
     from pikanid.mismatch.design.profiles import Bounds
     from pikanid.model import systems

@@ -54,7 +54,7 @@ def effects(
         raise errors.BadModel(errors.no_effects(chosen.name))
     shown = effects_shown(chosen, excited(chosen, excitation, duration, rate, []))
     if plot is not None and not all(one.failure for one in shown):
-        from pikanid.estimate.plots import save_figure
+        from pikanid.figures import save_figure
 
         save_figure(effects_figure(shown, chosen), plot)
     if quiet:

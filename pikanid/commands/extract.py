@@ -59,7 +59,7 @@ def extract(
     reading = read(network, x, y, inputs=names or None, alpha=alpha)
     files = {}
     if plot is not None:
-        from pikanid.estimate.plots import image_for
+        from pikanid.figures import image_for
 
         files[plot] = image_for(reading.plot(), plot)
     written(files, json_, _content(reading))

@@ -205,7 +205,8 @@ def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimat
     content = (strict_json.of_several(estimates, failed, model.name, labels, __version__, seconds)
                if several else strict_json.of_one(estimates[0], labels))
     if plot is not None:
-        from pikanid.estimate.plots import image_for, plot_strategies
+        from pikanid.estimate.plots import plot_strategies
+        from pikanid.figures import image_for
 
         figure = (plot_strategies({e.strategy: e.fits for e in estimates}, model.name)
                   if len(estimates) > 1 else estimates[0].plot())

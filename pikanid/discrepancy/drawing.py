@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pikanid.discrepancy.edge import Edge
-from pikanid.estimate.plots import embedded, new_figure
+from pikanid.figures import embedded, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

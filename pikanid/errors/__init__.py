@@ -11,6 +11,7 @@ from types import FunctionType
 from pikanid.errors.approximators import *
 from pikanid.errors.classes import *
 from pikanid.errors.commands import *
+from pikanid.errors.comparison import *
 from pikanid.errors.estimate import *
 from pikanid.errors.files import *
 from pikanid.errors.formula import *

@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pikanid import errors
+from pikanid.comparison import Validation, validate
+from pikanid.comparison.predict import predict
 from pikanid.estimate import file as estimate_file
 from pikanid.estimate.data import EstimateData, Fit
 from pikanid.model import Model
+from pikanid.recording import Recording
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -53,6 +56,18 @@ class Estimate(EstimateData):
         """The estimate of a parameter, or the value of a fixed one."""
         fixed = [p for p in self.model.parameters if p.name == name and not p.free]
         return fixed[0].value if fixed else float(self.theta[self.index(name, recording)])
+
+    def __getitem__(self, name: str) -> float:
+        """The value of a parameter by its name, or by its label: ``est["theta_0[1]"]``.
+
+        >>> import pikanid as pk
+        >>> model = pk.systems.sloshing()
+        >>> est = pk.NLS().fit(model, pk.simulate(model, pk.excitation.two_pulse(), sigma=1e-3))
+        >>> est["l_theta"] == est.value("l_theta")
+        True
+        """
+        labels = {f.label: k for k, f in enumerate(self.free)}
+        return float(self.theta[labels[name]]) if name in labels else self.value(name)
 
     def std(self, name: str, recording: int | None = None) -> float:
         """The standard error of a parameter; 0 for a fixed one."""
@@ -119,6 +134,41 @@ class Estimate(EstimateData):
     def rmse(self) -> float:
         """Root mean square residual of the first output, in its unit."""
         return next(iter(self.rmse_by_output.values()), 0.0)
+
+    # --- other recordings -------------------------------------------------------------------------
+
+    def predict(self, recording: Recording, **options: Any) -> Recording:
+        """The recording with its outputs as the fitted model predicts them.
+
+        Args:
+            recording: With the model's inputs; outputs are needed for a start or a horizon alone.
+            options: `first`, `initial`, `horizon`, `window`, `origins` of `pikanid.validate`.
+
+        Raises:
+            BadRecording: An input is missing or unusable.
+        """
+        return predict(self, recording, **options)
+
+    def validate(self, recordings: Recording | Sequence[Recording], **options: Any) -> Validation:
+        """How well the fitted model predicts recordings: see `pikanid.validate`.
+
+        Args:
+            recordings: One or several; best such as the fit has not seen.
+            options: Of `pikanid.validate`: `training` (for the linear baseline), `first`,
+                `horizon`, ...
+
+        Raises:
+            BadRecording: A channel is missing or unusable.
+
+        >>> import pikanid as pk
+        >>> model = pk.systems.sloshing()
+        >>> seen = pk.simulate(model, pk.excitation.two_pulse(), sigma=2e-3, seed=0)
+        >>> new = pk.simulate(model, pk.excitation.multisine(), sigma=2e-3, seed=1)
+        >>> score = pk.NLS().fit(model, seen).validate(new, training=seen).score("sloshing")
+        >>> score.held_out, round(score.fit, 1)
+        (True, 98.6)
+        """
+        return validate(self, recordings, **options)
 
     # --- showing and keeping ---------------------------------------------------------------------
 

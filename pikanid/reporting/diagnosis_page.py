@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
 from pikanid.estimate.estimate import rounded
-from pikanid.estimate.plots import embedded
+from pikanid.figures import embedded
 
 if TYPE_CHECKING:
     from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -24,6 +25,7 @@ h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
 .unconfirmed, .partial { border-color: #b45309; }
 table { border-collapse: collapse; margin: .5rem 0; } td, th { padding: .2rem .8rem .2rem 0;
         text-align: left; } th { font-weight: 600; border-bottom: 1px solid #ddd; }
+table { font-variant-numeric: tabular-nums; } .wide { overflow-x: auto; }
 code { background: #f3f4f6; padding: .1rem .3rem; } img { max-width: 100%; }
 .small { color: #6b7280; font-size: .9rem; }
 """
@@ -45,6 +47,11 @@ def page(dx: Diagnosis, title: str) -> str:
             f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes)) + "</ul>",
         f'<p class="small">p = {dx.p_value:.2g} at a false-alarm rate of {dx.alpha:g}; '
         f"{dx.seconds:.1f} s. {escape(str(dx.settings))}</p>"]
+    return document(title, parts)
+
+
+def document(title: str, parts: Sequence[str]) -> str:
+    """A page of HTML of its parts."""
     return ('<!doctype html><html lang="en"><head><meta charset="utf-8">'
             f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>"
             + "".join(parts) + "</body></html>\n")

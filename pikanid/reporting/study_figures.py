@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pikanid.estimate.plots import BAND, MEASURED, new_figure, stroke, tidy
+from pikanid.figures import BAND, MEASURED, new_figure, stroke, tidy
 from pikanid.recording import excitation
 from pikanid.simulation import simulate
 from pikanid.validation.study import slosh

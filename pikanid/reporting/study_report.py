@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pikanid.estimate.plots import image
+from pikanid.figures import image
 from pikanid.reporting import study_sheets as sheets
 from pikanid.reporting.study_figures import figures
 from pikanid.storage.outputs import together

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from pikanid.estimate.plots import image_for, new_figure
+from pikanid.figures import image_for, new_figure
 from pikanid.storage.outputs import together
 from pikanid.symbolic.composed import Groups, Place
 from pikanid.symbolic.named import NamedEdge

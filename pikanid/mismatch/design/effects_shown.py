@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pikanid import errors
-from pikanid.estimate.plots import COLOURS, DPI, new_figure
+from pikanid.figures import COLOURS, DPI, new_figure
 from pikanid.mismatch.catalogue.bound_effects import Ranges, bound_to
 from pikanid.mismatch.catalogue.candidate import Array
 from pikanid.mismatch.catalogue.site import sites

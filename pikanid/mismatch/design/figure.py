@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from pikanid.estimate.plots import COLOURS, DASHES, DPI, new_figure
+from pikanid.figures import COLOURS, DASHES, DPI, new_figure
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
 

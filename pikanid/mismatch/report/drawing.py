@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pikanid.estimate.plots import new_figure
+from pikanid.figures import new_figure
 from pikanid.mismatch.report.findings import DiagnosisData
 
 if TYPE_CHECKING:

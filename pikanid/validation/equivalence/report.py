@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pikanid.estimate.plots import new_figure
+from pikanid.figures import new_figure
 from pikanid.storage.outputs import together
 
 if TYPE_CHECKING:

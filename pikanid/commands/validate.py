@@ -1,0 +1,150 @@
+"""`pikanid validate`: how well do models predict recordings, and which is best?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pikanid.commands.identify import prepared
+from pikanid.commands.options import (
+    Columns,
+    Json,
+    Quiet,
+    Sigma,
+    Stride,
+    Units,
+    assignments,
+)
+from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.recording.formats import readable
+
+if TYPE_CHECKING:
+    from pikanid.model import Model
+    from pikanid.recording import Recording
+
+SAVED = (".json", ".json.gz")
+EXAMPLES = """Examples:
+
+  pikanid identify run1.csv --model sloshing --save fit.json
+
+  pikanid validate fit.json --data run2.csv --train run1.csv
+
+  pikanid validate nominal.toml extended.toml --train run1.csv --data run2.csv --first 50
+
+  pikanid validate fit.json --data run2.csv --horizon 10 --json - --quiet
+
+Models and saved estimates are compared as they are; with --train, models are fitted first.
+Exit codes: 0 compared, whatever was found; 2 bad input."""
+
+
+def validate(
+    model: Annotated[list[str], typer.Argument(
+        metavar="MODEL...", show_default=False,
+        help="ready-made models, model files, or estimates that 'identify --save' kept")],
+    data: Annotated[list[str], typer.Option(
+        "--data", "-d", metavar="RUN", show_default=False,
+        help=f"recording to predict: {readable()}; may be repeated")],
+    train: Annotated[list[str], typer.Option(
+        metavar="RUN", show_default=False, help="recording that models and the linear baseline "
+        "are fitted to; may be repeated")] = [],  # noqa: B006
+    first: Annotated[int, typer.Option(
+        metavar="N", min=0, help="estimate the initial state from the first N samples, which are "
+        "not scored")] = 0,
+    free_start: Annotated[bool, typer.Option(
+        "--free-start", help="fit the initial state to each recording")] = False,
+    horizon: Annotated[int | None, typer.Option(
+        metavar="K", min=1, show_default=False,
+        help="predict K samples ahead instead of simulating freely")] = None,
+    window: Annotated[int | None, typer.Option(
+        metavar="W", min=1, show_default=False,
+        help="samples up to each origin that its state is estimated of")] = None,
+    sigma: Sigma = [],  # noqa: B006
+    column: Columns = [],  # noqa: B006
+    unit: Units = [],  # noqa: B006
+    decimate: Stride = 1,
+    seed: Annotated[int, typer.Option(
+        metavar="N", min=0, help="of the bootstrap that compares models")] = 0,
+    json_: Json = None,
+    plot: Annotated[str | None, typer.Option(
+        metavar="FILE", help="draw measured, predicted and errors (.png, .svg, .pdf)")] = None,
+    report: Annotated[str | None, typer.Option(
+        metavar="FILE.html", help="write a page for people")] = None,
+    quiet: Quiet = False,
+) -> int:
+    """Compare models on recordings: fit per cent, RMSE, AIC, a linear baseline, the noise."""
+    check_outputs({"--json": (json_, [".json"]), "--plot": (plot, [".png", ".svg", ".pdf"]),
+                   "--report": (report, [".html"])}, [*model, *data, *train])
+    from pikanid.comparison import validate as run
+    from pikanid.reporting.console import console, working
+
+    columns = assignments("--column", column, "theta=angle")
+    units = assignments("--unit", unit, "theta=deg")
+    given = [_model(name) for name in model]
+    bare = [_bare(g) for g in given]
+
+    def read(paths: Sequence[str]) -> list[Recording]:
+        return [prepared(p, bare[0], columns, units, None, None, None, None, decimate, sigma)
+                for p in paths]
+
+    records, training = read(data), read(train)
+    with working("validating", len(given) + 1, quiet) as step:
+        compared: dict[str, Any] = {}
+        for name, one in zip(model, given, strict=True):
+            step(name)
+            label, count = _label(name), 2
+            while label in compared:
+                label, count = f"{_label(name)} ({count})", count + 1
+            compared[label] = _fitted(one, training)
+        step("comparing")
+        found = run(compared, records, training=training, first=first,
+                    initial="free" if free_start else "model", horizon=horizon, window=window,
+                    seed=seed)
+    files: dict[str, bytes] = {}
+    if plot is not None:
+        from pikanid.figures import image_for
+
+        files[plot] = image_for(found.plot(), plot)
+    if report is not None:
+        from pikanid.reporting.validation_page import page
+
+        files[report] = page(found, ", ".join(r.name for r in records)).encode()
+    written(files, json_, found.to_dict())
+    if not quiet and json_ != STDOUT:
+        from pikanid.reporting.validation_tables import show_validation
+
+        show_validation(console(), found)
+    return 0
+
+
+def _model(name: str) -> Any:
+    """The model, or the estimate, that an argument names."""
+    from pikanid.estimate import Estimate
+    from pikanid.model import systems
+
+    return Estimate.load(name) if name.lower().endswith(SAVED) else systems.find(name)
+
+
+def _bare(given: Any) -> Model:
+    from pikanid.model import Model
+
+    found: Model = given if isinstance(given, Model) else given.model
+    return found
+
+
+def _label(name: str) -> str:
+    return Path(name).name.split(".")[0] or name
+
+
+def _fitted(given: Any, training: Sequence[Recording]) -> Any:
+    """A model fitted to the training recordings, if there are any; an estimate as it is."""
+    from pikanid.model import Model
+    from pikanid.strategies import NLS
+
+    if not isinstance(given, Model) or not training:
+        return given
+    if not given.free_names:
+        return given
+    return NLS().fit(given, training)

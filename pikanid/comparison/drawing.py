@@ -1,0 +1,61 @@
+"""Figures of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pikanid.figures import BAND, MEASURED, labelled, new_figure, stroke, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pikanid.comparison.predictions import Prediction
+
+MANY = 2000  # layout: samples beyond which markers merge: then a thin line
+WIDE = 1.96  # definition: standard deviations of a 95 % band
+
+
+def plot_validation(predictions: Mapping[str, Sequence[Prediction]]) -> Figure:
+    """Measured against predicted (left) and the errors (right); the first model is the best.
+
+    Around the prediction of the best model lies its 95 % band: what the parameters' covariance and
+    the noise allow a measured sample.  The grey band of the errors is ±2σ of the noise.
+    """
+    rows = list(zip(*predictions.values(), strict=True))
+    figure = new_figure(11.0, 0.8 + 2.8 * len(rows))
+    grid = figure.subplots(len(rows), 2, squeeze=False, sharex="row")
+    several = len({row[0].recording for row in rows}) > 1
+    for (left, right), row in zip(grid, rows, strict=True):
+        first = row[0]
+        style = ({"marker": ".", "markersize": 4, "linestyle": "none"}
+                 if len(first.t) <= MANY else {"linewidth": 1.6})
+        left.plot(first.t, first.measured, color=MEASURED, label="measured", zorder=1, **style)
+        if first.spread is not None:
+            wide = WIDE * np.hypot(first.spread, first.sigma)
+            left.fill_between(first.t, first.predicted - wide, first.predicted + wide, alpha=0.25,
+                              color=stroke(0)["color"], linewidth=0, label="95 % band", zorder=2)
+        right.fill_between(first.t, -2 * first.sigma, 2 * first.sigma, color=BAND, alpha=0.5,
+                           linewidth=0, label="±2σ of the noise")
+        for k, p in enumerate(row):
+            left.plot(p.t, p.predicted, label=p.model, zorder=3, **stroke(k, 0.7))
+            right.plot(p.t, p.residual, **stroke(k, 0.45))
+        right.axhline(0.0, color="black", linewidth=0.6)
+        span = np.ptp(first.measured) or 1.0
+        low, high = left.get_ylim()  # a model gone astray must not flatten what was measured
+        left.set_ylim(max(low, first.measured.min() - span), min(high, first.measured.max() + span))
+        low, high = right.get_ylim()
+        right.set_ylim(max(low, -1.5 * span), min(high, 1.5 * span))
+        left.set_ylabel(labelled(first.output, first.unit))
+        right.set_ylabel(labelled("error", first.unit))
+        for axes in (left, right):
+            axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, frameon=False,
+                        fontsize="small", borderaxespad=0.1, handlelength=1.4, columnspacing=1.0)
+            tidy(axes)
+        if several:
+            right.set_title(first.recording, fontsize="small", loc="right")
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]")
+    return figure

@@ -1,0 +1,140 @@
+"""`Validation`: what `validate` finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pikanid.comparison.bootstrap import Pair
+from pikanid.comparison.predictions import Prediction, Protocol
+from pikanid.comparison.scores import Score
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    import pandas as pd
+
+NOISE = "noise"
+ALPHA = 0.01  # definition: of a difference that is called significant, unless it is said
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Models compared on recordings: best first, with a linear baseline and the noise beside them.
+
+    Attributes:
+        scores: One for every model, recording and output; the baseline's and the noise's too.
+        ranking: Names of models and baseline, best first: by mean NRMSE over all outputs.
+        pairs: Which of two models has the smaller squared error, and how sure that is.
+        predictions: What was scored, by model.
+        protocol: How predictions were made.
+        alpha: Below which a p-value is called significant.
+        notes: What could not be done, one sentence each.
+    """
+
+    scores: tuple[Score, ...]
+    ranking: tuple[str, ...]
+    pairs: tuple[Pair, ...]
+    predictions: Mapping[str, tuple[Prediction, ...]]
+    protocol: Protocol
+    alpha: float = ALPHA
+    notes: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> str:
+        """Name of the best model, or of the baseline if that is better."""
+        return self.ranking[0]
+
+    def score(self, model: str, output: str | None = None, recording: str | None = None) -> Score:
+        """The first score of a model, of an output and a recording if they are named.
+
+        Raises:
+            KeyError: There is none.
+        """
+        for s in self.scores:
+            if s.model == model and output in (None, s.output) and recording in (
+                    None, s.recording):
+                return s
+        raise KeyError((model, output, recording))
+
+    def significant(self) -> tuple[Pair, ...]:
+        """The pairs whose difference is more than chance."""
+        return tuple(p for p in self.pairs if p.p_value < self.alpha)
+
+    def sentence(self) -> str:
+        """Which model is best, and what it is surely better than."""
+        first = self.best
+        beaten = [p.worse for p in self.significant() if p.better == first]
+        equal = [n for n in self.ranking[1:] if n not in beaten]
+        if len(self.ranking) == 1:
+            mean = np.mean([s.fit for s in self.scores if s.model == first])
+            return f"'{first}' fits by {mean:.4g} % (NRMSE)."
+        words = f"Best is '{first}'"
+        if beaten:
+            words += f", significantly better than {_and(beaten)}"
+        if equal:
+            words += f"{';' if beaten else ','} its lead over {_and(equal)} may be chance"
+        return words + "."
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a score."""
+        import pandas as pd
+
+        return pd.DataFrame([s.to_dict() for s in self.scores])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of the JSON that `pikanid validate --json` writes."""
+        return {
+            "schema_version": 1, "sentence": self.sentence(), "ranking": list(self.ranking),
+            "protocol": {**asdict(self.protocol), "text": str(self.protocol)},
+            "alpha": self.alpha, "scores": [s.to_dict() for s in self.scores],
+            "pairs": [asdict(p) for p in self.pairs], "notes": list(self.notes)}
+
+    def rows(self) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+        """Headers and cells of the table, best model first, the noise last."""
+        headers = ("model", "recording", "output", "held out", "N", "RMSE", "unit", "fit %", "R²",
+                   "χ²/dof", "parameters", "AIC", "BIC")
+        place = {name: k for k, name in enumerate((*self.ranking, NOISE))}
+        cells = []
+        for s in sorted(self.scores, key=lambda s: place[s.model]):
+            counts = ("", "", "") if s.model == NOISE else (
+                str(s.parameters), f"{s.aic:.6g}", f"{s.bic:.6g}")
+            cells.append((
+                s.model, s.recording, s.output, {True: "yes", False: "no", None: "?"}[s.held_out]
+                if s.model != NOISE else "", str(s.n), f"{s.rmse:.4g}", s.unit or "-",
+                f"{s.fit:.2f}", f"{s.r2:.5g}", f"{s.chi2 / s.dof:.4g}", *counts))
+        return headers, tuple(cells)
+
+    def plot(self) -> matplotlib.figure.Figure:
+        """Measured against predicted and the errors, a row of axes an output and recording."""
+        from pikanid.comparison.drawing import plot_validation
+
+        return plot_validation({name: self.predictions[name] for name in self.ranking})
+
+    def __str__(self) -> str:
+        headers, cells = self.rows()
+        widths = [max(len(row[k]) for row in (headers, *cells)) for k in range(len(headers))]
+        lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
+                 for row in (headers, *cells)]
+        return "\n".join([self.sentence(), str(self.protocol), "", *lines,
+                          *(f"note: {n}" for n in self.notes)])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        headers, cells = self.rows()
+        head = "".join(f"<th>{escape(h)}</th>" for h in headers)
+        body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>"
+                       for row in cells)
+        notes = "".join(f"<p>{escape(n)}</p>" for n in self.notes)
+        return (f"<p>{escape(self.sentence())} {escape(str(self.protocol))}</p>"
+                f"<table><tr>{head}</tr>{body}</table>{notes}")
+
+
+def _and(names: list[str]) -> str:
+    quoted = [f"'{n}'" for n in names]
+    return quoted[0] if len(quoted) == 1 else ", ".join(quoted[:-1]) + f" and {quoted[-1]}"
