@@ -18,7 +18,7 @@ from pikanid.storage.version import __version__
 
 if TYPE_CHECKING:
     from pikanid import symbolic, uncertainty
-    from pikanid.comparison import Validation, validate
+    from pikanid.comparison import ResidualAnalysis, Validation, resid, validate
     from pikanid.discrepancy import kan_discrepancy
     from pikanid.estimate import Estimate
     from pikanid.mismatch.design.confusable import confusable
@@ -48,6 +48,8 @@ _HOMES = {
     **dict.fromkeys(strategies.__all__, "pikanid.strategies"),
     "validate": "pikanid.comparison",
     "Validation": "pikanid.comparison",
+    "resid": "pikanid.comparison",
+    "ResidualAnalysis": "pikanid.comparison",
     "kan_discrepancy": "pikanid.discrepancy",
     "diagnose": "pikanid.mismatch.diagnose",
     "Diagnosis": "pikanid.mismatch.report.diagnosis",
@@ -80,6 +82,8 @@ __all__ = [
     "Estimate",
     "validate",
     "Validation",
+    "resid",
+    "ResidualAnalysis",
     "kan_discrepancy",
     "diagnose",
     "Diagnosis",

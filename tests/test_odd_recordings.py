@@ -14,13 +14,13 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.preparation import EXACT, beginnings, loud_enough
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import condensed, lines, residual_tests
-from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.detect.tangent import CELLS, Tangent, directions
 from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.search.screen import best_level
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
+from pikanid.noise.projection import project
 from pikanid.recording import Recording
 from pikanid.reporting import strict_json
 from pikanid.reporting.diagnosis_page import page

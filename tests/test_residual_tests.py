@@ -16,11 +16,11 @@ from pikanid.mismatch.detect.residual_tests import (
     detect,
     frequency_bands,
     past_inputs,
-    project,
     unit_columns,
 )
 from pikanid.mismatch.settings.detection import DetectionSettings
 from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.noise.projection import project
 
 N = 200
 # orthonormal: a Jacobian, two signs, a narrow and a wide band, inputs

@@ -61,6 +61,8 @@ def validate(
     window: Annotated[int | None, typer.Option(
         metavar="W", min=1, show_default=False,
         help="samples up to each origin that its state is estimated of")] = None,
+    lags: Annotated[int, typer.Option(
+        metavar="L", min=1, help="of the residual analysis, in samples")] = 25,
     sigma: Sigma = [],  # noqa: B006
     column: Columns = [],  # noqa: B006
     unit: Units = [],  # noqa: B006
@@ -101,7 +103,7 @@ def validate(
         step("comparing")
         found = run(compared, records, training=training, first=first,
                     initial="free" if free_start else "model", horizon=horizon, window=window,
-                    seed=seed)
+                    lags=lags, seed=seed)
     files: dict[str, bytes] = {}
     if plot is not None:
         from pikanid.figures import image_for

@@ -25,7 +25,7 @@ class Pair:
 
     Attributes:
         better, worse: Their names, by mean squared error.
-        difference: Mean of worse² - better², each output by its variance.
+        difference: Mean of worse² - better², each output by the variance of its noise.
         interval: 95 % bootstrap interval of it.
         p_value: That a difference as large arises where there is none; adjusted for the number of
             pairs (S. Holm, Scand. J. Stat. 6, 1979).

@@ -8,11 +8,13 @@ from typing import Any, get_args
 import numpy as np
 
 from pikanid import errors
+from pikanid.comparison.analyse import LAGS, analyse
 from pikanid.comparison.bootstrap import pairs
 from pikanid.comparison.contender import contenders
 from pikanid.comparison.horizon import usual_window
-from pikanid.comparison.predictions import Baseline, Prediction, Protocol, of_model
-from pikanid.comparison.runs import Start
+from pikanid.comparison.predictions import BASELINE, Baseline, Prediction, Protocol, of_model
+from pikanid.comparison.residual_analysis import ResidualAnalysis
+from pikanid.comparison.runs import Start, free_run
 from pikanid.comparison.scores import Score, score
 from pikanid.comparison.validation import ALPHA, NOISE, Validation
 from pikanid.problem.arguments import several
@@ -22,8 +24,8 @@ from pikanid.recording import Recording
 def validate(models: Any, recordings: Recording | Sequence[Recording], *,
              training: Recording | Sequence[Recording] = (), first: int = 0,
              initial: Start = "model", horizon: int | None = None, window: int | None = None,
-             origins: int = 5000, baseline: bool = True, alpha: float = ALPHA, seed: int = 0
-             ) -> Validation:
+             origins: int = 5000, baseline: bool = True, lags: int = LAGS, alpha: float = ALPHA,
+             seed: int = 0) -> Validation:
     """Compare models on recordings, with the best linear model and the noise beside them.
 
     By default every model is simulated freely from its initial state: nothing measured is used but
@@ -46,7 +48,9 @@ def validate(models: Any, recordings: Recording | Sequence[Recording], *,
             are predicted, and at least 10 a state.
         origins: Windows at most, evenly spread.
         baseline: Whether to add the best linear model.
-        alpha: Below which a difference between two models is called significant.
+        lags: Of the residual analysis of each model, in samples.
+        alpha: Below which a difference between two models is called significant; rate of false
+            alarms of the residual analysis.
         seed: Of the bootstrap that compares them.
 
     Raises:
@@ -64,30 +68,72 @@ def validate(models: Any, recordings: Recording | Sequence[Recording], *,
     """
     records = several(recordings)
     trained = several(training) if isinstance(training, Recording) or len(training) else ()
-    _check(first, initial, horizon, window, origins, alpha)
+    _check(first, initial, horizon, window, origins, lags, alpha)
     found = contenders(models, trained)
     states = max(len(c.model.states) for c in found)
     protocol = Protocol(first, initial, horizon, 0 if horizon is None else (
         window or usual_window(horizon, states)), origins)
     named: dict[str, list[Prediction]] = {c.name: [] for c in found}
+    residuals: dict[str, tuple[ResidualAnalysis, ...]] = {}
     for c in found:
         for recording in records:
-            named[c.name] += of_model(c, recording, protocol)[0]
+            made, run = of_model(c, recording, protocol)
+            named[c.name] += made
+            if horizon is None:
+                residuals[c.name] = (*residuals.get(c.name, ()),
+                                     *analyse(c, run, lags, alpha, None, first))
     notes = [note for r in records for note in _diverged(named, r)]
     if baseline:
-        own = trained or tuple(r for r in records if any(
+        learnt = trained or tuple(r for r in records if any(
             p.held_out is False for p in named[found[0].name] if p.recording == r.name))
         richest = max((c.model for c in found), key=lambda m: len(m.inputs))
-        linear = Baseline(richest, own or records, protocol)
+        linear = Baseline(richest, learnt or records, protocol)
         notes += linear.notes
-        made = [p for r in records for p in linear.predictions(r)]
-        if len(made) == len(named[found[0].name]):
-            named[made[0].model] = made
-    return assembled(named, protocol, alpha, seed, tuple(notes))
+        own_predictions = [p for r in records for p in linear.predictions(r)]
+        if len(own_predictions) == len(named[found[0].name]):
+            named[BASELINE] = own_predictions
+    notes += dict.fromkeys(w for own in residuals.values() for a in own for w in a.warnings())
+    return assembled(named, residuals, protocol, alpha, seed, tuple(notes))
 
 
-def assembled(named: dict[str, list[Prediction]], protocol: Protocol, alpha: float, seed: int,
-              notes: tuple[str, ...]) -> Validation:
+def resid(models: Any, recordings: Recording | Sequence[Recording], *,
+          training: Recording | Sequence[Recording] = (), first: int = 0, initial: Start = "model",
+          lags: int = LAGS, rho: float | None = None, alpha: float = ALPHA
+          ) -> tuple[ResidualAnalysis, ...]:
+    """Residual analysis of a free simulation: one for each model, recording and output.
+
+    Is the residual white, and independent of the inputs at all lags?  Bands and joint tests count
+    the noise model and what was fitted (`pikanid.comparison.whitened`).
+
+    Args:
+        models, recordings, training, first, initial: As in `validate`.
+        lags: In samples.
+        rho: Correlation of neighbours in the noise, if it is known; by default white or AR(1)
+            noise, whichever BIC prefers.
+        alpha: Rate of false alarms of every joint test; bands hold 1 - alpha.
+
+    Raises:
+        BadModel, BadRecording, BadSetting: As in `validate`.
+
+    >>> import pikanid as pk
+    >>> model = pk.systems.sloshing()
+    >>> rec = pk.simulate(model, pk.excitation.multisine(duration=5), sigma=2e-3, seed=0)
+    >>> (found,) = resid(pk.NLS().fit(model, rec), rec)
+    >>> found.ok, found.test("whiteness").dof
+    (True, 25)
+    """
+    trained = several(training) if isinstance(training, Recording) or len(training) else ()
+    _check(first, initial, None, None, 1, lags, alpha)
+    if rho is not None and not -1 < rho < 1:
+        raise errors.BadSetting(errors.bad_value("'rho'", rho, "a number between -1 and 1"))
+    return tuple(
+        analysis for c in contenders(models, trained) for r in several(recordings)
+        for analysis in analyse(c, free_run(c, r, first, initial), lags, alpha, rho, first))
+
+
+def assembled(named: dict[str, list[Prediction]],
+              residuals: dict[str, tuple[ResidualAnalysis, ...]], protocol: Protocol, alpha: float,
+              seed: int, notes: tuple[str, ...]) -> Validation:
     """Scores, ranking and pairs of predictions by name, all on the samples that every model has."""
     lists = list(named.values())
     there = [_common(same) for same in zip(*lists, strict=True)]
@@ -98,20 +144,22 @@ def assembled(named: dict[str, list[Prediction]], protocol: Protocol, alpha: flo
         made = [_scored(p, m) for p, m in zip(own, there, strict=True)]
         scores += made
         losses[name] = float(np.mean([100.0 - s.fit for s in made]))
-        squares[name] = [p.residual[m] ** 2 / max(float(np.var(p.measured[m])), 1e-300)
-                         for p, m in zip(own, there, strict=True)]
+        # in units of the noise, of which all models have the same: a quiet output counts fully
+        squares[name] = [p.residual[m] ** 2 / float(np.mean(q.sigma[m] ** 2))
+                         for p, q, m in zip(own, lists[0], there, strict=True)]
     sound = {n: e for n, e in squares.items() if all(np.all(np.isfinite(x)) for x in e)}
     for p, m in zip(lists[0], there, strict=True):
         scores.append(_noise(p, m))
     return Validation(tuple(scores), tuple(sorted(losses, key=losses.__getitem__)),
-                      pairs(sound, seed), {n: tuple(own) for n, own in named.items()}, protocol,
-                      alpha, notes)
+                      pairs(sound, seed), {n: tuple(own) for n, own in named.items()},
+                      residuals, protocol, alpha, notes)
 
 
 def _check(first: int, initial: str, horizon: int | None, window: int | None, origins: int,
-           alpha: float) -> None:
+           lags: int, alpha: float) -> None:
     for name, value, least in (("first", first, 0), ("horizon", horizon, 1),
-                               ("window", window, 1), ("origins", origins, 1)):
+                               ("window", window, 1), ("origins", origins, 1),
+                               ("lags", lags, 1)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, int)
                                   or value < least):
             raise errors.BadSetting(errors.bad_value(

@@ -50,12 +50,13 @@ def plot_validation(predictions: Mapping[str, Sequence[Prediction]]) -> Figure:
         right.set_ylim(max(low, -1.5 * span), min(high, 1.5 * span))
         left.set_ylabel(labelled(first.output, first.unit))
         right.set_ylabel(labelled("error", first.unit))
-        for axes in (left, right):
-            axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, frameon=False,
-                        fontsize="small", borderaxespad=0.1, handlelength=1.4, columnspacing=1.0)
-            tidy(axes)
+        tidy(left)
+        tidy(right)
         if several:
             right.set_title(first.recording, fontsize="small", loc="right")
+    handles = [h for axes in grid[0] for h in axes.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="outside upper left", ncols=6, frameon=False,
+                  fontsize="small", handlelength=1.6, columnspacing=1.2)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
     return figure

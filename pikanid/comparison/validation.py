@@ -10,6 +10,7 @@ import numpy as np
 
 from pikanid.comparison.bootstrap import Pair
 from pikanid.comparison.predictions import Prediction, Protocol
+from pikanid.comparison.residual_analysis import ResidualAnalysis
 from pikanid.comparison.scores import Score
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ class Validation:
         ranking: Names of models and baseline, best first: by mean NRMSE over all outputs.
         pairs: Which of two models has the smaller squared error, and how sure that is.
         predictions: What was scored, by model.
+        residuals: Analysis of what each model leaves, by model; empty for predictions ahead.
         protocol: How predictions were made.
         alpha: Below which a p-value is called significant.
         notes: What could not be done, one sentence each.
@@ -38,6 +40,7 @@ class Validation:
     ranking: tuple[str, ...]
     pairs: tuple[Pair, ...]
     predictions: Mapping[str, tuple[Prediction, ...]]
+    residuals: Mapping[str, tuple[ResidualAnalysis, ...]]
     protocol: Protocol
     alpha: float = ALPHA
     notes: tuple[str, ...] = ()
@@ -90,7 +93,9 @@ class Validation:
             "schema_version": 1, "sentence": self.sentence(), "ranking": list(self.ranking),
             "protocol": {**asdict(self.protocol), "text": str(self.protocol)},
             "alpha": self.alpha, "scores": [s.to_dict() for s in self.scores],
-            "pairs": [asdict(p) for p in self.pairs], "notes": list(self.notes)}
+            "pairs": [asdict(p) for p in self.pairs],
+            "residuals": [a.to_dict() for own in self.residuals.values() for a in own],
+            "notes": list(self.notes)}
 
     def rows(self) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
         """Headers and cells of the table, best model first, the noise last."""
@@ -118,7 +123,8 @@ class Validation:
         widths = [max(len(row[k]) for row in (headers, *cells)) for k in range(len(headers))]
         lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
                  for row in (headers, *cells)]
-        return "\n".join([self.sentence(), str(self.protocol), "", *lines,
+        left = [a.sentence() for own in self.residuals.values() for a in own]
+        return "\n".join([self.sentence(), str(self.protocol), "", *lines, "", *left,
                           *(f"note: {n}" for n in self.notes)])
 
     __repr__ = __str__

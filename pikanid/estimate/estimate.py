@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pikanid import errors
-from pikanid.comparison import Validation, validate
+from pikanid.comparison import ResidualAnalysis, Validation, resid, validate
 from pikanid.comparison.predict import predict
 from pikanid.estimate import file as estimate_file
 from pikanid.estimate.data import EstimateData, Fit
@@ -169,6 +169,15 @@ class Estimate(EstimateData):
         (True, 98.6)
         """
         return validate(self, recordings, **options)
+
+    def resid(self, recordings: Recording | Sequence[Recording], **options: Any
+              ) -> tuple[ResidualAnalysis, ...]:
+        """Residual analysis, one a recording and output: see `pikanid.resid`.
+
+        Raises:
+            BadRecording: A channel is missing or unusable.
+        """
+        return resid(self, recordings, **options)
 
     # --- showing and keeping ---------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ from pikanid.reporting.validation_tables import pairs, scores
 if TYPE_CHECKING:
     from pikanid.comparison import Validation
 
+MOST = 6  # layout: figures of residuals
 DPI = 110  # layout: pixels an inch
 
 
@@ -29,7 +30,19 @@ def page(found: Validation, title: str) -> str:
         f"<p>{escape(str(found.protocol))}</p>", _table(scores(found)),
         embedded(found.plot(), "measured and predicted", DPI),
         "<h2>Who is better than whom</h2>" + _table(pairs(found)) if found.pairs else "",
-        "".join(f"<p>{escape(note)}</p>" for note in found.notes)])
+        _residuals(found), "".join(f"<p>{escape(note)}</p>" for note in found.notes)])
+
+
+def _residuals(found: Validation) -> str:
+    """What every model leaves, in sentences; in pictures what the best of them does."""
+    said = "".join(f"<li>{escape(a.sentence())}</li>"
+                   for own in found.residuals.values() for a in own)
+    best = next((name for name in found.ranking if found.residuals.get(name)), None)
+    if best is None:
+        return ""
+    figures = "".join(embedded(a.plot(), f"residual of {escape(a.output)}", DPI)
+                      for a in found.residuals[best][:MOST])
+    return f"<h2>What is left</h2><ul>{said}</ul>{figures}"
 
 
 def _table(sheet: Sheet) -> str:

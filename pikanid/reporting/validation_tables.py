@@ -22,7 +22,7 @@ def scores(found: Validation) -> Sheet:
 
 def pairs(found: Validation) -> Sheet:
     """Who is better than whom, and how sure that is."""
-    size = "MSE difference / variance"
+    size = "MSE difference / σ²"
     return Sheet(("better", "worse", size, "95 % interval", "p (Holm)"), tuple(
         (p.better, p.worse, f"{p.difference:.3g}", f"{p.interval[0]:.3g} … {p.interval[1]:.3g}",
          f"{p.p_value:.2g}") for p in found.pairs), (size, "p (Holm)"))
@@ -37,5 +37,11 @@ def show_validation(out: Console, found: Validation) -> None:
     if found.pairs:
         out.print()
         out.print(pairs(found).to_rich())
+    left = [a for own in found.residuals.values() for a in own]
+    if left:
+        out.print()
+    for analysis in left:
+        out.print(analysis.sentence(), style="green" if analysis.ok else "yellow", markup=False,
+                  soft_wrap=True)
     for note in found.notes:
         out.print(f"Note: {note}", style="yellow", markup=False, soft_wrap=True)

@@ -24,10 +24,10 @@ from pikanid.approximators.bspline import uniform_knots
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.remainder import residual_tests
-from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.settings.settings import Settings
+from pikanid.noise.projection import project
 from pikanid.symbolic.curve import Curve
 
 INTERVALS, DEGREE = 8, 3  # numerical: knots to spare, which the penalty holds down; cubic

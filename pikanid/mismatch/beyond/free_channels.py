@@ -19,12 +19,12 @@ from scipy.interpolate import BSpline
 from pikanid.approximators.bspline import uniform_knots
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import acts_in, needed
 from pikanid.mismatch.judge.partial import Explanations, dominance
+from pikanid.noise.projection import project
 
 INTERVALS, DEGREE = 24, 3  # numerical: fine enough for a few periods of cogging
 GAUGE = 1e-3  # numerical: of a sign: less is left when the free parameters can do the same

@@ -7,7 +7,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from pikanid.mismatch.detect.residual_tests import orthonormal
+from pikanid.noise.projection import orthonormal
 
 # of the force, in knot intervals: it follows an oscillation, or does not
 MEMORIES = (2.0, 50.0)  # numerical: the likelihood takes one of two, and is flat between them

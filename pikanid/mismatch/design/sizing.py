@@ -11,13 +11,13 @@ from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.design.response import SHARE, Sigma
-from pikanid.mismatch.detect.residual_tests import project
 from pikanid.mismatch.fitting.descent import start_from
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.noise.level import NoiseModel
+from pikanid.noise.projection import project
 from pikanid.recording import Channel, Recording
 from pikanid.simulation.synthetic import with_outputs
 

@@ -19,6 +19,7 @@ from scipy.special import chdtrc, roots_hermitenorm
 
 from pikanid.mismatch.settings.detection import DetectionSettings
 from pikanid.mismatch.settings.settings import Settings
+from pikanid.noise.projection import project
 
 BATCH = 500  # numerical: draws at once, between which it is asked whether more would matter
 CLEAR = (1e-6, 0.1)  # numerical: p-values beyond which more draws would decide nothing
@@ -42,22 +43,6 @@ class Detection:
     inputs: float
     z: np.ndarray
     power: float
-
-
-def orthonormal(J: np.ndarray) -> np.ndarray:
-    """Orthonormal columns (N, k) that span what the columns of J (N, n) do."""
-    norms = np.linalg.norm(J, axis=0)
-    u, s, _ = np.linalg.svd(J[:, norms > 0] / norms[norms > 0], full_matrices=False)
-    return np.asarray(u[:, s > 1e-9 * s[0]] if len(s) else u)
-
-
-def project(J: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Rows (N,) or (N, k) without what the columns of J (N, n) span."""
-    if J.shape[1] == 0:
-        return rows
-    q = orthonormal(J)
-    spanned = q @ (q.T @ rows)
-    return np.asarray(np.subtract(rows, spanned, out=spanned))
 
 
 def unit_columns(D: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
