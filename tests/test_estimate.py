@@ -201,3 +201,16 @@ def test_files_cut_or_changed_anywhere(estimate: Estimate, tmp_path: Path) -> No
     (0.0, 0.1, "0.00 ± 0.10")])
 def test_rounding_shows_two_digits_of_the_error(value: float, std: float, expected: str) -> None:
     assert rounded(value, std) == expected
+
+
+def test_the_band_survives_saving_and_files_without_one_load(tmp_path: Path) -> None:
+    recording = pk.simulate(systems.sloshing(), excitation.two_pulse(), sigma=SIGMA, seed=0)
+    estimate = pk.NLS().fit(systems.sloshing(), recording)
+    path = tmp_path / "fit.json"
+    estimate.save(path)
+    again = pk.Estimate.load(path)
+    assert np.array_equal(again.fits[0].spread, estimate.fits[0].spread)
+    older = json.loads(path.read_text())
+    del older["fits"][0]["spread"]
+    path.write_text(json.dumps(older))
+    assert pk.Estimate.load(path).fits[0].spread is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import interpreted
 import numpy as np
@@ -201,3 +201,22 @@ def test_what_was_measured_comes_back_with_its_noise_and_unit() -> None:
         sigma = np.broadcast_to(np.asarray(channel.sigma), seen.shape)[seen]
         np.testing.assert_array_equal(fit.sigma, sigma)
         assert fit.rmse == pytest.approx(np.sqrt(np.mean((fit.fitted - fit.measured) ** 2)))
+
+
+def test_the_band_of_the_fit_covers_the_true_output_as_often_as_it_says() -> None:
+    """Over many fits, at every sample; with noise added, new samples, too."""
+    model = pk.systems.sloshing()
+    clean = pk.simulate(model, pk.excitation.two_pulse())
+    truth, inside, new = clean["theta"].values, [], []
+    for seed in range(120):
+        noise = np.random.default_rng(seed).normal(0.0, 0.01, (2, len(truth)))
+        rec = clean.with_channels(replace(clean["theta"], values=truth + noise[0], sigma=0.01))
+        (fit,) = pk.NLS(starts=1).fit(model, rec).fits
+        assert fit.spread is not None
+        moving = fit.spread > 0  # at rest before the first pulse: no parameter matters
+        inside.append(np.mean(np.abs(fit.fitted - truth)[moving] < 1.96 * fit.spread[moving]))
+        wide = 1.96 * np.hypot(fit.spread, 0.01)
+        new.append(np.mean(np.abs(truth + noise[1] - fit.fitted) < wide))
+    # samples of one fit go together: the spread over fits says how sure the mean is
+    for found in (inside, new):
+        assert abs(np.mean(found) - 0.95) < 3.5 * np.std(found) / np.sqrt(len(found))

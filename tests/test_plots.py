@@ -101,3 +101,14 @@ assert 'matplotlib.pyplot' not in sys.modules
 assert dict(matplotlib.rcParams) == before
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+def test_a_single_fit_shows_its_band_with_the_noise() -> None:
+    figure = plot_fits([replace(FIT, spread=np.full(81, 0.01))])
+    (band,) = figure.axes[0].collections
+    low, high = (f(band.get_paths()[0].vertices[:, 1][:81]) for f in (np.min, np.max))
+    assert (high - low) > np.ptp(FIT.fitted)
+    assert [t.get_text() for t in figure.axes[0].get_legend().get_texts()] == [
+        "measured", "95 % band", "fitted"]
+    both = plot_strategies({"a": [replace(FIT, spread=np.full(81, 0.01))], "b": [FIT]})
+    assert not both.axes[0].collections

@@ -15,6 +15,7 @@ from pikanid.comparison.runs import Run, Start, free_run
 from pikanid.model import Model
 from pikanid.noise.level import estimate
 from pikanid.objective.adequacy import difference_noise
+from pikanid.optimise.propagation import propagated
 from pikanid.problem.problem import Experiment, Samples, bind
 from pikanid.recording import Recording
 
@@ -114,8 +115,7 @@ def _spread(contender: Contender, run: Run) -> np.ndarray | None:
     """√diag(J C Jᵀ) (rows,) by the parameters that recordings share."""
     if not run.finished or not np.any(contender.covariance):
         return None
-    J = run.response.sensitivity[:, len(run.own):]
-    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", J, contender.covariance, J), 0.0))
+    return propagated(run.response.sensitivity[:, len(run.own):], contender.covariance)
 
 
 def noise_of(recording: Recording, model: Model, samples: Samples) -> tuple[np.ndarray, str]:

@@ -15,7 +15,11 @@ from pikanid.problem.problem import FreeParameter
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Measured against fitted, for an output of a recording; arrays (N,) in the model's unit."""
+    """Measured against fitted, for an output of a recording; arrays (N,) in the model's unit.
+
+    `sigma` is the noise, `spread` the standard deviation of `fitted` that the parameters'
+    covariance gives to first order; None where they are not known.
+    """
 
     recording: str
     output: str
@@ -24,6 +28,7 @@ class Fit:
     measured: np.ndarray
     fitted: np.ndarray
     sigma: np.ndarray | None = None
+    spread: np.ndarray | None = None
 
     @property
     def residual(self) -> np.ndarray:

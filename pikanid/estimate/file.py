@@ -127,12 +127,14 @@ def _free(entry: Entry, model: Model) -> FreeParameter:
 
 
 def _fit(entry: Entry) -> Fit:
-    get = entry.table(("recording", "output", "unit", "t", "measured", "fitted", "sigma"))
+    get = entry.table(("recording", "output", "unit", "t", "measured", "fitted", "sigma"),
+                      ("spread",))
     t = get["t"].array(None)
-    sigma = get["sigma"]
+    sigma, spread = get["sigma"], get.get("spread")
     return Fit(get["recording"].text(), get["output"].text(), get["unit"].text(), t,
                get["measured"].array(len(t)), get["fitted"].array(len(t)),
-               None if sigma.value is None else sigma.array(len(t)))
+               None if sigma.value is None else sigma.array(len(t)),
+               None if spread is None or spread.value is None else spread.array(len(t)))
 
 
 def _trajectory(entry: Entry, states: int) -> Trajectory:

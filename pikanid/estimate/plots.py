@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from pikanid.figures import BAND, MEASURED, labelled, new_figure, stroke, tidy
+from pikanid.figures import BAND, COLOURS, MEASURED, labelled, new_figure, stroke, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 # Beyond this many samples markers merge into a band: draw a thin line instead.
 MANY = 2000  # layout: samples of an output
+WIDE = 1.96  # definition: standard deviations of a 95 % band
 
 
 class FitLike(Protocol):
@@ -51,16 +52,22 @@ class FitLike(Protocol):
     def sigma(self) -> np.ndarray | None:
         """Standard deviation of the noise (N,), or None."""
 
+    @property
+    def spread(self) -> np.ndarray | None:
+        """Standard deviation of `fitted` (N,) by the parameters' covariance, or None."""
+
 
 def plot_fits(fits: Sequence[FitLike], title: str = "") -> Figure:
     """Measured against fitted (left) and the residual (right), a row for every output.
 
-    The grey band of the residual is ±2σ where the noise σ is known.
+    The grey band of the residual is ±2σ where the noise σ is known.  In the coloured band around
+    the fit 95 % of the samples are expected: by the parameters' covariance, to first order, and
+    the noise.
 
     >>> from types import SimpleNamespace
     >>> t = np.linspace(0, 1, 50)
     >>> fit = SimpleNamespace(recording="run", output="theta", unit="rad", t=t,
-    ...                       measured=np.sin(t), fitted=np.sin(t), sigma=None)
+    ...                       measured=np.sin(t), fitted=np.sin(t), sigma=None, spread=None)
     >>> [axes.get_ylabel() for axes in plot_fits([fit]).axes]
     ['theta [rad]', 'residual [rad]']
     """
@@ -101,12 +108,24 @@ def _curves(axes: Axes, fits: Mapping[str, FitLike]) -> None:
     axes.plot(first.t[order], first.measured[order], color=MEASURED, label="measured", **style)
     for k, (name, fit) in enumerate(fits.items()):
         order = np.argsort(fit.t, kind="stable")
+        if len(fits) == 1:
+            _band(axes, fit, order)
         axes.plot(fit.t[order], fit.fitted[order], label=name, **stroke(k, 0.7))
     axes.set_ylabel(labelled(first.output, first.unit))
     # Above the axes: inside, a legend would cover an oscillation somewhere.
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(fits) + 1, frameon=False,
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(fits) + 2, frameon=False,
                 fontsize="small", borderaxespad=0.1, handlelength=1.4)
     tidy(axes)
+
+
+def _band(axes: Axes, fit: FitLike, order: np.ndarray) -> None:
+    """Where 95 % of the samples are expected: parameters by their covariance, and noise."""
+    if fit.spread is None:
+        return
+    noise = 0.0 if fit.sigma is None else fit.sigma
+    wide = (WIDE * np.hypot(fit.spread, noise))[order]
+    axes.fill_between(fit.t[order], fit.fitted[order] - wide, fit.fitted[order] + wide, alpha=0.25,
+                      color=COLOURS[0], linewidth=0, label="95 % band")
 
 
 def _residuals(axes: Axes, fits: Mapping[str, FitLike]) -> None:

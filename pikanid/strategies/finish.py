@@ -12,6 +12,7 @@ from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
 from pikanid.objective.shooting import Shooting
+from pikanid.optimise.propagation import propagated
 from pikanid.problem.problem import Problem
 from pikanid.storage.version import __version__
 from pikanid.uncertainty.information import (
@@ -36,7 +37,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     at_bound = np.isclose(theta, problem.lower, rtol=1e-6, atol=0) | np.isclose(
         theta, problem.upper, rtol=1e-6, atol=0)
     cov = covariance(jacobian, ~at_bound) * scale
-    fits, trajectories = evaluate(problem, shooting, theta)
+    fits, trajectories = evaluate(problem, shooting, theta, cov)
     notes = [*warnings]
     if not converged:
         notes.append("The optimiser stopped before it converged: raise max_evaluations or give "
@@ -61,17 +62,22 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         version=__version__, approximator=approximator)
 
 
-def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray
-             ) -> tuple[tuple[Fit, ...], tuple[Trajectory, ...]]:
-    """Simulated outputs beside the measured ones, and the states."""
+def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray,
+             cov: np.ndarray | None = None) -> tuple[tuple[Fit, ...], tuple[Trajectory, ...]]:
+    """Simulated outputs beside the measured ones, with what the covariance of θ does to them, and
+    the states.
+    """
     fits, trajectories = [], []
     responses = shooting.responses(theta, states=True)
-    for e, response in zip(problem.experiments, responses, strict=True):
+    for r, (e, response) in enumerate(zip(problem.experiments, responses, strict=True)):
         trajectories.append(Trajectory(response.t, response.states))
+        own = problem.columns(r)[1]
+        spread = None if cov is None else propagated(response.sensitivity, cov[np.ix_(own, own)])
         row = 0
         for s in e.samples:
             output = problem.model.outputs[s.output]
             fits.append(Fit(e.name, output.name, output.unit, s.t, s.y,
-                            response.y[row:row + len(s.t)].copy(), s.sigma))
+                            response.y[row:row + len(s.t)].copy(), s.sigma,
+                            None if spread is None else spread[row:row + len(s.t)]))
             row += len(s.t)
     return tuple(fits), tuple(trajectories)

@@ -26,7 +26,7 @@ from pikanid.objective.functional import Functional
 from pikanid.objective.shooting import Shooting
 from pikanid.problem.chains import Chains
 from pikanid.problem.problem import Problem
-from pikanid.strategies.finish import finish
+from pikanid.strategies.finish import evaluate, finish
 from pikanid.strategies.relaxation import RelaxedFit
 
 
@@ -120,7 +120,8 @@ def assemble(strategy: str, fit: Relaxed, settings: Mapping[str, Any],
     covariance = fit.covariance.copy()
     stuck = np.isnan(np.diag(estimate.covariance)) if finished else np.diag(covariance) == 0.0
     covariance[stuck] = covariance[:, stuck] = np.nan
-    return replace(estimate, covariance=covariance, converged=fit.converged,
+    fits = evaluate(fit.problem, shooting, fit.theta, covariance)[0] if finished else estimate.fits
+    return replace(estimate, covariance=covariance, converged=fit.converged, fits=fits,
                    seconds=time.perf_counter() - begun)
 
 

@@ -11,6 +11,7 @@ from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.objective.adequacy import judge
+from pikanid.optimise.propagation import propagated
 from pikanid.storage.version import __version__
 
 
@@ -22,11 +23,14 @@ def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
     for r, response in enumerate(whitened.responses(h.minimum.theta, states=True)):
         trajectories.append(Trajectory(response.t, response.states))
         experiment, row = problem.experiments[r], 0
+        own = problem.columns(r)[1]
+        spread = propagated(response.sensitivity, h.covariance[np.ix_(own, own)])
         for s in experiment.samples:
             output = problem.model.outputs[s.output]
             sigma = whitened.records.levels[r][output.name].sigma
             fits.append(Fit(experiment.name, output.name, output.unit, s.t, s.y,
-                            response.y[row:row + len(s.t)].copy(), np.full(len(s.t), sigma)))
+                            response.y[row:row + len(s.t)].copy(), np.full(len(s.t), sigma),
+                            spread[row:row + len(s.t)]))
             row += len(s.t)
     adequacy = judge([f.residual for f in fits], [f.sigma for f in fits],
                      [f.measured for f in fits], len(h.minimum.theta),
@@ -43,4 +47,7 @@ def widened(estimate: Estimate, overdispersion: float) -> Estimate:
     so much, covariances are multiplied by it (P. McCullagh and J. A. Nelder, Generalized Linear
     Models, 1989, sec. 4.5).
     """
-    return replace(estimate, covariance=overdispersion * estimate.covariance)
+    wider = overdispersion**0.5
+    fits = tuple(f if f.spread is None else replace(f, spread=wider * f.spread)
+                 for f in estimate.fits)
+    return replace(estimate, covariance=overdispersion * estimate.covariance, fits=fits)
