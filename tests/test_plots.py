@@ -106,9 +106,12 @@ assert dict(matplotlib.rcParams) == before
 def test_a_single_fit_shows_its_band_with_the_noise() -> None:
     figure = plot_fits([replace(FIT, spread=np.full(81, 0.01))])
     (band,) = figure.axes[0].collections
-    low, high = (f(band.get_paths()[0].vertices[:, 1][:81]) for f in (np.min, np.max))
-    assert (high - low) > np.ptp(FIT.fitted)
+    edges = band.get_paths()[0].vertices
+    at = np.isclose(edges[:, 0], T[40])
+    assert np.ptp(edges[at, 1]) == pytest.approx(2 * 1.96 * np.hypot(0.01, 0.02))
     assert [t.get_text() for t in figure.axes[0].get_legend().get_texts()] == [
         "measured", "95 % band", "fitted"]
+    unknown = plot_fits([replace(FIT, sigma=None, spread=np.full(81, 0.01))]).axes[0]
+    assert "95 % of the parameters" in [t.get_text() for t in unknown.get_legend().get_texts()]
     both = plot_strategies({"a": [replace(FIT, spread=np.full(81, 0.01))], "b": [FIT]})
     assert not both.axes[0].collections

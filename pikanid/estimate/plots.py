@@ -119,13 +119,16 @@ def _curves(axes: Axes, fits: Mapping[str, FitLike]) -> None:
 
 
 def _band(axes: Axes, fit: FitLike, order: np.ndarray) -> None:
-    """Where 95 % of the samples are expected: parameters by their covariance, and noise."""
+    """Where 95 % of the samples are expected, by the parameters' covariance and the noise; where
+    that is not known, the fit of other recordings like this one.
+    """
     if fit.spread is None:
         return
     noise = 0.0 if fit.sigma is None else fit.sigma
     wide = (WIDE * np.hypot(fit.spread, noise))[order]
     axes.fill_between(fit.t[order], fit.fitted[order] - wide, fit.fitted[order] + wide, alpha=0.25,
-                      color=COLOURS[0], linewidth=0, label="95 % band")
+                      color=COLOURS[0], linewidth=0,
+                      label="95 % band" if fit.sigma is not None else "95 % of the parameters")
 
 
 def _residuals(axes: Axes, fits: Mapping[str, FitLike]) -> None:
