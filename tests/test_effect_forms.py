@@ -35,7 +35,8 @@ def around(model: pk.Model, channels: dict[str, str] | None = None) -> Surroundi
     channels = channels or {}
     sizes = {**dict.fromkeys(model.input_names, 2.0), **dict.fromkeys(channels, 5.0)}
     ranges = dict.fromkeys(model.state_names, (1.0, 3.0))
-    return Surroundings(model, model.state_names, ranges, sizes, channels, 100.0)
+    seen = dict.fromkeys(model.output_names, (0.0, 2.0))
+    return Surroundings(model, model.state_names, ranges, seen, sizes, channels, 100.0)
 
 
 def form(content: dict[str, Any], key: str = "own") -> EffectForm:

@@ -59,3 +59,26 @@ def truth_case(detail: str) -> str:
 def diagnosis_unreadable(case: str, detail: object) -> str:
     return (f"The diagnosis of case '{short(case)}' cannot be scored: {short(str(detail))} "
             "(wanted: verdict, mismatch, and hypotheses with effects' ids and a probability).")
+
+
+def not_for_scipy(model: str) -> str:
+    return (f"'{short(model)}' has splines, play or rate limits of inputs, which concealed "
+            "recordings are not simulated with: leave them out.")
+
+
+def conceal_needs_inputs() -> str:
+    return ("An input of the model is not in the experiment and has no default: record it, or give "
+            "one.")
+
+
+def conceal_noise(share: float) -> str:
+    return f"--noise is {share:g}; give the share of an output's range, 1e-6 to 0.5, such as 0.005."
+
+
+def conceal_one_time_base(name: str) -> str:
+    return (f"The channels of '{short(name)}' have several time bases; recordings are concealed on "
+            "one: resample them.")
+
+
+def conceal_at_rest(output: str) -> str:
+    return f"Output '{short(output)}' does not move in this experiment: choose one that drives it."

@@ -27,6 +27,7 @@ class Surroundings:
         model: Nominal.
         states: Whose equations may lack something.
         ranges: Lowest and highest value of each state along the motion.
+        seen: The same of each output, as recorded.
         sizes: Largest size of each input and channel.
         channels: Recorded, and not used by the model; with units.
         duration: Of the recordings [s].
@@ -36,6 +37,7 @@ class Surroundings:
     model: Lookup
     states: tuple[str, ...]
     ranges: Mapping[str, tuple[float, float]]
+    seen: Mapping[str, tuple[float, float]]
     sizes: Mapping[str, float]
     channels: Mapping[str, str]
     duration: float
@@ -44,17 +46,33 @@ class Surroundings:
     def choices(self, kind: str, bound: Mapping[str, str]) -> list[str]:
         """What a placeholder of this kind may stand for beside those that are bound."""
         first = next(iter(bound.values()), "")
+        rates = self.rates
         return {
             "state": [*self.states],
             "other state": [n for n in self.model.state_names if n not in bound.values()],
+            "coordinate": [q for q, v in rates.items() if v in self.states],
+            "its rate": [rates[first]] if first in rates else [],
+            "output": [n for n in self.model.output_names if n in self.seen],
             "input": [n for n in self.model.input_names if n in self.sizes],
             "channel": [*self.channels],
             "parameter": [p for p in self.model.free_names if first in self.model.equations
                           and symbol(p) in self.model.equations[first].free_symbols]}[kind]
 
+    @property
+    def rates(self) -> dict[str, str]:
+        """Of each state that is a coordinate, the state that is its rate."""
+        rights = {s.name: self.model.equations[s.name] for s in self.model.states}
+        return {q: e.name for q, e in rights.items()
+                if e.is_Symbol and e.name in rights and e.name != q}
+
+    def range_of(self, name: str, kind: str) -> tuple[float, float]:
+        """Lowest and highest value of a state, or of an output."""
+        return (self.seen if kind == "output" else self.ranges).get(name, (0.0, 1.0))
+
     def unit(self, name: str) -> str:
-        """Of a state, input, parameter or channel; empty where it says none."""
-        own = {**{s.name: s.unit for s in self.model.states},
+        """Of a state, input, output, parameter or channel; empty where it says none."""
+        own = {**{o.name: o.unit for o in self.model.outputs},
+               **{s.name: s.unit for s in self.model.states},
                **{i.name: i.unit for i in self.model.inputs},
                **{p.name: p.unit for p in self.model.parameters}}
         return own.get(name, self.channels.get(name, ""))
@@ -77,7 +95,7 @@ def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,
           alone: bool) -> Effect:
     values = {"duration": around.duration}
     for name, wanted in binding.items():
-        low, high = around.ranges.get(wanted, (0.0, 1.0))
+        low, high = around.range_of(wanted, form.places[name])
         values |= {f"{name}_low": low, f"{name}_high": high,
                    f"{name}_size": around.sizes.get(wanted, 1.0),
                    f"{name}_value": around.model.values.get(wanted, 1.0)}

@@ -9,8 +9,10 @@
     null = { k = 0 }
 
 Texts in braces become the unit of what a placeholder stands for, in names its name.  Guesses and
-bounds may be formulas of the range that a state covers, of the largest size of an input or a
-channel (``u_size``), of a parameter's value (``p_value``) and of the recordings' duration [s].
+bounds may be formulas of the range that a state or an output covers (``x_low``, ``x_high``), of the
+largest size of an input or a channel (``u_size``), of a parameter's value (``p_value``) and of the
+recordings' duration [s].  A coordinate is a state whose rate is another state: ``"its rate"``, the
+place after it, is that one.  A parameter is one of the equation of the first place.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ from pikanid.formula.expressions import check_name
 from pikanid.storage.entries import Entry
 
 MOST_PLACES = 4  # limit: of placeholders in one form
-FIRST = ("state", "input")
-KINDS = ("state", "other state", "input", "channel", "parameter")
+FIRST = ("state", "coordinate", "input", "output")
+KINDS = ("state", "other state", "coordinate", "its rate", "input", "output", "channel",
+         "parameter")
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ class Recording(Leaving):
             raise errors.BadRecording(errors.not_of_kind("'values'", kind, wanted))
         for what, given in (("units", units), ("sigma", sigma), ("hold", hold)):
             for unknown in set(given or ()) - set(values):
-                raise errors.BadSetting(errors.unknown_channel_setting(what, unknown, values))
+                raise errors.BadSetting(errors.unknown_channel_setting(what, unknown, [*values]))
         made = {
             key: Channel(
                 key,

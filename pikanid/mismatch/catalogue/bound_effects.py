@@ -39,12 +39,19 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     names = [*(i for i in site.model.input_names if i in first), *site.extra]
     around = Surroundings(
         site.model, tuple(dict.fromkeys(s.v for s in sites)), ranges(),
+        {n: _range(first, n) for n in site.model.output_names if n in first},
         {n: float(np.abs(first[n].values).max(initial=0.0)) for n in names},
         {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings))
     for form in forms:
         around = replace(around, taken=frozenset(n for e in own for n in e.names))
         own += [e for e in bound(form, around) if _fits(site.model, e)]
     return own
+
+
+def _range(recording: Recording, name: str) -> tuple[float, float]:
+    values = recording[name].values
+    seen = values[np.isfinite(values)]
+    return (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
 
 
 def _fits(model: Model, effect: Effect) -> bool:

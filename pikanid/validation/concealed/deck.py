@@ -94,7 +94,7 @@ def deal(cases: int, mix: Mapping[str, float], rng: np.random.Generator) -> list
     outside = _endless((*OUTSIDE, *[FLOW] * len(OUTSIDE)), rng)
     unforeseen, steady, hand = _endless(UNFORESEEN, rng), _endless(STEADY, rng), _Hand(LAWS, rng)
     cards = []
-    for kind, number in _counts(cases, mix).items():
+    for kind, number in counts(cases, mix).items():
         for _ in range(number):
             if kind == "single":
                 cards.append(Card(kind, (_variant(next(ids), rng),)))
@@ -116,7 +116,7 @@ def deal(cases: int, mix: Mapping[str, float], rng: np.random.Generator) -> list
     return [cards[k] for k in rng.permutation(len(cards))]
 
 
-def _counts(cases: int, mix: Mapping[str, float]) -> dict[str, int]:
+def counts(cases: int, mix: Mapping[str, float]) -> dict[str, int]:
     """Whole numbers that sum to `cases`, by largest remainders."""
     exact = {kind: cases * mix.get(kind, 0.0) for kind in CLASSES}
     counts = {kind: int(number) for kind, number in exact.items()}

@@ -51,6 +51,8 @@ def families_of_entry(effect: Mapping[str, Any]) -> set[str]:
     >>> sorted(families_of_entry({"id": "power_drag", "parameters": {"n": {"value": 0.2}}}))
     ['drag', 'dry friction']
     """
+    if "families" in effect:
+        return {*effect["families"]}
     found = families_of(effect["id"], effect.get("variant", ""))
     for twin in effect.get("twins", ()):
         found |= families_of(twin)

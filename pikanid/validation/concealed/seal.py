@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from pikanid import errors
@@ -66,12 +66,13 @@ def secret(seed: int | None) -> Secret:
     return Secret(seed, nonce, sealed=False)
 
 
-def truth_content(settings: Settings, key: Secret, cases: Sequence[Mapping[str, object]]) -> bytes:
+def truth_content(settings: Mapping[str, object], key: Secret,
+                  cases: Sequence[Mapping[str, object]]) -> bytes:
     """The truth file."""
     return files.canonical({
         "schema_version": SCHEMA_VERSION, "generator": GENERATOR, "sealed": key.sealed,
         "open": not key.sealed, "seed": str(key.seed), "nonce": key.nonce,
-        "settings": asdict(settings), "cases": list(cases)})
+        "settings": dict(settings), "cases": list(cases)})
 
 
 def seal_content(truth: bytes, sealed: bool) -> bytes:

@@ -1,0 +1,100 @@
+"""How far a model stays from a recording without noise, whatever its parameters are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pikanid import errors
+from pikanid.model import Model
+from pikanid.recording import Recording
+from pikanid.validation.concealed.arrays import Array
+from pikanid.validation.own_model.plant import Plant
+
+STEP = 1e-5  # numerical: relative, of a finite difference through the simulator
+MOST_FITS = 12  # numerical: evaluations of a refit, each with a Jacobian
+FAR = 1e6  # numerical: [σ] in place of a residual of a motion that diverges
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """An experiment with the noise of its outputs.
+
+    Attributes:
+        experiment: Inputs.
+        sigma: Standard deviation of each output.
+    """
+
+    experiment: Recording
+    sigma: Mapping[str, float]
+
+    def whitened(self, outputs: Mapping[str, Array]) -> Array:
+        """(rows,) all outputs, each over its noise."""
+        return np.concatenate([outputs[n] / s for n, s in self.sigma.items()])
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A refit: distance [σ] and values of what was free."""
+
+    distance: float
+    values: Mapping[str, float]
+
+
+def sensitivities(plant: Plant, scene: Scene, values: Mapping[str, float], names: Sequence[str],
+                  clean: Array) -> Array:
+    """(rows, n) derivatives of the whitened outputs, in relative steps of each parameter.
+
+    Raises:
+        SimulationFailed: If the motion diverges.
+    """
+    columns = []
+    for name in names:
+        step = STEP * (abs(values[name]) or 1.0)
+        moved = scene.whitened(plant.outputs({**values, name: values[name] + step},
+                                             scene.experiment))
+        columns.append((moved - clean) / STEP)
+    return np.column_stack(columns)
+
+
+def beyond(change: Array, directions: Array) -> float:
+    """Length of what is left of a change [σ] when it is projected on directions (rows, n)."""
+    scale = np.linalg.norm(directions, axis=0)
+    kept = directions[:, scale > 0] / scale[scale > 0]
+    return float(np.linalg.norm(change - kept @ np.linalg.lstsq(kept, change, rcond=1e-9)[0]))
+
+
+def refit(model: Model, scene: Scene, truth: Array, start: Mapping[str, float],
+          free: Sequence[str]) -> Fit:
+    """The least-squares distance of a model from a truth (rows,) without noise.
+
+    Args:
+        model: Whatever explains.
+        scene: Experiment and noise.
+        truth: Whitened.
+        start: Values of all parameters that are not the model's own.
+        free: Names of those that are fitted, within their bounds.
+    """
+    plant = Plant(model)
+    bounds = {p.name: p.bounds for p in model.parameters}
+    low, high = (np.array([bounds[n][k] for n in free]) for k in (0, 1))
+    x = np.clip([start[n] for n in free], low, high)
+    scale = np.where(x != 0, np.abs(x), 1.0)
+
+    def residual(z: Array) -> Array:
+        values = {**start, **dict(zip(free, z * scale, strict=True))}
+        try:
+            return scene.whitened(plant.outputs(values, scene.experiment)) - truth
+        except errors.SimulationFailed:
+            return np.full(len(truth), FAR)
+
+    inside = np.clip(x / scale, low / scale, high / scale)
+    inside = np.where(inside == low / scale, inside + 1e-6, inside)
+    inside = np.where(inside >= high / scale, high / scale - 1e-6, inside)
+    found = least_squares(residual, inside, bounds=(low / scale, high / scale),
+                          diff_step=np.full(len(free), STEP), max_nfev=MOST_FITS)
+    values = dict(zip(free, (found.x * scale).tolist(), strict=True))
+    return Fit(float(np.sqrt(2 * found.cost)), {**start, **values})

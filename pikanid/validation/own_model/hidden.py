@@ -1,0 +1,170 @@
+"""A law at the size at which it is as visible as wanted, and what else could explain it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.model import Model
+from pikanid.recording import Recording
+from pikanid.validation.concealed.arrays import Array
+from pikanid.validation.concealed.visibility import FROM_NOMINAL
+from pikanid.validation.own_model.distance import Fit, Scene, beyond, refit, sensitivities
+from pikanid.validation.own_model.law import Law
+from pikanid.validation.own_model.plant import Plant
+
+FAINTEST, GROSSEST = 3.0, 600.0  # definition: [σ] that a law is aimed at
+SHARE = 0.15  # definition: RMS of what a law changes, at most, in ranges of the output
+LADDER = np.geomspace(1e-4, 1e3, 15)  # numerical: times the guess of a size
+HALVINGS = 8  # numerical: of the logarithm between two rungs
+SHAPES = 2  # numerical: values of a rival's shape to first order
+FULL = 3  # numerical: rivals that are refitted
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """A law with the values of all its parameters."""
+
+    law: Law
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Workbench:
+    """The nominal model at true values in a scene, and what it costs to know there."""
+
+    model: Model
+    values: Mapping[str, float]
+    scene: Scene
+
+    @cached_property
+    def plant(self) -> Plant:
+        """The nominal one."""
+        return Plant(self.model)
+
+    @cached_property
+    def clean(self) -> Array:
+        """(rows,) whitened outputs without any law."""
+        return self.scene.whitened(self.plant.outputs(self.values, self.scene.experiment))
+
+    @cached_property
+    def directions(self) -> Array:
+        """(rows, n) derivatives to the free parameters."""
+        return sensitivities(self.plant, self.scene, self.values, self.model.free_names, self.clean)
+
+    def extended(self, hidden: Sequence[Hidden]) -> Model:
+        """The model with laws, at their guesses."""
+        model = self.model
+        for one in hidden:
+            model = model.with_effect(one.law.effect, self.model)
+        return model
+
+    def at(self, hidden: Sequence[Hidden]) -> dict[str, float]:
+        """Values of the free parameters and of those of the laws."""
+        return {**self.values, **{n: v for one in hidden for n, v in one.values.items()}}
+
+    def outputs(self, hidden: Sequence[Hidden], experiment: Recording) -> dict[str, Array]:
+        """Of the model with laws in an experiment.
+
+        Raises:
+            SimulationFailed: If the motion diverges.
+        """
+        return Plant(self.extended(hidden)).outputs(self.at(hidden), experiment)
+
+    def seen(self, hidden: Sequence[Hidden]) -> Array:
+        """(rows,) whitened outputs.
+
+        Raises:
+            SimulationFailed: If the motion diverges.
+        """
+        return self.scene.whitened(self.outputs(hidden, self.scene.experiment))
+
+    def missed(self, hidden: Sequence[Hidden]) -> float:
+        """Distance of the nominal model [σ], to first order in what it can absorb."""
+        return beyond(self.seen(hidden) - self.clean, self.directions)
+
+    def sized(self, law: Law, rng: np.random.Generator) -> Hidden:
+        """A law at a size whose distance is drawn evenly in its logarithm.
+
+        Raises:
+            SimulationFailed: If it does not reach what is wanted.
+        """
+        shape, size = law.drawn(rng), law.size
+        null = law.effect.null[1]
+        signs = [s for s in (1.0, -1.0) if size.bounds[0] <= null + s * 1e-12 <= size.bounds[1]]
+        unit = float(rng.choice(signs)) * (abs(size.value - null) or 1.0)
+        rows = len(self.clean)
+        noise = min(s / np.ptp(y) for s, y in zip(
+            self.scene.sigma.values(), self.outputs([], self.scene.experiment).values(),
+            strict=True))
+        most = min(GROSSEST, SHARE / noise * rows**0.5)
+        wanted = float(np.exp(rng.uniform(np.log(FAINTEST), np.log(max(most, 2 * FAINTEST)))))
+
+        def at(times: float) -> Hidden:
+            value = float(np.clip(null + unit * times, *size.bounds))
+            return Hidden(law, {**shape, size.name: float(f"{value:.4g}")})
+
+        def far(times: float) -> float:
+            try:
+                return self.missed([at(times)])
+            except errors.SimulationFailed:
+                return np.inf
+
+        rung = next((k for k, times in enumerate(LADDER) if far(float(times)) >= wanted), None)
+        if rung is None:
+            raise errors.SimulationFailed(errors.conceal_faint())
+        low, high = np.log(LADDER[max(rung - 1, 0)]), np.log(LADDER[rung])
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if far(float(np.exp(middle))) < wanted else (low, middle)
+        return at(float(np.exp(low)))
+
+    def nearest(self, truth: Array, hidden: Sequence[Hidden], laws: Sequence[Law],
+                rng: np.random.Generator) -> tuple[tuple[str, ...], float]:
+        """Ids and distance [σ] of the best explanation that is not the truth: another known law in
+        the place of one that hides, beside the others.
+        """
+        change = truth - self.clean
+        ranked: list[tuple[float, list[Hidden]]] = []
+        ways = [[h for h in hidden if h is not out] for out in hidden]
+        for law in laws:
+            if not law.known or any(_same(law, h.law) for h in hidden):
+                continue
+            for _ in range(SHAPES if law.shapes else 1):
+                rival = Hidden(law, {**law.drawn(rng), law.size.name: law.size.value or 1.0})
+                try:
+                    moved = self.seen([rival]) - self.clean
+                except errors.SimulationFailed:
+                    continue
+                for way in ways:
+                    beside = [self.seen([h]) - self.clean for h in way]
+                    far = beyond(change, np.column_stack([self.directions, moved, *beside]))
+                    ranked.append((far, [*way, rival]))
+        ranked.sort(key=lambda pair: pair[0])
+        best: tuple[tuple[str, ...], float] = ((), np.inf)
+        for _, explanation in ranked[:FULL]:
+            found = self.fitted(truth, explanation)
+            if found.distance < best[1]:
+                best = tuple(h.law.id for h in explanation), found.distance
+        return best
+
+    def fitted(self, truth: Array, hidden: Sequence[Hidden]) -> Fit:
+        """The model with these laws, all of them refitted to a truth."""
+        free = [*self.model.free_names, *(p.name for h in hidden for p in (
+            h.law.size, *h.law.shapes))]
+        return refit(self.extended(hidden), self.scene, truth, self.at(hidden), free)
+
+
+def _same(a: Law, b: Law) -> bool:
+    """Whether naming one for the other is right."""
+    return a.id == b.id or a.id in b.twins
+
+
+def nameable(hidden: Sequence[Hidden], nominal: float, rival: float, from_rival: float) -> bool:
+    """Whether a diagnosis could tell: every law known, far enough from what else there is."""
+    return (bool(hidden) and all(h.law.known for h in hidden) and nominal >= FROM_NOMINAL
+            and rival >= from_rival)

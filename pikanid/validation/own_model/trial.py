@@ -1,0 +1,100 @@
+"""Diagnoses of a concealed set, kept one by one, and scored."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pikanid.model import Model
+from pikanid.recording import Recording
+from pikanid.storage.outputs import atomically
+from pikanid.storage.workers import unordered
+from pikanid.validation.concealed.score import Score, judge
+from pikanid.validation.concealed.seal import read_truth
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One case: the score, whether the place was right, and what it cost.
+
+    Attributes:
+        score: Of the names.
+        place: Whether channel and, of laws in an equation, the equation are right; None where
+            nothing hides or two effects hide in different places, or no answer is right.
+        cpu: Processor time of the diagnosis [s].
+        said: Ids that were given.
+        hidden: Ids and places.
+    """
+
+    score: Score
+    place: bool | None
+    cpu: float
+    said: str
+    hidden: str
+
+
+def trials(folder: str | Path, truth: str | Path, model: Model, answers: str | Path,
+           workers: int = 1, step: Callable[[str], None] = lambda text: None) -> list[Trial]:
+    """Diagnose every case of a set that has no answer yet, and score all.
+
+    Args:
+        folder: Of the recordings.
+        truth: File; it is read for the names of the cases first, and nothing of it reaches a
+            diagnosis.
+        model: Nominal, with the effects that it may lack.
+        answers: Folder of the answers, one file a case.
+        workers: Processes.
+        step: Called with the number of a case that is done.
+
+    Raises:
+        BadSetting: If the truth cannot be read.
+    """
+    cases: Sequence[Mapping[str, Any]] = read_truth(truth)["cases"]  # type: ignore[assignment]
+    kept = Path(answers)
+    kept.mkdir(parents=True, exist_ok=True)
+    waiting = [c["id"] for c in cases if not (kept / f"{c['id']}.json").exists()]
+    for done in unordered(_answer, [(str(folder), case, model, str(kept)) for case in waiting],
+                          min(workers, max(len(waiting), 1))):
+        step(done)
+    return [_trial(case, json.loads((kept / f"{case['id']}.json").read_bytes())) for case in cases]
+
+
+def _answer(folder: str, case: str, model: Model, answers: str) -> str:
+    from pikanid.mismatch.diagnose import diagnose
+
+    train, held_out = (Recording.read(Path(folder) / f"{case}_{part}.csv")
+                       for part in ("train", "held_out"))
+    begun = time.process_time()
+    answer = diagnose(model, train, held_out, workers=1).to_dict()
+    answer["cpu"] = time.process_time() - begun
+    atomically(Path(answers) / f"{case}.json", json.dumps(answer).encode())
+    return case
+
+
+def _trial(case: Mapping[str, Any], answer: Mapping[str, Any]) -> Trial:
+    score = judge(case, answer)
+    if answer["verdict"] == "partial":
+        said = " + ".join("/".join(p["ids"]) if p["ids"] else f"({p['family']})"
+                          for p in answer["present"])
+    else:
+        said = " | ".join(" + ".join("/".join(e["ids"]) for e in h["effects"])
+                          for h in answer["hypotheses"])
+    hidden = " + ".join(f"{e['id']}[{e['variant'] or e['where']['place']}]"
+                        for e in case["effects"])
+    return Trial(score, _placed(case, answer) if score.outcome == "right" else None,
+                 float(answer["cpu"]), said, hidden or "-")
+
+
+def _placed(case: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
+    places = {(e["where"]["channel"], e["where"]["place"]) for e in case["effects"]}
+    if len(places) != 1:
+        return None
+    (channel, place), said = places.pop(), answer["where"]
+    if len({*said["channels"]}) > 1 and channel in said["channels"]:
+        return True  # which of them cannot be known: twins
+    return bool(channel == said["channel"] and (
+        channel != "dynamics" or place == said["equation"]))

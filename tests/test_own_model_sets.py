@@ -1,0 +1,144 @@
+"""Concealed recordings of any model: SciPy's simulator, laws, sizes, truths."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid import errors
+from pikanid.model import Effect
+from pikanid.model.parts import Parameter
+from pikanid.validation.concealed.score import judge
+from pikanid.validation.own_model.case import Order, make
+from pikanid.validation.own_model.generate import OwnSet, generate
+from pikanid.validation.own_model.hidden import Workbench
+from pikanid.validation.own_model.law import Law
+from pikanid.validation.own_model.plant import Plant
+from pikanid.validation.own_model.rig import Rig
+
+
+def inputs(model: pk.Model, n: int = 200, dt: float = 0.02, seed: int = 0) -> pk.Recording:
+    """Steps, after a tenth without any."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n) * dt
+    piece = (t / t[-1] * 19).astype(int)
+    driven = [i for i in model.inputs if i.default is None]
+    steps = {i.name: np.where(piece < 2, 0.0, rng.uniform(-1, 1, 20)[piece]) for i in driven}
+    return pk.Recording.from_arrays(t, steps or {"clock": t}, {i.name: i.unit for i in driven})
+
+
+def effect(model: pk.Model, **change: dict) -> pk.Model:
+    parameters = (Parameter("e", 0.03, ""),)
+    return model.with_effect(Effect("own", "own", parameters, ("e", 0.0), **change))
+
+
+MOTOR, CRANE = pk.systems.dc_motor(), pk.systems.cart_pole()
+
+
+@pytest.mark.parametrize("model", [
+    MOTOR, CRANE, pk.systems.two_mass_drive(), pk.systems.lotka_volterra(),
+    effect(MOTOR, inputs={"u": {"delay": "e"}}), effect(MOTOR, inputs={"u": {"lag": "e"}}),
+    effect(MOTOR, inputs={"u": {"saturation": "0.5", "dead_zone": "e"}}),
+    effect(MOTOR, outputs={"omega": {"delay": "e"}}),
+    effect(MOTOR, outputs={"omega": {"lag": "e", "drift": "e", "gain": "1 + e"}}),
+    effect(MOTOR, add={"omega": "-e*signed_power(omega, 1.5) - e*tanh(omega/0.1)"}),
+    effect(CRANE, add={"x_dot": "-30*max(x - e, 0) - clip(x_dot, -e, e)"})])
+def test_scipys_simulator_agrees_with_the_kits(model: pk.Model) -> None:
+    experiment = inputs(model)
+    ours = Plant(model).outputs({}, experiment)
+    theirs = pk.simulate(model, experiment)
+    for name, y in ours.items():
+        kit = theirs[name].values
+        assert np.max(np.abs(y - kit)) < 2e-5 * (np.ptp(kit) or 1.0), name
+
+
+def test_what_scipys_simulator_does_not_do_is_refused() -> None:
+    with pytest.raises(errors.BadModel, match="play"):
+        Plant(MOTOR.map_input("u", backlash="0.1"))
+
+
+def test_a_motion_that_diverges_is_said() -> None:
+    bad = effect(MOTOR, add={"omega": "1e3*omega*abs(omega)"})
+    with pytest.raises(errors.SimulationFailed):
+        Plant(bad).outputs({"e": 1.0}, inputs(MOTOR))
+
+
+@pytest.fixture(scope="module")
+def motor_rig() -> Rig:
+    return Rig(MOTOR, inputs(MOTOR, seed=1), inputs(MOTOR, seed=2), 0.005)
+
+
+def law(rig: Rig, key: str) -> Law:
+    return next(one for one in rig.laws(rig.nominal.values) if one.id == key)
+
+
+def test_a_law_stands_where_it_acts(motor_rig: Rig) -> None:
+    found = {(one.id, one.channel, one.where) for one in motor_rig.laws(MOTOR.values)}
+    assert ("coulomb_friction", "dynamics", "omega") in found
+    assert ("input_saturation", "input", "u") in found
+    assert ("sensor_lag", "sensor", "omega") in found
+    assert ("parameter_drift", "dynamics", "omega") in found
+    assert law(motor_rig, "input_delay").twins == ("sensor_delay",)
+    assert not [one for one in found if one[0] == "cubic_stiffness"]  # there is no coordinate
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_law_is_as_far_as_is_wanted(motor_rig: Rig, seed: int) -> None:
+    values = {n: MOTOR.values[n] for n in MOTOR.free_names}
+    bench = Workbench(motor_rig.nominal, values, motor_rig.scene(values))
+    hidden = bench.sized(law(motor_rig, "coulomb_friction"), np.random.default_rng(seed))
+    first, refitted = bench.missed([hidden]), bench.fitted(bench.seen([hidden]), []).distance
+    assert 2.5 < first < 620
+    assert refitted == pytest.approx(first, rel=0.25)
+    assert bench.fitted(bench.seen([hidden]), [hidden]).distance < 0.5
+
+
+def test_a_case_is_a_function_of_its_order_and_its_truth_is_judged(motor_rig: Rig) -> None:
+    order = Order("001", 3, 0, "single", motor_rig)
+    case = make(order)
+    assert case.recordings == order.made().recordings
+    hidden, = case.truth["effects"]  # type: ignore[misc]
+    answer = {"verdict": "named", "mismatch": True, "hypotheses": [
+        {"effects": [{"ids": [hidden["id"]]}], "probability": 0.9}]}
+    assert judge(dict(case.truth), answer).outcome == "right"
+    answer["hypotheses"][0]["effects"][0]["ids"] = ["another"]  # type: ignore[index]
+    assert judge(dict(case.truth), answer).outcome == "wrong"
+
+
+def test_noise_is_what_was_asked_for(motor_rig: Rig, tmp_path: Path) -> None:
+    case = make(Order("001", 4, 0, "nothing", motor_rig))
+    (tmp_path / "a.csv").write_bytes(case.recordings["001_train.csv"])
+    seen = pk.Recording.read(tmp_path / "a.csv")
+    values = {n: v["value"] for n, v in case.truth["base"].items()}  # type: ignore[attr-defined]
+    clean = Plant(MOTOR).outputs(values, motor_rig.train)["omega"]
+    sigma = case.truth["noise"]["omega"]  # type: ignore[index]
+    assert sigma == pytest.approx(0.005 * np.ptp(clean), rel=1e-3)
+    assert np.std(seen["omega"].values - clean) == pytest.approx(sigma, rel=0.2)
+    assert seen["omega"].unit == "rad/s"
+
+
+def test_a_set_of_ones_own(motor_rig: Rig, tmp_path: Path) -> None:
+    wanted = OwnSet(motor_rig, 3, {"nothing": 1.0})
+    made = generate(tmp_path / "r", tmp_path / "t.json", wanted, seed=1, workers=1)
+    assert made.made == 3
+    truth = json.loads((tmp_path / "t.json").read_bytes())
+    assert [c["class"] for c in truth["cases"]] == ["nothing"] * 3
+    again = generate(tmp_path / "r", tmp_path / "t.json", wanted, seed=1)
+    assert (again.made, again.kept) == (0, 3)
+    with pytest.raises(errors.BadSetting):
+        generate(tmp_path / "r", tmp_path / "t.json", OwnSet(motor_rig, 4), seed=1)
+
+
+@pytest.mark.parametrize("wrong", [0.0, 0.9, float("nan")])
+def test_bad_noise_is_refused(wrong: float) -> None:
+    with pytest.raises(errors.BadSetting, match="noise"):
+        Rig(MOTOR, inputs(MOTOR), inputs(MOTOR), wrong)
+
+
+def test_an_unknown_class_is_refused(motor_rig: Rig) -> None:
+    with pytest.raises(errors.BadSetting, match="classes"):
+        OwnSet(motor_rig, 3, {"many": 1.0})
