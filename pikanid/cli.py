@@ -36,6 +36,8 @@ from pikanid.commands.identify import EXAMPLES as IDENTIFY
 from pikanid.commands.identify import identify
 from pikanid.commands.models import EXAMPLES as MODELS
 from pikanid.commands.models import models
+from pikanid.commands.score import EXAMPLES as SCORE
+from pikanid.commands.score import score
 from pikanid.commands.simulate import EXAMPLES as SIMULATE
 from pikanid.commands.simulate import simulate
 from pikanid.commands.study import EXAMPLES as STUDY
@@ -75,6 +77,7 @@ app.command(epilog=STUDY)(study)
 app.command(epilog=EQUIVALENCE)(equivalence)
 app.command(epilog=EXTRACT)(extract)
 app.command(epilog=CONCEAL)(conceal)
+app.command(epilog=SCORE)(score)
 
 
 @app.callback(invoke_without_command=True, epilog=EXAMPLES)

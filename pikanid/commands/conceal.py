@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pikanid.commands.options import Quiet, quantity
+from pikanid import errors
+from pikanid.commands.options import Catalogues, Quiet, Values, adjusted, quantity
+
+if TYPE_CHECKING:
+    from pikanid.validation.own_model.rig import Rig
 
 EXAMPLES = """Examples:
 
@@ -18,9 +22,16 @@ EXAMPLES = """Examples:
 
   pikanid conceal --out rest --truth rest.json --mix remainder=1 --excitation mixed
 
+  pikanid conceal --model tanks.toml --catalogue hydraulics --inputs a.csv --held-out-inputs b.csv
+  --out mine --truth mine.json --cases 20 --seed 1
+
 Without --seed nobody knows what is hidden: the seed comes from the operating system and lies in
 the truth file only; the folder holds the truth's SHA-256. An interrupted run goes on where it
-stopped when it is repeated."""
+stopped when it is repeated.
+
+With --model the recordings are of your own rig: parameters near the model's, driven by the inputs
+in two files, simulated by SciPy. It hides what your catalogue and the kit's know, and laws of
+neither; `pikanid score` then tells how far a diagnosis can be trusted there."""
 
 
 def conceal(
@@ -40,6 +51,18 @@ def conceal(
         metavar="CLASS=SHARE,...", show_default=False,
         help="shares of nothing, single, pair, near, outside, unforeseen (more laws of no "
              "catalogue) and remainder (strong effects, with such laws beside them)")] = None,
+    model: Annotated[str | None, typer.Option(
+        "--model", "-m", metavar="NAME|FILE.toml", show_default=False,
+        help="conceal in this model instead of the sloshing rig")] = None,
+    inputs: Annotated[str | None, typer.Option(
+        metavar="FILE", show_default=False,
+        help="of the model, for the recording to explain")] = None,
+    held_out_inputs: Annotated[str | None, typer.Option(
+        metavar="FILE", show_default=False, help="the same for the one to prove it on")] = None,
+    noise: Annotated[float, typer.Option(
+        metavar="SHARE", help="of an output's range, with --model")] = 0.005,
+    set_: Values = [],  # noqa: B006
+    catalogue: Catalogues = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(
         metavar="N", min=0, show_default=False,
         help="makes an open set, for development: anybody can make it again")] = None,
@@ -53,11 +76,20 @@ def conceal(
     from pikanid.validation.concealed.generate import check, generate
     from pikanid.validation.concealed.seal import Settings
 
-    shares = parse_mix(mix) if mix is not None else dict(DEFAULT_MIX)
-    settings = Settings(cases, excitation, quantity(sigma, "rad", "--sigma"), shares)
-    check(settings)
-    with working("concealing", cases, quiet) as step:
-        made = generate(out, truth, settings, seed, workers, step=step)
+    if model is not None:
+        rig = _rig(model, inputs, held_out_inputs, noise, set_, catalogue)
+        from pikanid.validation.own_model import generate as own
+        from pikanid.validation.own_model.case import CLASSES
+
+        wanted = own.OwnSet(rig, cases, parse_mix(mix, CLASSES) if mix is not None else None)
+        with working("concealing", cases, quiet) as step:
+            made = own.generate(out, truth, wanted, seed, workers, step=step)
+    else:
+        shares = parse_mix(mix) if mix is not None else dict(DEFAULT_MIX)
+        settings = Settings(cases, excitation, quantity(sigma, "rad", "--sigma"), shares)
+        check(settings)
+        with working("concealing", cases, quiet) as step:
+            made = generate(out, truth, settings, seed, workers, step=step)
     if not quiet:
         kept = f" ({made.kept} were there already)" if made.kept else ""
         kind = "sealed" if seed is None else "open"
@@ -65,3 +97,19 @@ def conceal(
             f"{made.folder}: {made.made + made.kept} cases{kept}; {kind} truth: {made.truth}",
             markup=False, soft_wrap=True)
     return 0
+
+
+def _rig(model: str, inputs: str | None, held_out: str | None, noise: float,
+         set_: list[str], catalogue: list[str]) -> Rig:
+    from pikanid.model import systems
+    from pikanid.model.effects_file import read_effects
+    from pikanid.recording import Recording
+    from pikanid.validation.own_model.rig import Rig
+
+    if inputs is None or held_out is None:
+        raise errors.BadSetting(errors.conceal_two_inputs())
+    chosen = adjusted(systems.find(model), set_)
+    drives = [Recording.read(path) for path in (inputs, held_out)]
+    kept = [d.without(*(n for n in chosen.output_names if n in d)) for d in drives]
+    own = [effect for name in catalogue for effect in read_effects(name)]
+    return Rig(chosen, kept[0], kept[1], noise, tuple(own))

@@ -16,7 +16,7 @@ def conceal_remainder() -> str:
 
 
 def conceal_faint() -> str:
-    return "A hidden effect is weaker than it is to be beside a remainder."
+    return "A hidden effect cannot be made as visible as is wanted in this experiment."
 
 
 def conceal_cases(given: int, limit: int) -> str:
@@ -64,6 +64,16 @@ def diagnosis_unreadable(case: str, detail: object) -> str:
 def not_for_scipy(model: str) -> str:
     return (f"'{short(model)}' has splines, play or rate limits of inputs, which concealed "
             "recordings are not simulated with: leave them out.")
+
+
+def not_the_sealed(truth: str, folder: str) -> str:
+    return (f"'{short(truth, 200)}' is not the truth about the recordings in '{short(folder, 200)}'"
+            ", or one of them was changed: give the file that was written with them.")
+
+
+def conceal_two_inputs() -> str:
+    return ("--model needs --inputs and --held-out-inputs: two files with the inputs of the model, "
+            "one for each recording of a pair.")
 
 
 def conceal_needs_inputs() -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +55,7 @@ class Card:
     remainder: tuple[Effect, ...] = ()
 
 
-def parse_mix(text: str) -> dict[str, float]:
+def parse_mix(text: str, classes: Sequence[str] = CLASSES) -> dict[str, float]:
     """Shares of the classes, summing to 1.
 
     Raises:
@@ -64,19 +64,19 @@ def parse_mix(text: str) -> dict[str, float]:
     >>> parse_mix("single=3,nothing=1")
     {'nothing': 0.25, 'single': 0.75, 'pair': 0.0, 'near': 0.0, 'outside': 0.0}
     """
-    shares = dict.fromkeys(DEFAULT_MIX, 0.0)
+    shares = dict.fromkeys([c for c in DEFAULT_MIX if c in classes], 0.0)
     for part in text.split(","):
         name, _, number = part.partition("=")
         try:
             share = float(number)
         except ValueError:
             share = -1.0
-        if name.strip() not in CLASSES or not 0.0 <= share < 1e6:
-            raise errors.BadSetting(errors.conceal_mix(text, CLASSES))
+        if name.strip() not in classes or not 0.0 <= share < 1e6:
+            raise errors.BadSetting(errors.conceal_mix(text, classes))
         shares[name.strip()] = share
     total = sum(shares.values())
     if total <= 0.0:
-        raise errors.BadSetting(errors.conceal_mix(text, CLASSES))
+        raise errors.BadSetting(errors.conceal_mix(text, classes))
     return {name: share / total for name, share in shares.items()}
 
 
@@ -117,13 +117,13 @@ def deal(cases: int, mix: Mapping[str, float], rng: np.random.Generator) -> list
 
 
 def counts(cases: int, mix: Mapping[str, float]) -> dict[str, int]:
-    """Whole numbers that sum to `cases`, by largest remainders."""
+    """Whole numbers of each class that sum to `cases`, by largest remainders."""
     exact = {kind: cases * mix.get(kind, 0.0) for kind in CLASSES}
-    counts = {kind: int(number) for kind, number in exact.items()}
-    order = sorted(CLASSES, key=lambda kind: counts[kind] - exact[kind])
-    for kind in order[: cases - sum(counts.values())]:
-        counts[kind] += 1
-    return counts
+    found = {kind: int(number) for kind, number in exact.items()}
+    order = sorted(CLASSES, key=lambda kind: found[kind] - exact[kind])
+    for kind in order[: cases - sum(found.values())]:
+        found[kind] += 1
+    return found
 
 
 def _endless(things: tuple, rng: np.random.Generator) -> Iterator:

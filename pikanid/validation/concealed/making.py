@@ -33,20 +33,26 @@ MOST_CASES = 100_000  # limit: of one set
 
 
 class Made(Protocol):
-    """What a case has become: file name -> content of recordings, and its entry of the truth."""
+    """What a case has become."""
 
     @property
-    def recordings(self) -> Mapping[str, bytes]: ...
+    def recordings(self) -> Mapping[str, bytes]:
+        """File name -> content."""
+        ...
 
     @property
-    def truth(self) -> Mapping[str, object]: ...
+    def truth(self) -> Mapping[str, object]:
+        """Entry of the truth file."""
+        ...
 
 
 class Order(Protocol):
     """What a case is to be; a process can be sent it."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Number of the case, as in its files' names."""
+        ...
 
     def made(self) -> Made:
         """The case: a function of the order alone."""

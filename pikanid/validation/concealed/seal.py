@@ -12,6 +12,7 @@ import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pikanid import errors
 from pikanid.storage.limits import json_content
@@ -96,6 +97,18 @@ def read_truth(path: str | Path) -> dict[str, object]:
     if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
         raise wrong("it is none of this version")
     return content
+
+
+def cases_of(path: str | Path) -> list[Mapping[str, Any]]:
+    """The entries of a truth file.
+
+    Raises:
+        BadSetting: If it cannot be read or has none.
+    """
+    found = read_truth(path).get("cases")
+    if not isinstance(found, list) or not all(isinstance(case, dict) for case in found):
+        raise errors.BadSetting(errors.unreadable("truth file", str(path), "it has no cases"))
+    return found
 
 
 def matches(folder: str | Path, truth: str | Path) -> bool:

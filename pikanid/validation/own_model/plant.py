@@ -42,10 +42,18 @@ def _log_abs(x: float) -> float:
     return math.log(abs(x)) if x else 0.0
 
 
+def _step(x: float, at: float = 0.5) -> float:  # 0.5: as SymPy's Heaviside has it
+    return at if x == 0 else float(x > 0)
+
+
+def _sign(x: float) -> float:
+    return float((x > 0) - (x < 0))
+
+
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "clip": lambda x, low, high: min(max(x, low), high), "signed_power": _signed_power,
-    "abs_power": _abs_power, "log_abs": _log_abs, "Heaviside": lambda x, at=0.5: at if x == 0 else
-    float(x > 0), "sign": lambda x: float((x > 0) - (x < 0)), "Max": max, "Min": min, "Abs": abs}
+    "abs_power": _abs_power, "log_abs": _log_abs, "Heaviside": _step,
+    "sign": _sign, "Max": max, "Min": min, "Abs": abs}
 
 
 class Plant:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,8 @@ from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.storage.outputs import atomically
 from pikanid.storage.workers import unordered
-from pikanid.validation.concealed.score import Score, judge
-from pikanid.validation.concealed.seal import read_truth
+from pikanid.validation.concealed.score import Score, Share, judge
+from pikanid.validation.concealed.seal import cases_of
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def trials(folder: str | Path, truth: str | Path, model: Model, answers: str | P
     Raises:
         BadSetting: If the truth cannot be read.
     """
-    cases: Sequence[Mapping[str, Any]] = read_truth(truth)["cases"]  # type: ignore[assignment]
+    cases = cases_of(truth)
     kept = Path(answers)
     kept.mkdir(parents=True, exist_ok=True)
     waiting = [c["id"] for c in cases if not (kept / f"{c['id']}.json").exists()]
@@ -61,6 +61,12 @@ def trials(folder: str | Path, truth: str | Path, model: Model, answers: str | P
                           min(workers, max(len(waiting), 1))):
         step(done)
     return [_trial(case, json.loads((kept / f"{case['id']}.json").read_bytes())) for case in cases]
+
+
+def places(found: Iterable[Trial]) -> Share:
+    """How many right answers have the right place."""
+    told = [one.place for one in found if one.place is not None]
+    return Share(sum(told), len(told))
 
 
 def _answer(folder: str, case: str, model: Model, answers: str) -> str:
