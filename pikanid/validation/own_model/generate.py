@@ -18,7 +18,8 @@ from pikanid.validation.own_model.case import CLASSES, Order
 from pikanid.validation.own_model.rig import Rig
 
 DEFAULT_MIX: Mapping[str, float] = {
-    "nothing": 0.2, "single": 0.45, "pair": 0.15, "outside": 0.2}  # definition: shares of the classes
+    "nothing": 0.2, "single": 0.45, "pair": 0.15,
+    "outside": 0.2}  # definition: shares of the classes
 
 
 @dataclass(frozen=True)
