@@ -18,6 +18,8 @@ import typer
 
 from pikanid import errors
 from pikanid.commands import interrupts, unforeseen
+from pikanid.commands.channels import EXAMPLES as CHANNELS
+from pikanid.commands.channels import channels
 from pikanid.commands.conceal import EXAMPLES as CONCEAL
 from pikanid.commands.conceal import conceal
 from pikanid.commands.confusable import EXAMPLES as CONFUSABLE
@@ -66,6 +68,7 @@ app = typer.Typer(
     name="pikanid", add_completion=False, rich_markup_mode="rich",
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
 app.command(epilog=IDENTIFY)(identify)
+app.command(epilog=CHANNELS)(channels)
 app.command(epilog=VALIDATE)(validate)
 app.command(epilog=DIAGNOSE)(diagnose)
 app.command(epilog=EFFECTS)(effects)

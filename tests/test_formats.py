@@ -40,7 +40,7 @@ def test_every_format_has_endings_and_a_reader_of_its_own() -> None:
 
 def test_help_and_sentences_list_the_formats(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("identify", "diagnose", "extract"):
+    for command in ("identify", "diagnose", "extract", "channels"):
         assert main([command, "--help"]) == 0
         told = re.sub(r"[\s│]+", "", capsys.readouterr().out)
         assert formats.readable().replace(" ", "") in told, command

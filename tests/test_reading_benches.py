@@ -37,7 +37,7 @@ def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 def test_each_signal_is_on_its_own_clock(rig: Path) -> None:
     ros = rig.suffix in ("", ".bag")
     theta = {"theta": "/joints.position.theta"} if ros else None
-    rec = Recording.read(rig, theta, also=["u_x"])
+    rec = Recording.read(rig, theta, also=["theta", "u_x"])
     assert set(rec.names) == {"theta", "u_x"} and rec.name == "rig"
     np.testing.assert_allclose(rec["theta"].time, benches.FAST, atol=1e-9)
     np.testing.assert_allclose(rec["u_x"].time, benches.SLOW, atol=1e-9)

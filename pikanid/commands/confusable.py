@@ -8,17 +8,24 @@ import typer
 
 from pikanid.commands.options import (
     Catalogues,
+    Columns,
     Duration,
     Excitation,
     Json,
     ModelName,
+    OwnTimes,
     Quiet,
     Rate,
+    Sheet,
     Sigma,
+    Start,
+    Stop,
+    Units,
     Values,
     adjusted,
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.commands.reading import Reading, every_source
 from pikanid.commands.simulate import excited, sigmas
 
 EXAMPLES = """Examples:
@@ -35,7 +42,13 @@ def confusable(
     set_: Values = [],  # noqa: B006
     catalogue: Catalogues = [],  # noqa: B006
     duration: Duration = 5.0,
-    rate: Rate = 100.0,
+    rate: Rate = None,
+    column: Columns = [],  # noqa: B006
+    unit: Units = [],  # noqa: B006
+    sheet: Sheet = None,
+    start: Start = None,
+    stop: Stop = None,
+    own_times: OwnTimes = False,
     strength: Annotated[float, typer.Option(
         metavar="N", help="how many σ strong effects are made before they are compared")] = 30.0,
     quick: Annotated[bool, typer.Option(
@@ -44,13 +57,14 @@ def confusable(
     quiet: Quiet = False,
 ) -> int:
     """Say which effects an experiment could detect, from which size, and which it confuses."""
-    check_outputs({"--json": (json_, [".json"])}, [model, excitation, *catalogue])
+    check_outputs({"--json": (json_, [".json"])}, [*every_source(excitation), model, *catalogue])
     from pikanid.mismatch.design.confusable import confusable as run
     from pikanid.model import systems
     from pikanid.reporting.console import console, working
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
-    drive = excited(chosen, excitation, duration, rate, [])
+    files = Reading(column, unit, rate, sheet, start, stop, own_times=own_times)
+    drive = excited(chosen, excitation, duration, files)
     with working("looking", 28, quiet) as step:
         found = run(chosen, drive, sigmas(chosen, sigma) or None, strength=strength,
                     refit=not quick, tell=step)

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
 
-from pikanid.commands.options import Quiet, Sigma, assignments, quantity
+from pikanid.commands.options import (
+    Columns,
+    OwnTimes,
+    Quiet,
+    Sheet,
+    Sigma,
+    Start,
+    Stop,
+    Stride,
+    Units,
+    assignments,
+    quantity,
+)
 from pikanid.commands.outputs import check_outputs
+from pikanid.commands.reading import Reading, every_source
 from pikanid.commands.simulate import sigmas
 from pikanid.recording.formats import written_endings
 
@@ -30,7 +44,8 @@ def design(
         help=f"profile to run ({', '.join(written_endings())})")],
     sigma: Sigma = [],  # noqa: B006
     recorded: Annotated[list[str], typer.Option(
-        metavar="FILE", show_default=False, help="what was recorded before")] = [],  # noqa: B006
+        metavar="FILE", show_default=False,
+        help="what was recorded before; files joined by + are one")] = [],  # noqa: B006
     candidate: Annotated[list[str], typer.Option(
         metavar="FILE", show_default=False,
         help="profile to choose from; many feasible ones by default")] = [],  # noqa: B006
@@ -45,6 +60,13 @@ def design(
         help="largest value that an output may reach, as theta=15deg")] = [],  # noqa: B006
     duration: Annotated[float, typer.Option(metavar="S", help="of the profile [s]")] = 20.0,
     rate: Annotated[float, typer.Option(metavar="HZ", help="its sampling rate")] = 100.0,
+    column: Columns = [],  # noqa: B006
+    unit: Units = [],  # noqa: B006
+    sheet: Sheet = None,
+    start: Start = None,
+    stop: Stop = None,
+    own_times: OwnTimes = False,
+    decimate: Stride = 1,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of random profiles")] = 0,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", help="figure to write (.png, .svg, .pdf)")] = None,
@@ -52,13 +74,13 @@ def design(
 ) -> int:
     """Choose the next experiment among feasible ones, and write it ready to run."""
     check_outputs({"--out": (out, written_endings()),
-                   "--plot": (plot, [".png", ".svg", ".pdf"])}, [*models, *recorded, *candidate])
+                   "--plot": (plot, [".png", ".svg", ".pdf"])},
+                  every_source(*models, *recorded, *candidate))
     from pikanid import errors
     from pikanid.figures import image_for
     from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
     from pikanid.mismatch.design.profiles import Bounds
     from pikanid.model import systems
-    from pikanid.recording import Recording
     from pikanid.recording.writing import content
     from pikanid.reporting.console import console
     from pikanid.storage.outputs import together
@@ -69,18 +91,21 @@ def design(
     first = found[models[0]]
     limits = {name: quantity(value, first.output(name).unit, f"--limit {name}")
               for name, value in assignments("--limit", limit, "theta=15deg").items()}
-    past = [Recording.read(path) for path in recorded]
-    offered = [Recording.read(path) for path in candidate] or None
+    files = Reading(column, unit, None, sheet, start, stop, decimate, own_times)
+    past = [files.recording(text, *found.values()) for text in recorded]
+    # a profile holds inputs alone: nothing to thin
+    whole = replace(files, decimate=1)
+    offered = [whole.recording(text, *found.values()) for text in candidate] or None
     noise, drive = sigmas(first, sigma) or None, Bounds(acceleration, velocity, stroke)
     if len(found) == 1:
         chosen = d_optimal(first, past, noise, offered, drive, duration, 1 / rate, limits, seed)
     else:
         chosen = next_experiment(found, past, noise, offered, drive, duration, 1 / rate, limits,
                                  seed)
-    files = {out: content(chosen.profile.channels, out)}
+    made = {out: content(chosen.profile.channels, out)}
     if plot is not None:
-        files[plot] = image_for(chosen.plot(), plot)
-    together(files)
+        made[plot] = image_for(chosen.plot(), plot)
+    together(made)
     if not quiet:
         console().print(f"{chosen}\n{out}: {chosen.profile.stop:g} s, "
                         f"columns {', '.join(chosen.profile.names)}", markup=False, soft_wrap=True)

@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from pikanid.commands.identify import prepared
 from pikanid.commands.options import (
     Catalogues,
     Columns,
+    FileRate,
     Json,
     ModelName,
+    OwnTimes,
     Quiet,
+    Sheet,
     Sigma,
+    Start,
+    Stop,
     Stride,
     Units,
     Values,
     adjusted,
-    assignments,
     quantity,
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.commands.reading import Reading, every_source
 from pikanid.recording.formats import readable
-
-if TYPE_CHECKING:
-    from pikanid.recording import Recording
 
 EXAMPLES = """Examples:
 
@@ -43,7 +43,8 @@ Exit codes: 0 diagnosed, whatever was found; 2 bad input."""
 
 def diagnose(
     train: Annotated[list[str], typer.Argument(
-        metavar="TRAIN...", help=f"recordings to explain: {readable()}",
+        metavar="TRAIN...", help=f"recordings to explain: {readable()}; files joined by + "
+        "are one",
         show_default=False)],
     model: ModelName,
     held_out: Annotated[list[str], typer.Option(
@@ -64,6 +65,11 @@ def diagnose(
     catalogue: Catalogues = [],  # noqa: B006
     column: Columns = [],  # noqa: B006
     unit: Units = [],  # noqa: B006
+    rate: FileRate = None,
+    sheet: Sheet = None,
+    start: Start = None,
+    stop: Stop = None,
+    own_times: OwnTimes = False,
     decimate: Stride = 1,
     workers: Annotated[int | None, typer.Option(
         metavar="N", min=1, show_default=False,
@@ -72,8 +78,9 @@ def diagnose(
 ) -> int:
     """Find out which physics a model leaves out, and prove it on another recording."""
     check_outputs({"--json": (json_, [".json"]),
-                   "--report": (report, [".html"])}, 
-                  [*train, *held_out, model, *catalogue, *([settings] if settings else [])])
+                   "--report": (report, [".html"])},
+                  [*every_source(*train, *held_out), model, *catalogue,
+                   *([settings] if settings else [])])
     from pikanid.mismatch.diagnose import diagnose as run
     from pikanid.mismatch.settings.settings import Settings
     from pikanid.model import systems
@@ -82,27 +89,22 @@ def diagnose(
     taken = Settings() if settings is None else Settings.read(settings)
     taken = taken if alpha is None else taken.with_values({"alpha": alpha})
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
-    columns, units = assignments("--column", column, "theta=angle"), assignments(
-        "--unit", unit, "theta=deg")
-
-    def read(paths: list[str]) -> list[Recording]:
-        return [prepared(p, chosen, columns, units, None, None, None, None, decimate, sigma)
-                for p in paths]
-
-    records, others = read(train), read(held_out)
+    files = Reading(column, unit, rate, sheet, start, stop, decimate, own_times)
+    records, others = ([files.recording(text, chosen, sigma=sigma) for text in texts]
+                       for texts in (train, held_out))
     stretch = None
     if quiet_until is not None:
-        start = min(r.start for r in records)
-        stretch = (start, start + quantity(quiet_until, "s", "--quiet-until"))
+        begin = min(r.start for r in records)
+        stretch = (begin, begin + quantity(quiet_until, "s", "--quiet-until"))
     with working("diagnosing", 8, quiet) as step:
         dx = run(chosen, records, others or None,
                  settings=taken, quiet=stretch, tell=step, workers=workers)
-    files = {}
+    made = {}
     if report is not None:
         from pikanid.reporting.diagnosis_page import page
 
-        files[report] = page(dx, Path(train[0]).stem).encode()
-    written(files, json_, dx.to_dict())
+        made[report] = page(dx, records[0].name).encode()
+    written(made, json_, dx.to_dict())
     if not quiet and json_ != STDOUT:
         print(dx)
     return 0

@@ -10,15 +10,22 @@ import typer
 from pikanid import errors
 from pikanid.commands.options import (
     Catalogues,
+    Columns,
     Duration,
     Excitation,
     ModelName,
+    OwnTimes,
     Quiet,
     Rate,
+    Sheet,
+    Start,
+    Stop,
+    Units,
     Values,
     adjusted,
 )
 from pikanid.commands.outputs import check_outputs
+from pikanid.commands.reading import Reading, every_source
 from pikanid.commands.simulate import excited
 
 EXAMPLES = """Examples:
@@ -36,14 +43,21 @@ def effects(
     excitation: Excitation = "two_pulse",
     set_: Values = [],  # noqa: B006
     duration: Duration = 5.0,
-    rate: Rate = 100.0,
+    rate: Rate = None,
+    column: Columns = [],  # noqa: B006
+    unit: Units = [],  # noqa: B006
+    sheet: Sheet = None,
+    start: Start = None,
+    stop: Stop = None,
+    own_times: OwnTimes = False,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", show_default=False,
         help="draw what each effect does at its guess (.png, .svg, .pdf)")] = None,
     quiet: Quiet = False,
 ) -> int:
     """Check the effects that a model file lists: symbols, units, derivatives; show what they do."""
-    check_outputs({"--plot": (plot, [".png", ".svg", ".pdf"])}, [model, excitation, *catalogue])
+    check_outputs({"--plot": (plot, [".png", ".svg", ".pdf"])},
+                  [*every_source(excitation), model, *catalogue])
     from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown
     from pikanid.model import systems
     from pikanid.reporting.console import console
@@ -52,7 +66,8 @@ def effects(
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
     if not chosen.effects:
         raise errors.BadModel(errors.no_effects(chosen.name))
-    shown = effects_shown(chosen, excited(chosen, excitation, duration, rate, []))
+    files = Reading(column, unit, rate, sheet, start, stop, own_times=own_times)
+    shown = effects_shown(chosen, excited(chosen, excitation, duration, files))
     if plot is not None and not all(one.failure for one in shown):
         from pikanid.figures import save_figure
 

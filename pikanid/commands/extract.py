@@ -90,8 +90,8 @@ def _points(path: str, names: list[str], output: str | None) -> tuple[np.ndarray
 
     from pikanid.recording import Recording
 
-    channels = Recording.read(path).channels
     wanted = [*names, output or ""]
+    channels = Recording.read(path, also=filter(None, wanted)).channels
     missing = [n or "(no --output)" for n in wanted if n not in channels]
     if missing or not names:
         raise errors.BadSetting(errors.extract_columns(

@@ -12,19 +12,22 @@ import typer
 from pikanid import errors
 from pikanid.commands.options import (
     Columns,
+    FileRate,
     Json,
     ModelName,
+    OwnTimes,
     Quiet,
+    Sheet,
     Sigma,
+    Start,
+    Stop,
     Stride,
     Units,
     Values,
     adjusted,
-    assignments,
-    by_output,
-    quantity,
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.commands.reading import Reading, every_source
 from pikanid.recording.formats import readable
 from pikanid.storage.version import __version__
 from pikanid.strategies import STRATEGIES
@@ -46,12 +49,15 @@ EXAMPLES = """Examples:
 
   pikanid identify run.xlsx --sheet Run2 --column theta=angle --model pendulum --plot fit.png
 
+  pikanid identify drive.csv+camera.mf4 --column theta=*/angle --model sloshing
+
 Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
 
 
 def identify(
     recordings: Annotated[list[str], typer.Argument(
-        metavar="RECORDING...", help=f"{readable()}; several are fitted jointly",
+        metavar="RECORDING...", help=f"{readable()}; several are fitted jointly, "
+        "files joined by + are one recording",
         show_default=False)],
     model: ModelName,
     strategy: Annotated[str, typer.Option(
@@ -68,12 +74,11 @@ def identify(
         help="estimate a parameter, or the initial value of a state")] = [],  # noqa: B006
     column: Columns = [],  # noqa: B006
     unit: Units = [],  # noqa: B006
-    rate: Annotated[float | None, typer.Option(
-        metavar="HZ", help="sampling rate, where the file has no times")] = None,
-    sheet: Annotated[str | None, typer.Option(
-        metavar="NAME", help="sheet of a workbook, by name or number from 0")] = None,
-    start: Annotated[float | None, typer.Option("--from", metavar="S", help="start [s]")] = None,
-    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="end [s]")] = None,
+    rate: FileRate = None,
+    sheet: Sheet = None,
+    start: Start = None,
+    stop: Stop = None,
+    own_times: OwnTimes = False,
     decimate: Stride = 1,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the starting points")] = 0,
     json_: Json = None,
@@ -90,67 +95,22 @@ def identify(
     names = list(STRATEGIES) if strategy == ALL else [strategy]
     if save is not None and len(names) > 1:
         raise errors.BadSetting(errors.save_needs_one_strategy())
-    if start is not None and stop is not None and not start < stop:
-        raise errors.BadSetting(errors.reversed_window(start, stop))
     check_outputs({"--json": (json_, [".json"]),
                    "--plot": (plot, [".png", ".svg", ".pdf"]),
-                   "--save": (save, [".json", ".json.gz"])}, [*recordings, model])
+                   "--save": (save, [".json", ".json.gz"])}, every_source(*recordings, model))
     from pikanid.model import systems
 
     chosen = adjusted(systems.find(model), set_, fix, free)
     if not chosen.free_names:
         raise errors.BadModel(errors.nothing_free(chosen.name))
-    columns = assignments("--column", column, "theta=angle")
-    units = assignments("--unit", unit, "theta=deg")
-    given = [prepared(path, chosen, columns, units, rate, sheet, start, stop, decimate, sigma)
-             for path in recordings]
+    files = Reading(column, unit, rate, sheet, start, stop, decimate, own_times)
+    given = [files.recording(text, chosen, sigma=sigma) for text in recordings]
     return _fit_and_tell(chosen, given, names, protocol, seed, json_, plot, save, quiet)
 
 
 def _check_choice(option: str, value: str, known: Sequence[str]) -> None:
     if value not in known:
         raise errors.BadSetting(errors.bad_value(option, value, f"one of {', '.join(known)}"))
-
-
-def prepared(path: str, model: Model, columns: dict[str, str], units: dict[str, str],
-              rate: float | None, sheet: str | None, start: float | None, stop: float | None,
-              decimate: int, sigma: Sequence[str]) -> Recording:
-    """The recording in a file as the options want it: channels, units, window, noise."""
-    from pikanid.formula.units import check
-    from pikanid.recording import Recording
-
-    known = [*model.input_names, *model.output_names, "t", "time"]
-    for name in [*columns, *units]:
-        if name not in known:
-            raise errors.BadModel(errors.not_in_model("input or output", name, known))
-    for name, text in units.items():
-        check(text, f"--unit {name}")
-    rec = Recording.read(path, columns, rate, sheet, units)
-    # Declared as held, an input keeps its meaning when the recording is cut.
-    rec = rec.with_hold(**{i.name: i.hold for i in model.inputs
-                           if i.name in rec and rec[i.name].hold is None})
-    if start is not None or stop is not None:
-        rec = rec.window(start, stop)
-    if decimate > 1:
-        rec = rec.decimate(decimate, channels=model.output_names)
-    return _with_sigma(rec, model, sigma)
-
-
-def _with_sigma(rec: Recording, model: Model, texts: Sequence[str]) -> Recording:
-    """The noise of the outputs: one for all, or one by name."""
-    made = {}
-    for name, text in by_output(model, texts).items():
-        model.output(name)
-        own = rec[name].unit
-        # A bare number is in the model's unit, in which the results are printed too.
-        asked = quantity(text, model.output(name).unit or own, f"--sigma {name}", difference=True)
-        if not asked > 0:
-            raise errors.BadSetting(errors.sigma_not_positive(text))
-        made[name] = asked
-        if own and model.output(name).unit:
-            made[name] = quantity(f"{asked!r} {model.output(name).unit}", own, f"--sigma {name}",
-                                  difference=True)
-    return rec.with_sigma(made)
 
 
 def _make(name: str, protocol: str, seed: int) -> Strategy:

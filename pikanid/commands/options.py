@@ -30,19 +30,32 @@ Catalogues = Annotated[list[str], typer.Option(
     "file of your own")]
 Columns = Annotated[list[str], typer.Option(
     "--column", metavar="NAME=COLUMN", show_default=False,
-    help="column of the file that holds a signal; t=COLUMN for time")]
+    help="column, channel or topic of the file that holds a signal, by name, path or a pattern "
+    "that fits one; t=COLUMN for time")]
 Units = Annotated[list[str], typer.Option(
     "--unit", metavar="NAME=UNIT", show_default=False,
     help="unit of a signal, where the file does not say")]
+FileRate = Annotated[float | None, typer.Option(
+    "--rate", metavar="HZ", help="sampling rate, where the file has no times")]
+Sheet = Annotated[str | None, typer.Option(
+    "--sheet", metavar="NAME", help="sheet of a workbook, by name or number from 0")]
+Start = Annotated[float | None, typer.Option(
+    "--from", metavar="S", help="start [s]", show_default=False)]
+Stop = Annotated[float | None, typer.Option(
+    "--to", metavar="S", help="end [s]", show_default=False)]
+OwnTimes = Annotated[bool, typer.Option(
+    "--own-times", help="take the times of files joined by + as they stand, whatever their dates")]
 Stride = Annotated[int, typer.Option(
     "--decimate", metavar="N", min=1, help="use every N-th sample of the outputs")]
 Excitation = Annotated[str, typer.Option(
     "--excitation", "-e", metavar="NAME|FILE",
-    help=f"what drives the model: {', '.join(EXCITATIONS)}, or a recording of its inputs")]
+    help=f"what drives the model: {', '.join(EXCITATIONS)}, or a recording of its inputs (files "
+    "joined by + are one)")]
 Duration = Annotated[float, typer.Option(
     "--duration", metavar="S", help="of a built-in excitation [s]")]
-Rate = Annotated[float, typer.Option(
-    "--rate", metavar="HZ", help="sampling rate of a built-in excitation")]
+Rate = Annotated[float | None, typer.Option(
+    "--rate", metavar="HZ", show_default=False,
+    help="sampling rate of a built-in excitation, 100 by default, or of a file without times")]
 Json = Annotated[str | None, typer.Option(
     "--json", metavar="FILE", show_default=False,
     help="write the result as JSON (- for standard output)")]

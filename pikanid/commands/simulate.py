@@ -12,22 +12,28 @@ from pikanid.commands.options import (
     Duration,
     Excitation,
     ModelName,
+    OwnTimes,
     Quiet,
     Rate,
+    Sheet,
     Sigma,
+    Start,
+    Stop,
+    Units,
     Values,
     adjusted,
-    assignments,
     by_output,
     quantity,
 )
 from pikanid.commands.outputs import check_outputs
+from pikanid.commands.reading import Reading, every_source
 from pikanid.recording.formats import written_endings
 
 if TYPE_CHECKING:
     from pikanid.model import Model
     from pikanid.recording import Recording
 
+BUILT_IN_RATE = 100.0  # definition: [Hz] of a built-in excitation, unless it is told
 EXAMPLES = """Examples:
 
   pikanid simulate --model sloshing --sigma 0.1deg --out run.csv
@@ -49,18 +55,24 @@ def simulate(
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the noise")] = 0,
     set_: Values = [],  # noqa: B006
     duration: Duration = 5.0,
-    rate: Rate = 100.0,
+    rate: Rate = None,
     column: Columns = [],  # noqa: B006
+    unit: Units = [],  # noqa: B006
+    sheet: Sheet = None,
+    start: Start = None,
+    stop: Stop = None,
+    own_times: OwnTimes = False,
     quiet: Quiet = False,
 ) -> int:
     """Simulate a model and write what would be recorded."""
     check_outputs({"--out": (out, written_endings())},
-                  [excitation, model])
+                  every_source(excitation, model))
     from pikanid.model import systems
     from pikanid.simulation import simulate as run
 
     chosen = adjusted(systems.find(model), set_)
-    drive = excited(chosen, excitation, duration, rate, column)
+    files = Reading(column, unit, rate, sheet, start, stop, own_times=own_times)
+    drive = excited(chosen, excitation, duration, files)
     made = run(chosen, drive, sigma=sigmas(chosen, sigma), seed=seed)
     if not chosen.inputs:
         made = made.without(*drive.names)
@@ -74,12 +86,12 @@ def simulate(
     return 0
 
 
-def excited(model: Model, name: str, duration: float, rate: float,
-            column: list[str]) -> Recording:
-    """The inputs to simulate under: the built-in excitation `name`, or the recording it names."""
+def excited(model: Model, name: str, duration: float, files: Reading) -> Recording:
+    """The inputs to simulate under: the built-in excitation `name`, or the recording it names,
+    read as `files` says; its rate is that of a built-in one too.
+    """
     from pathlib import Path
 
-    from pikanid.recording import Recording
     from pikanid.recording.excitation import EXCITATIONS, built_in
 
     if name not in EXCITATIONS:
@@ -89,12 +101,11 @@ def excited(model: Model, name: str, duration: float, rate: float,
             known = list(EXCITATIONS)
             close = difflib.get_close_matches(name, known, 1)
             raise errors.BadSetting(errors.unknown_excitation(name, known, close))
-        rec = Recording.read(name, assignments("--column", column, "u_x=acceleration"))
-        rec = rec.with_hold(**{i.name: i.hold for i in model.inputs
-                               if i.name in rec and rec[i.name].hold is None})
+        rec = files.recording(name, model)
         if model.inputs and not any(i in rec for i in model.input_names):
             raise errors.BadRecording(errors.nothing_to_simulate(name))
         return rec
+    rate = BUILT_IN_RATE if files.rate is None else files.rate
     if not rate > 0:
         raise errors.BadSetting(errors.bad_rate(rate))
     # The profile drives the model's own inputs, in their own units.

@@ -8,17 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pikanid.commands.identify import prepared
 from pikanid.commands.options import (
     Columns,
+    FileRate,
     Json,
+    OwnTimes,
     Quiet,
+    Sheet,
     Sigma,
+    Start,
+    Stop,
     Stride,
     Units,
-    assignments,
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.commands.reading import Reading, every_source
 from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
@@ -46,7 +50,7 @@ def validate(
         help="ready-made models, model files, or estimates that 'identify --save' kept")],
     data: Annotated[list[str], typer.Option(
         "--data", "-d", metavar="RUN", show_default=False,
-        help=f"recording to predict: {readable()}; may be repeated")],
+        help=f"recording to predict: {readable()}; files joined by + are one; may be repeated")],
     train: Annotated[list[str], typer.Option(
         metavar="RUN", show_default=False, help="recording that models and the linear baseline "
         "are fitted to; may be repeated")] = [],  # noqa: B006
@@ -66,6 +70,11 @@ def validate(
     sigma: Sigma = [],  # noqa: B006
     column: Columns = [],  # noqa: B006
     unit: Units = [],  # noqa: B006
+    rate: FileRate = None,
+    sheet: Sheet = None,
+    start: Start = None,
+    stop: Stop = None,
+    own_times: OwnTimes = False,
     decimate: Stride = 1,
     seed: Annotated[int, typer.Option(
         metavar="N", min=0, help="of the bootstrap that compares models")] = 0,
@@ -78,20 +87,16 @@ def validate(
 ) -> int:
     """Compare models on recordings: fit per cent, RMSE, AIC, a linear baseline, the noise."""
     check_outputs({"--json": (json_, [".json"]), "--plot": (plot, [".png", ".svg", ".pdf"]),
-                   "--report": (report, [".html"])}, [*model, *data, *train])
+                   "--report": (report, [".html"])}, every_source(*model, *data, *train))
     from pikanid.comparison import validate as run
     from pikanid.reporting.console import console, working
 
-    columns = assignments("--column", column, "theta=angle")
-    units = assignments("--unit", unit, "theta=deg")
     given = [_model(name) for name in model]
     bare = [_bare(g) for g in given]
 
-    def read(paths: Sequence[str]) -> list[Recording]:
-        return [prepared(p, bare[0], columns, units, None, None, None, None, decimate, sigma)
-                for p in paths]
-
-    records, training = read(data), read(train)
+    reading = Reading(column, unit, rate, sheet, start, stop, decimate, own_times)
+    records, training = ([reading.recording(text, *bare, sigma=sigma) for text in texts]
+                         for texts in (data, train))
     with working("validating", len(given) + 1, quiet) as step:
         compared: dict[str, Any] = {}
         for name, one in zip(model, given, strict=True):

@@ -106,6 +106,19 @@ def too_slow(where: str, kind: str) -> str:
     return f"'{where}' takes too long to read as {kind}: it is damaged, or far too large."
 
 
+def unit_to_be_told(unit: str) -> str:
+    return f"its unit '{unit}' is unknown: say what is meant (--unit NAME=UNIT)"
+
+
+def times_to_be_told() -> str:
+    return "no times: name their column (--column t=COLUMN) or the rate (--rate HZ)"
+
+
+def files_of_one_name(stem: str) -> str:
+    return (f"Two of the files that are read together are called '{stem}': rename one, so that "
+            "their channels can be told apart.")
+
+
 def too_many_cells(where: str, most: int) -> str:
     return f"'{where}' holds more than {most} cells: save what you need as CSV or Parquet."
 

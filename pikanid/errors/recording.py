@@ -108,3 +108,18 @@ def missing_input(where: str, name: str, sample: int, time: float) -> str:
 def constant_output(where: str, name: str, value: float) -> str:
     return (f"'{where}': output '{name}' is {value:g} throughout; a signal that never changes (a "
             "dead sensor, a wrong column?) identifies nothing.")
+
+
+def note_undated(names: Sequence[str]) -> str:
+    return ("Times are taken as they stand, each from the zero of its own file: when "
+            f"{listed(names)} began is not known.")
+
+
+def note_begins_later(name: str, first: str, seconds: float) -> str:
+    return f"Recording '{name}' begins {seconds:.9g} s after '{first}' by the dates in their files."
+
+
+def recorded_apart(names: Sequence[str], gap: float) -> str:
+    return (f"By their dates {listed(names)} were not recorded together: {gap:.6g} s lie between "
+            "them. If a clock was wrong, take their times as they stand (--own-times, in Python "
+            "by_date=False).")

@@ -7,27 +7,23 @@ so, by name.  Channels may have different time bases, such as a 500 Hz motion an
 from __future__ import annotations
 
 import difflib
-import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from numpy.typing import ArrayLike
 
 from pikanid import errors
 from pikanid.recording import channel as channels_of
 from pikanid.recording.channel import Array, Channel, Hold
-from pikanid.recording.leaving import Leaving
-
-if TYPE_CHECKING:
-    import pandas as pd
+from pikanid.recording.entering import Entering
 
 __all__ = ["Channel", "Hold", "Recording"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Leaving):
+class Recording(Entering):
     """Signals measured together.
 
     Attributes:
@@ -37,6 +33,7 @@ class Recording(Leaving):
         unreadable: Columns of the file that could not be used, and why; asking for one of them
             raises that sentence.
         began: POSIX time [s] of t = 0, where the file tells it.
+        others: What else its file holds, for messages.
 
     >>> rec = Recording.from_arrays([0.0, 0.1, 0.2], {"theta": [0.0, 1.0, 0.5]}, {"theta": "deg"})
     >>> rec["theta"].unit, rec.names, rec.stop
@@ -48,6 +45,7 @@ class Recording(Leaving):
     notes: tuple[str, ...] = ()
     unreadable: Mapping[str, str] = field(default_factory=dict)
     began: float | None = None
+    others: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         given: object = self.channels
@@ -103,106 +101,6 @@ class Recording(Leaving):
         }
         return cls(made, name)
 
-    @classmethod
-    def from_frame(cls, frame: pd.DataFrame, columns: Mapping[str, str | int] | None = None,
-                   units: Mapping[str, str] | None = None,
-                   sigma: Mapping[str, ArrayLike] | None = None,
-                   name: str = "recording") -> Recording:
-        """A recording of a DataFrame; its times are a column or an index called t or time.
-
-        Headers may carry units, as those of a file: ``"theta [deg]"``, ``"t [h]"``.  Dates count
-        in seconds from the first one.
-
-        Args:
-            frame: The table.
-            columns, units, sigma: As in `read`.
-            name: Of the recording.
-
-        Raises:
-            BadRecording: If there are no times, or a column cannot be used.
-
-        >>> import pandas as pd
-        >>> frame = pd.DataFrame({"t [min]": [0, 1], "theta [deg]": [1.0, 2.0]})
-        >>> Recording.from_frame(frame)
-        Recording 'recording': 0 s to 60 s
-          theta  [deg]  2 samples, every 60 s  1 to 2
-        """
-        from pikanid.recording.reading import columns as made_of
-        from pikanid.recording.reading import frame as frames
-
-        if not (hasattr(frame, "columns") and hasattr(frame, "index")):
-            raise errors.BadRecording(errors.no_recording(type(frame).__name__))
-        request = made_of.Request(columns or {}, None, units or {})
-        found = made_of.channels(frames.read(frame, name), request, name)
-        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
-                  found.began)
-        return rec.with_sigma(sigma) if sigma else rec
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str], columns: Mapping[str, str | int] | None = None,
-             rate: float | None = None, sheet: str | int | None = None,
-             units: Mapping[str, str] | None = None, sigma: Mapping[str, ArrayLike] | None = None,
-             delimiter: str | None = None, decimal: str | None = None,
-             name: str | None = None, also: Iterable[str] = ()) -> Recording:
-        """Read a file of a format in `pikanid.recording.formats`: CSV, Excel, Parquet, ...
-
-        Args:
-            path: The file; its kind is known by its ending, checked against its content.
-            columns: Channel name -> column in the file; ``"t"`` (or ``"time"``) names the time
-                column.  A column may be given by its header with or without unit, by its number
-                counted from 1 where the file has no header, by its whole path in a file with
-                groups or topics, or by a pattern (``"*/theta"``) that fits one.
-            rate: Sampling rate [Hz] of a file without a time column.
-            sheet: Excel sheet by name or number counted from 0; the first by default.
-            units: Channel name -> unit, in place of what the header says (``"t"`` for time).
-            sigma: Channel name -> noise standard deviation in the channel's unit.
-            delimiter: Of a CSV; found out by default.
-            decimal: Decimal sign of a CSV, ``"."`` or ``","``; found out by default.
-            name: Of the recording; the file's stem by default.
-            also: Channels that are wanted beside those of `columns` where the file has them, under
-                their own names; a table is read as a whole, of other files only what is named.
-
-        Raises:
-            BadRecording: With one sentence that says what is wrong, and in which row.
-
-        >>> import pathlib, tempfile
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     path = pathlib.Path(folder) / "run.csv"
-        ...     _ = path.write_text("t;theta [deg]\\n0,0;1,5\\n0,1;2,5\\n")
-        ...     Recording.read(path)["theta"].values.tolist()
-        [1.5, 2.5]
-        """
-        from pikanid.recording import reading
-
-        found = reading.read(path, columns, rate, sheet, units, delimiter, decimal, also)
-        rec = cls({ch.name: ch for ch in found.channels}, name or found.stem, found.notes,
-                  found.unreadable, found.began)
-        return rec.with_sigma(sigma) if sigma else rec
-
-    @classmethod
-    def merge(cls, *recordings: Recording, name: str | None = None) -> Recording:
-        """One recording with the channels of several, each with its own time base.
-
-        Raises:
-            BadRecording: If two of them have a channel of the same name.
-
-        >>> a = Recording.from_arrays([0, 1], {"u": [0, 1]}, name="motion")
-        >>> b = Recording.from_arrays([0.0, 0.5, 1.0], {"y": [0, 1, 2]})
-        >>> Recording.merge(a, b).names
-        ('u', 'y')
-        """
-        together: dict[str, Channel] = {}
-        for rec in recordings:
-            if not isinstance(rec, Recording):
-                raise errors.BadRecording(errors.no_recording(type(rec).__name__))
-            for key, ch in rec.channels.items():
-                if key in together:
-                    raise errors.BadRecording(errors.channel_twice(key, rec.name))
-                together[key] = ch
-        return cls(together, name or (recordings[0].name if recordings else "recording"),
-                   tuple(note for rec in recordings for note in rec.notes),
-                   {key: why for rec in recordings for key, why in rec.unreadable.items()})
-
     # --- looking ---------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Channel:
@@ -214,8 +112,9 @@ class Recording(Leaving):
             return self.channels[name]
         if name in self.unreadable:
             raise errors.BadRecording(self.unreadable[name])
-        close = difflib.get_close_matches(name, self.names, n=1, cutoff=0.5)
-        raise errors.BadRecording(errors.missing_channel(self.name, name, self.names, close))
+        known = [*self.names, *self.others]
+        close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+        raise errors.BadRecording(errors.missing_channel(self.name, name, known, close))
 
     def __contains__(self, name: object) -> bool:
         return name in self.channels
@@ -230,7 +129,7 @@ class Recording(Leaving):
     def __reduce__(self) -> tuple[type[Recording], tuple[object, ...]]:
         # A read-only mapping cannot be sent to another process; what it shows can.
         return Recording, (dict(self.channels), self.name, self.notes, dict(self.unreadable),
-                           self.began)
+                           self.began, self.others)
 
     @property
     def t(self) -> Array:

@@ -7,51 +7,59 @@ channels of the table.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 from pikanid.recording.channel import Channel
-from pikanid.recording.formats import Format
 from pikanid.recording.reading.columns import Request, channels
 from pikanid.recording.reading.door import opened
+from pikanid.recording.reading.reader import reader
 from pikanid.recording.reading.table import Options, Table
 
-__all__ = ["Found", "read"]
+__all__ = ["Found", "loaded", "read"]
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a file holds: channels, notes, unusable columns, when t = 0 was, its name's stem."""
+    """What a file holds: channels, notes, unusable columns, when t = 0 was, what nobody asked for,
+    and the stem of its name.
+    """
 
     channels: tuple[Channel, ...]
     notes: tuple[str, ...]
     unreadable: Mapping[str, str]
     began: float | None
+    others: tuple[str, ...]
     stem: str
 
 
-def read(path: str | os.PathLike[str], columns: Mapping[str, str | int] | None = None,
-         rate: float | None = None, sheet: str | int | None = None,
-         units: Mapping[str, str] | None = None, delimiter: str | None = None,
-         decimal: str | None = None, also: Iterable[str] = ()) -> Found:
-    """Read a file; the arguments are those of `Recording.read`.
+def read(path: str | os.PathLike[str], request: Request, options: Options) -> Found:
+    """Read a file.
+
+    Args:
+        path: Of the file.
+        request: Which of its columns are wanted.
+        options: For the reader of its format.
 
     Raises:
         BadRecording: If the file or a wanted column cannot be used.
         BadUnit: If a given unit or the time's unit is unknown.
         BadSetting: If an argument cannot work.
     """
+    table, where, stem = loaded(path, options)
+    result = channels(table, request, where)
+    return Found(result.channels, result.notes, result.unreadable, result.began, result.others,
+                 stem)
+
+
+def loaded(path: str | os.PathLike[str], options: Options) -> tuple[Table, str, str]:
+    """The table in a file, the file's name, and the stem of it.
+
+    Raises:
+        BadRecording: If the file cannot be used.
+        BadSetting: If an option cannot work.
+    """
     found, content, stem = opened(path)
     where = Path(path).name
-    request = Request(columns or {}, rate, units or {}, tuple(also))
-    table = _reader(found)(content, where, Options(sheet, delimiter, decimal, request.wanted))
-    result = channels(table, request, where)
-    return Found(result.channels, result.notes, result.unreadable, result.began, stem)
-
-
-def _reader(found: Format) -> Callable[[bytes, str, Options], Table]:
-    read: Callable[[bytes, str, Options], Table] = import_module(
-        f"pikanid.recording.reading.{found.file}").read
-    return read
+    return reader(found)(content, where, options), where, stem

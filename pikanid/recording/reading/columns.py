@@ -10,7 +10,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.formula import units
 from pikanid.recording.channel import LARGEST, Array, Channel
-from pikanid.recording.reading.headers import Named, find, named
+from pikanid.recording.reading.headers import Named, find, missing, named
 from pikanid.recording.reading.signals import TIME_NAMES
 from pikanid.recording.reading.table import Table
 
@@ -32,27 +32,35 @@ class Request:
     @property
     def wanted(self) -> tuple[str, ...]:
         """Names and patterns of all that is asked for; empty if that is everything."""
-        if not self.columns:
-            return ()
         return (*map(str, self.columns.values()), *self.also,
                 *(f"{mark}{name}" for mark in (OWN_TIME, OWN_SIGMA) for name in self.also))
 
 
 @dataclass(frozen=True)
 class Result:
-    """Channels, notes on the file, why some of its columns are unusable, and when t = 0 was."""
+    """Channels, notes on the file, why some of its columns are unusable, when t = 0 was, and what
+    columns else the file has, which nobody asked for.
+    """
 
     channels: tuple[Channel, ...]
     notes: tuple[str, ...]
     unreadable: Mapping[str, str]
     began: float | None
+    others: tuple[str, ...]
 
 
-def channels(table: Table, request: Request, where: str) -> Result:
+def channels(table: Table, request: Request, where: str, partly: bool = False) -> Result:
     """The channels of a table.
 
     Without a mapping every column is meant, and a wrong cell in one of them is an error (columns
-    of words are left out).  With a mapping only the mapped columns are checked so strictly.
+    of words are left out).  With a mapping only the mapped columns are checked so strictly, and in
+    a file whose channels have paths none: it holds what nobody asked for.
+
+    Args:
+        table: The columns of a file.
+        request: Which of them are wanted.
+        where: Name of the file, for messages.
+        partly: Whether it may hold nothing of all that.
 
     Raises:
         BadRecording: If a column, a time, or a cell of a wanted column is wrong.
@@ -63,10 +71,10 @@ def channels(table: Table, request: Request, where: str) -> Result:
     available = named(table.columns, where)
     mapped = {key: find(str(header), available, where) for key, header in request.columns.items()}
     clock = mapped.pop("t", None) or mapped.pop("time", None)
-    bases = _TimeBases(table, request, where, available, clock)
+    bases = TimeBases(table, request, where, available, clock)
     signals = [(key, found, True) for key, found in mapped.items()]
     # Variables of a workspace are unrelated: a mapping then names all that are wanted.
-    every = table.shared_time or not request.columns
+    every = table.shared_time or not request.wanted
     if every or request.also:
         taken = [*mapped.values(), *bases.clocks()]
         signals += [
@@ -88,18 +96,23 @@ def channels(table: Table, request: Request, where: str) -> Result:
             strict = strict and not is_gap
         if time is not None:
             made.append(_channel(key, found, time, request, available))
-        elif is_mapped or (strict and not found.column.text):
+        elif is_mapped or (strict and not found.column.text and not found.column.path):
             raise errors.BadRecording(defect)
         else:
             unreadable[key] = defect
-    if not made:
+    notes = tuple(f"Column '{key}' is left out: {why}" for key, why in unreadable.items())
+    if not made and not partly:
         soft = [unreadable[k] for k, found, _ in signals if not found.column.text]
+        soft += [missing(name, available, where) for name in request.also if not every]
         raise errors.BadRecording(soft[0] if soft else errors.no_channels(where))
     for key in set(request.units) - {"t", "time"} - {ch.name for ch in made}:
+        if partly:
+            continue
         raise errors.BadRecording(
             errors.missing_channel(where, key, [channel.name for channel in made]))
-    notes = tuple(f"Column '{key}' is left out: {why}" for key, why in unreadable.items())
-    return Result(tuple(made), (*table.notes, *notes), unreadable, bases.began())
+    used = [found for _, found, _ in signals] + bases.clocks()
+    others = tuple(found.column.path or found.name for found in available if found not in used)
+    return Result(tuple(made), (*table.notes, *notes), unreadable, bases.began(), others)
 
 
 def _defect(table: Table, where: str, found: Named) -> str:
@@ -130,7 +143,7 @@ def _channel(key: str, found: Named, time: Array, request: Request,
 
 
 @dataclass(frozen=True)
-class _TimeBases:
+class TimeBases:
     """Finds and checks the times of each column."""
 
     table: Table

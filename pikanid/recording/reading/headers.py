@@ -62,19 +62,32 @@ def find(wanted: str, available: list[Named], where: str) -> Named:
     Raises:
         BadRecording: If there is none, or several; the message lists those that there are.
     """
-    for found in available:
-        if wanted in (found.column.header, found.name, found.column.path):
-            return found
-    fits = [found for found in available
-            if asked(wanted, found.name, found.column.header, found.column.path)]
+    fits = matching(wanted, available)
     if len(fits) > 1:
         raise errors.BadRecording(errors.several_columns(
             where, wanted, [found.column.path or found.column.header for found in fits]))
-    if fits:
-        return fits[0]
+    if not fits:
+        raise errors.BadRecording(missing(wanted, available, where))
+    return fits[0]
+
+
+def matching(wanted: str, available: list[Named]) -> list[Named]:
+    """The column that is called so; where none is, those that the pattern fits, but for clocks that
+    a file keeps beside its signals.
+    """
+    calls = [(found.column.header, found.name, found.column.path, found.column.alias)
+             for found in available]
+    exact = [found for found, names in zip(available, calls, strict=True) if wanted in names]
+    return exact[:1] or [
+        found for found, names in zip(available, calls, strict=True)
+        if asked(wanted, *names) and not (found.column.is_clock and found.column.path)]
+
+
+def missing(wanted: str, available: list[Named], where: str) -> str:
+    """The sentence that says which columns there are."""
     headers = [found.column.header or found.name for found in available]
     close = difflib.get_close_matches(wanted, headers, n=1, cutoff=0.5)
-    raise errors.BadRecording(errors.missing_channel(where, wanted, headers, close))
+    return errors.missing_channel(where, wanted, headers, close)
 
 
 def _split(column: Column, number: int) -> tuple[str, str]:

@@ -51,6 +51,7 @@ class Column:
         sigma, hold: Where the format itself carries them.
         is_clock: Whether it holds times in seconds, whatever its header says.
         path: Its whole name, where the header is the short one of a channel in a group.
+        alias: Another whole name, of file and column, where several files are read together.
         began: POSIX time [s] of the zero of a clock that was made of dates.
     """
 
@@ -64,6 +65,7 @@ class Column:
     hold: str | None = None
     is_clock: bool = False
     path: str = ""
+    alias: str = ""
     began: float | None = None
 
 

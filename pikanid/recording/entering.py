@@ -1,0 +1,174 @@
+"""How a recording comes about: from a file or several, from a table of pandas, from recordings."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Self
+
+from numpy.typing import ArrayLike
+
+from pikanid import errors
+from pikanid.recording import merging
+from pikanid.recording.channel import Channel
+from pikanid.recording.leaving import Leaving
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Entering(Leaving):
+    """What a `Recording` can be made of; its data live there."""
+
+    if TYPE_CHECKING:
+        def __init__(self, channels: Mapping[str, Channel], name: str = ...,
+                     notes: tuple[str, ...] = ..., unreadable: Mapping[str, str] = ...,
+                     began: float | None = ..., others: tuple[str, ...] = ...) -> None: ...
+
+        unreadable: Mapping[str, str]
+        began: float | None
+        others: tuple[str, ...]
+
+    @classmethod
+    def from_frame(cls, frame: pd.DataFrame, columns: Mapping[str, str | int] | None = None,
+                   units: Mapping[str, str] | None = None,
+                   sigma: Mapping[str, ArrayLike] | None = None,
+                   name: str = "recording") -> Self:
+        """A recording of a DataFrame; its times are a column or an index called t or time.
+
+        Headers may carry units, as those of a file: ``"theta [deg]"``, ``"t [h]"``.  Dates count
+        in seconds from the first one.
+
+        Args:
+            frame: The table.
+            columns, units, sigma: As in `read`.
+            name: Of the recording.
+
+        Raises:
+            BadRecording: If there are no times, or a column cannot be used.
+
+        >>> import pandas as pd
+        >>> from pikanid import Recording
+        >>> frame = pd.DataFrame({"t [min]": [0, 1], "theta [deg]": [1.0, 2.0]})
+        >>> Recording.from_frame(frame)
+        Recording 'recording': 0 s to 60 s
+          theta  [deg]  2 samples, every 60 s  1 to 2
+        """
+        from pikanid.recording.reading import columns as made_of
+        from pikanid.recording.reading import frame as frames
+
+        if not (hasattr(frame, "columns") and hasattr(frame, "index")):
+            raise errors.BadRecording(errors.no_recording(type(frame).__name__))
+        request = made_of.Request(columns or {}, None, units or {})
+        found = made_of.channels(frames.read(frame, name), request, name)
+        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
+                  found.began)
+        return rec.with_sigma(sigma) if sigma else rec
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+             columns: Mapping[str, str | int] | None = None, rate: float | None = None,
+             sheet: str | int | None = None,
+             units: Mapping[str, str] | None = None, sigma: Mapping[str, ArrayLike] | None = None,
+             delimiter: str | None = None, decimal: str | None = None,
+             name: str | None = None, also: Iterable[str] = (),
+             by_date: bool = True) -> Self:
+        """Read a file of a format in `pikanid.recording.formats`: CSV, Excel, Parquet, MDF, ...
+
+        Several files that were recorded together make one recording, in which each channel keeps
+        its own times; one that more than one file has is called ``"file/channel"``.
+
+        Args:
+            path: The file, or several; its kind is known by its ending, checked against its
+                content.
+            columns: Channel name -> column in the file; ``"t"`` (or ``"time"``) names the time
+                column.  A column may be given by its header with or without unit, by its number
+                counted from 1 where the file has no header, by its whole path in a file with
+                groups or topics, or by a pattern (``"*/theta"``) that fits one.
+            rate: Sampling rate [Hz] of a file without a time column.
+            sheet: Excel sheet by name or number counted from 0; the first by default.
+            units: Channel name -> unit, in place of what the header says (``"t"`` for time).
+            sigma: Channel name -> noise standard deviation in the channel's unit.
+            delimiter: Of a CSV; found out by default.
+            decimal: Decimal sign of a CSV, ``"."`` or ``","``; found out by default.
+            name: Of the recording; the file's stem by default.
+            also: Channels that are wanted beside those of `columns` where the file has them, under
+                their own names; a table is read as a whole, of other files only what is named.
+            by_date: Whether several files are put on one clock as in `merge`.
+
+        Raises:
+            BadRecording: With one sentence that says what is wrong, and in which row.
+
+        >>> import pathlib, tempfile
+        >>> from pikanid import Recording
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder) / "run.csv"
+        ...     _ = path.write_text("t;theta [deg]\\n0,0;1,5\\n0,1;2,5\\n")
+        ...     Recording.read(path)["theta"].values.tolist()
+        [1.5, 2.5]
+        """
+        from pikanid.recording import reading
+        from pikanid.recording.reading.columns import Request
+        from pikanid.recording.reading.table import Options
+
+        asked = Request(columns or {}, rate, units or {}, tuple(also))
+        options = Options(sheet, delimiter, decimal, asked.wanted)
+        if isinstance(path, str | os.PathLike) or not isinstance(path, Sequence):
+            found = [reading.read(path, asked, options)]
+        else:
+            from pikanid.recording.reading import together
+
+            found = together.read(path, asked, options)
+        parts = [cls({ch.name: ch for ch in one.channels}, one.stem, one.notes, one.unreadable,
+                     one.began, one.others) for one in found if one.channels]
+        if not parts:
+            told = [why for one in found for why in one.unreadable.values()]
+            told += [errors.missing_channel(
+                "the files together", text, [o for one in found for o in one.others])
+                for text in asked.also]
+            raise errors.BadRecording(next(iter(told), errors.no_channels(found[0].stem)))
+        rec = parts[0] if len(found) == 1 else cls.merge(*parts, by_date=by_date)
+        rec = cls(rec.channels, name or "+".join(one.stem for one in found), rec.notes,
+                  {key: why for one in found for key, why in one.unreadable.items()}, rec.began,
+                  tuple(other for one in found for other in one.others))
+        return rec.with_sigma(sigma) if sigma else rec
+
+    @classmethod
+    def merge(cls, *recordings: Self, name: str | None = None, by_date: bool = True) -> Self:
+        """One recording with the channels of several, each with its own time base.
+
+        Where every recording knows when it began (`began`), later ones are moved by so much, and
+        t = 0 is the earliest beginning; otherwise, and with ``by_date=False``, times are taken as
+        they stand.  Nothing is resampled.
+
+        Args:
+            recordings: No two of them with a channel of the same name.
+            name: Of the result; that of the first by default.
+            by_date: Whether dates count.
+
+        Raises:
+            BadRecording: If two of them have a channel of the same name, or they do not overlap by
+                their dates.
+
+        >>> from pikanid import Recording
+        >>> a = Recording.from_arrays([0, 1], {"u": [0, 1]}, name="motion")
+        >>> b = Recording.from_arrays([0.0, 0.5, 1.0], {"y": [0, 1, 2]})
+        >>> Recording.merge(a, b).names
+        ('u', 'y')
+        """
+        for rec in recordings:
+            if not isinstance(rec, Entering):
+                raise errors.BadRecording(errors.no_recording(type(rec).__name__))
+        late, began, notes = merging.delays(
+            [(r.name, r.start, r.stop, r.began) for r in recordings], by_date)
+        together: dict[str, Channel] = {}
+        for rec, delay in zip(recordings, late, strict=True):
+            for key, ch in rec.channels.items():
+                if key in together:
+                    raise errors.BadRecording(errors.channel_twice(key, rec.name))
+                together[key] = replace(ch, time=ch.time + delay) if delay else ch
+        return cls(together, name or (recordings[0].name if recordings else "recording"),
+                   tuple(note for rec in recordings for note in rec.notes) + notes,
+                   {key: why for rec in recordings for key, why in rec.unreadable.items()}, began,
+                   tuple(other for rec in recordings for other in rec.others))
