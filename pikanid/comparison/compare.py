@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
@@ -17,6 +18,7 @@ from pikanid.comparison.residual_analysis import ResidualAnalysis
 from pikanid.comparison.runs import Start, free_run
 from pikanid.comparison.scores import Score, score
 from pikanid.comparison.validation import ALPHA, NOISE, Validation
+from pikanid.objective.adequacy import difference_noise
 from pikanid.problem.arguments import several
 from pikanid.recording import Recording
 
@@ -135,8 +137,9 @@ def assembled(named: dict[str, list[Prediction]],
               residuals: dict[str, tuple[ResidualAnalysis, ...]], protocol: Protocol, alpha: float,
               seed: int, notes: tuple[str, ...]) -> Validation:
     """Scores, ranking and pairs of predictions by name, all on the samples that every model has."""
+    there = [_common(same) for same in zip(*named.values(), strict=True)]
+    named = _quieter(named, there)
     lists = list(named.values())
-    there = [_common(same) for same in zip(*lists, strict=True)]
     scores: list[Score] = []
     squares: dict[str, list[np.ndarray]] = {}
     losses: dict[str, float] = {}
@@ -153,6 +156,22 @@ def assembled(named: dict[str, list[Prediction]],
     return Validation(tuple(scores), tuple(sorted(losses, key=losses.__getitem__)),
                       pairs(sound, seed), {n: tuple(own) for n, own in named.items()},
                       residuals, protocol, alpha, notes)
+
+
+def _quieter(named: dict[str, list[Prediction]], there: list[np.ndarray]
+             ) -> dict[str, list[Prediction]]:
+    """The same with estimates of the noise that no residual contradicts: a signal that reaches the
+    highest frequencies looks noisier than it is, and what a model leaves there is noise or less.
+    """
+    found: dict[str, list[Prediction]] = {name: [] for name in named}
+    for same, m in zip(zip(*named.values(), strict=True), there, strict=True):
+        left = [difference_noise(p.residual[m]) for p in same if np.isfinite(p.residual[m]).all()]
+        least = 1e-9 * max(float(np.ptp(same[0].measured)), 1e-300)
+        for name, p in zip(named, same, strict=True):
+            sigma = p.sigma if p.sigma_source == "given" else np.minimum(
+                p.sigma, max(min(left, default=np.inf), least))
+            found[name].append(replace(p, sigma=sigma))
+    return found
 
 
 def _check(first: int, initial: str, horizon: int | None, window: int | None, origins: int,

@@ -5,8 +5,9 @@
 Each output has its own, with all inputs; coefficients by least squares of the equation error
 (L. Ljung, System Identification, 2nd ed. 1999, sec. 4.2).  What is compared is a simulation, so
 the order is the one whose *simulation* of the training recordings has the least
-N ln(RSS/N) + k ln N: the equation error of densely sampled data says little about that.  The
-simulation starts from the p outputs before its first sample that suit its first samples best.
+N ln(RSS/N) + k ln N: the equation error of densely sampled data says little about that.  Where
+predictions K samples ahead are compared, it is these.  A simulation starts from the p outputs
+before its first sample that suit its first samples best.
 """
 
 from __future__ import annotations
@@ -128,9 +129,10 @@ def fitted(training: Sequence[Series], order: int) -> ARX:
     return ARX(theta[:order], theta[order:-1].reshape(order + 1, m), float(theta[-1]))
 
 
-def best_arx(training: Sequence[Series], first: int = 0, highest: int = HIGHEST) -> ARX | None:
-    """The ARX model with the least BIC of its simulation among orders 0 to `highest`; None where
-    no simulation is stable.
+def best_arx(training: Sequence[Series], first: int = 0, horizon: int | None = None,
+             highest: int = HIGHEST) -> ARX | None:
+    """The ARX model with the least BIC of its simulation, or of its predictions so far ahead,
+    among orders 0 to `highest`; None where no simulation is stable.
 
     >>> rng = np.random.default_rng(0)
     >>> u, y = rng.standard_normal((400, 1)), np.zeros(400)
@@ -144,17 +146,27 @@ def best_arx(training: Sequence[Series], first: int = 0, highest: int = HIGHEST)
         if n <= 2 * (order + (order + 1) * training[0].u.shape[1] + 1):
             break
         model = fitted(training, order)
-        total = 0.0
-        for s in training:
-            y, there = model.simulate(s, first), np.isfinite(s.y)
-            wild = not np.all(np.abs(y) < WILD * np.max(np.abs(s.y[there]), initial=1e-300))
-            total += np.inf if wild else float(np.sum((s.y[there] - y[there]) ** 2))
-        if np.isfinite(total):
+        errors = np.concatenate([_errors(model, s, first, horizon, highest) for s in training])
+        if len(errors) and np.all(np.isfinite(errors)):
             with np.errstate(divide="ignore"):
-                bic = n * float(np.log(total / n)) + model.parameters * float(np.log(n))
+                bic = (len(errors) * float(np.log(np.mean(errors**2)))
+                       + model.parameters * float(np.log(len(errors))))
             if best is None or bic < best[0]:
                 best = bic, model
     return None if best is None else best[1]
+
+
+def _errors(model: ARX, s: Series, first: int, horizon: int | None, highest: int) -> np.ndarray:
+    """Errors of all samples that every order predicts; infinite where the model runs away."""
+    if horizon is None:
+        y, there = model.simulate(s, first), np.isfinite(s.y)
+    else:
+        y = model.ahead(s, horizon)
+        there = np.isfinite(s.y) & np.isfinite(y)
+        there[:highest + horizon] = False
+    limit = WILD * np.max(np.abs(s.y[there]), initial=1e-300)
+    error = s.y[there] - y[there]
+    return np.where(np.abs(y[there]) < limit, error, np.inf)
 
 
 def even_grid(t: np.ndarray) -> tuple[np.ndarray, float] | None:

@@ -30,7 +30,8 @@ class Prediction:
         model, recording, output, unit: What.
         t, measured, predicted: (N,) times [s] and values in the model's unit; predictions are NaN
             where the protocol gives none, and everywhere if the motion leaves the finite numbers.
-        sigma: (N,) noise, as given or estimated.
+        sigma: (N,) noise, as given or estimated; an estimate is no more than what some model
+            leaves at the highest frequencies.
         sigma_source: "given" or "estimated".
         spread: (N,) standard deviation of the prediction that the parameters' covariance gives, or
             None where that is not known.
@@ -156,7 +157,7 @@ class Baseline:
             if np.ptp([g[2] for g in grids]) > 1e-3 * grids[0][2]:
                 self.notes.append(errors.baseline_rates(output.name))
                 continue
-            arx = best_arx([g[0] for g in grids], protocol.first)
+            arx = best_arx([g[0] for g in grids], protocol.first, protocol.horizon)
             if arx is None:
                 self.notes.append(errors.baseline_unstable(output.name))
                 continue

@@ -16,6 +16,8 @@ from pikanid.comparison.whitened import White
 if TYPE_CHECKING:
     import matplotlib.figure
 
+SMALLEST = 1e-99  # layout: p-values below are not told apart
+
 
 @dataclass(frozen=True, eq=False)
 class ResidualAnalysis:
@@ -89,7 +91,7 @@ class ResidualAnalysis:
         said = {"whiteness": "correlated with itself", "mean": "off zero on average",
                 "independence": "correlated with the past of {}", "dependence": "dependent on {}",
                 "normality": "not normally distributed"}
-        found = [said[t.kind].format(f"'{t.of}'") + f" (p = {t.p_value:.2g})" for t in self.failed]
+        found = [said[t.kind].format(f"'{t.of}'") + f" ({_p(t.p_value)})" for t in self.failed]
         return f"What {where} is no noise: it is {', '.join(found)}."
 
     def warnings(self) -> tuple[str, ...]:
@@ -114,3 +116,12 @@ class ResidualAnalysis:
             f"{self.model}: residual of {self.output}, {self.recording}", self.white,
             self.autocorrelation, self.crosscorrelation, self.spectrum, self.dependences,
             self.alpha)
+
+
+def _p(value: float) -> str:
+    """A p-value in words; nobody computes the smallest ones.
+
+    >>> _p(0.0123), _p(0.0)
+    ('p = 0.012', 'p < 1e-99')
+    """
+    return f"p = {value:.2g}" if value >= SMALLEST else f"p < {SMALLEST:.0e}"

@@ -126,5 +126,6 @@ def _dependence(axes: Axes, found: Dependence, white: White, alpha: float) -> No
     axes.fill_between(found.centres, -half, half, color=BAND, alpha=0.9, linewidth=0, zorder=2.5)
     axes.plot(found.centres, found.means, color=COLOURS[1], marker="o", markersize=3, linewidth=1.2,
               zorder=3)
+    axes.locator_params(axis="x", nbins=5)
     axes.set_xlabel(labelled(found.name, found.unit))
     axes.set_ylabel("residual [s.d.]")
