@@ -155,9 +155,9 @@ def pendulum(folder: Path) -> list[str]:
         f"Free swing, 100 Hz, fitted to the first {train.stop - train.start:.1f} s and held out "
         f"for the following {test.stop - test.start:.1f} s. Free simulation from a state that is "
         "found in the first second, which is not scored; and prediction one second ahead, from a "
-        "state that is estimated of the second before. Without an input the linear baseline is AR; where "
-        "it has one parameter, no linear model simulates the large swings of the training part "
-        "better than their mean.", "",
+        "state that is estimated of the second before. Without an input the linear baseline is AR; "
+        "where it has one parameter, no linear model simulates the large swings of the training "
+        "part better than their mean.", "",
         table(found.items(), Shown("mrad", 1e3)), "", *sentences(found), "",
         "![The held-out swing, simulated freely](figures/validation-pendulum.png)", ""]
 
