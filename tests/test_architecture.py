@@ -38,7 +38,8 @@ ROWS = tuple(map(tuple, reversed(_HOUSE)))
 INSIDE = tuple(map(tuple, _MISMATCH))
 
 # Seconds to import, or optional: never at the top of a module that `import pikanid` can reach.
-HEAVY = ("torch", "kan", "pandas", "matplotlib", "pint", "numba", "sklearn", "pyarrow", "h5py")
+HEAVY = ("torch", "kan", "pandas", "matplotlib", "pint", "numba", "sklearn", "pyarrow", "h5py",
+         "xarray", "asammdf", "rosbags", "nptdms")
 
 # Where a library may be named at all.
 ONLY_IN = {

@@ -110,6 +110,24 @@ def constant_output(where: str, name: str, value: float) -> str:
             "dead sensor, a wrong column?) identifies nothing.")
 
 
+def no_labelled_times(where: str) -> str:
+    return (f"'{where}' has no variable of numbers over one or two dimensions with a coordinate of "
+            "times along one of them.")
+
+
+def no_sampling_time(where: str) -> str:
+    return f"'{where}' does not say its sampling time: give the sampling rate in Hz (rate=)."
+
+
+def not_as_many_names(what: str, given: int, wanted: int) -> str:
+    return f"{given} names of {what} are given for {wanted} of them."
+
+
+def note_warm_up(samples: int) -> str:
+    return (f"The first {samples} samples are there to find the initial state; scores leave them "
+            "out (--first, in Python first=).")
+
+
 def note_undated(names: Sequence[str]) -> str:
     return ("Times are taken as they stand, each from the zero of its own file: when "
             f"{listed(names)} began is not known.")

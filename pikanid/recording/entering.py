@@ -1,11 +1,11 @@
-"""How a recording comes about: from a file or several, from a table of pandas, from recordings."""
+"""How a recording comes about: from files, from what other libraries hold, from recordings."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from numpy.typing import ArrayLike
 
@@ -16,6 +16,7 @@ from pikanid.recording.leaving import Leaving
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 
 class Entering(Leaving):
@@ -65,6 +66,73 @@ class Entering(Leaving):
         rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
                   found.began)
         return rec.with_sigma(sigma) if sigma else rec
+
+    @classmethod
+    def from_xarray(cls, data: xr.Dataset | xr.DataArray,
+                    columns: Mapping[str, str | int] | None = None,
+                    units: Mapping[str, str] | None = None,
+                    sigma: Mapping[str, ArrayLike] | None = None,
+                    name: str = "recording") -> Self:
+        """A recording of a Dataset or DataArray, each variable on the coordinate of its dimension.
+
+        Units, a scalar sigma and the hold are attributes (``units``, ``sigma``, ``hold``), as
+        `to_xarray` writes them.  Dates count in seconds from the earliest one.
+
+        Args:
+            data: Variables over time; a second dimension makes a signal of each of its labels.
+            columns, units, sigma: As in `read`.
+            name: Of the recording.
+
+        Raises:
+            BadRecording: If no variable has times, or a wanted one cannot be used.
+
+        >>> import pytest; xr = pytest.importorskip("xarray")
+        >>> from pikanid import Recording
+        >>> y = xr.DataArray([1.0, 2.0], {"time": [0.0, 0.1]}, name="y", attrs={"units": "mm"})
+        >>> Recording.from_xarray(y)["y"].unit
+        'mm'
+        """
+        from pikanid.recording.reading import columns as made_of
+        from pikanid.recording.reading import labelled
+
+        if not (hasattr(data, "coords") and hasattr(data, "dims")):
+            raise errors.BadRecording(errors.no_recording(type(data).__name__))
+        request = made_of.Request(columns or {}, None, units or {})
+        found = made_of.channels(labelled.read(data, name), request, name)
+        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
+                  found.began, found.others)
+        return rec.with_sigma(sigma) if sigma else rec
+
+    @classmethod
+    def from_benchmark(cls, data: Any, inputs: Sequence[str] | None = None,
+                       outputs: Sequence[str] | None = None,
+                       units: Mapping[str, str] | None = None, rate: float | None = None,
+                       name: str | None = None) -> Self:
+        """A recording of an object with `u`, `y` and `sampling_time`, as nonlinear_benchmarks has.
+
+        Args:
+            data: `u` and `y` are (N,) or (N, channels); `sampling_time` is in seconds; where
+                `state_initialization_window_length` is there, a note says so.
+            inputs: Names of the inputs; ``u``, or ``u1``, ``u2``, ... by default.
+            outputs: Names of the outputs; ``y``, or ``y1``, ``y2``, ... by default.
+            units: Channel name -> unit.
+            rate: Sampling rate [Hz], where the object has no sampling time.
+            name: Of the recording; that of the object by default.
+
+        Raises:
+            BadRecording: If it is no such object, or does not say its sampling time.
+            BadSetting: If there are more or fewer names than channels.
+
+        >>> from types import SimpleNamespace
+        >>> from pikanid import Recording
+        >>> data = SimpleNamespace(u=[0.0, 1.0], y=[[0.0, 2.0], [1.0, 3.0]], sampling_time=0.5)
+        >>> Recording.from_benchmark(data).names
+        ('u', 'y1', 'y2')
+        """
+        from pikanid.recording import benchmark
+
+        channels, called, notes = benchmark.channels(data, inputs, outputs, units or {}, rate)
+        return cls(channels, name or called, notes)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],

@@ -1,4 +1,4 @@
-"""How a recording leaves: as a table of pandas, as a file, as text."""
+"""How a recording leaves: as a table of pandas, as a Dataset of xarray, as a file, as text."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pikanid.recording.operations import Operations
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 
 class Leaving(Operations):
@@ -32,6 +33,39 @@ class Leaving(Operations):
         every = np.unique(np.concatenate([ch.time for ch in self.channels.values()]))
         series = {key: pd.Series(ch.values, ch.time) for key, ch in self.channels.items()}
         return pd.DataFrame(series, index=pd.Index(every, name="t"))
+
+    def to_xarray(self) -> xr.Dataset:
+        """A Dataset: a variable for each channel, a dimension for each time base.
+
+        The first channel's times are the coordinate ``t`` [s]; a channel on other times brings its
+        own, ``t:name``.  Units, a scalar sigma and the hold are attributes; a sigma of each sample
+        is the variable ``sigma:name``.  `Recording.from_xarray` gives the channels back.
+
+        Raises:
+            BadSetting: If xarray is not installed.
+
+        >>> import pytest; xr = pytest.importorskip("xarray")
+        >>> from pikanid import Recording
+        >>> Recording.from_arrays([0, 1], {"y": [5, 6]}, {"y": "mm"}).to_xarray()["y"].attrs
+        {'units': 'mm'}
+        """
+        try:
+            import xarray as xr
+        except ImportError:
+            raise errors.BadSetting(
+                errors.not_installed("to_xarray", "xarray", "xarray")) from None
+        shared = next(iter(self.channels.values())).time
+        made = xr.Dataset(attrs={"name": self.name})
+        for key, ch in self.channels.items():
+            axis = "t" if np.array_equal(ch.time, shared) else f"t:{key}"
+            about = {"units": ch.unit, "hold": ch.hold,
+                     "sigma": ch.sigma if isinstance(ch.sigma, float) else None}
+            told = {k: v for k, v in about.items() if v is not None}
+            at = {axis: (axis, ch.time, {"units": "s"})}
+            made[key] = xr.DataArray(ch.values, at, [axis], attrs=told)
+            if isinstance(ch.sigma, np.ndarray):
+                made[f"sigma:{key}"] = xr.DataArray(ch.sigma, at, [axis])
+        return made
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write a file, as ``.csv`` or ``.parquet``; see `pikanid.recording.writing`."""
