@@ -238,3 +238,26 @@ def test_models_must_be_models_of_the_same_outputs(recorded: pk.Recording) -> No
         pk.validate([], recorded)
     assert pk.validate([oscillator(), oscillator()], recorded, baseline=False).ranking == (
         "oscillator", "oscillator (2)")
+
+
+def test_an_output_of_mere_noise_does_not_decide() -> None:
+    """Of one output both models know nothing: on the other one of them is right."""
+    model = pk.systems.sloshing_2d()
+    rec = pk.simulate(model, pk.excitation.multisine(duration=5), sigma=2e-3, seed=1)
+    off = model.with_values(l_theta=0.0452)
+    found = pk.validate({"off": off, "right": model}, rec)
+    assert found.score("right", "phi").fit < 5
+    assert found.ranking[0] == "right"
+    assert ("right", "off") in {(p.better, p.worse) for p in found.significant()}
+
+
+def test_clean_recordings_of_several_outputs_are_told_in_one_sentence() -> None:
+    model = pk.systems.sloshing_2d()
+    runs = [replace(pk.simulate(model, pk.excitation.multisine(duration=5), sigma=2e-3, seed=k),
+                    name=f"run {k}") for k in (1, 2)]
+    found = pk.validate(model, runs, baseline=False)
+    assert [good for _, good in found.left()] == [True]
+    assert "all outputs" in str(found)
+    wrong = pk.validate(model.with_values(l_theta=0.05), runs, baseline=False)
+    assert sum(good for _, good in wrong.left()) == 2  # phi of both runs
+    assert any("'theta'" in sentence for sentence, good in wrong.left() if not good)

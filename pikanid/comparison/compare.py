@@ -94,7 +94,8 @@ def validate(models: Any, recordings: Recording | Sequence[Recording], *,
         own_predictions = [p for r in records for p in linear.predictions(r)]
         if len(own_predictions) == len(named[found[0].name]):
             named[BASELINE] = own_predictions
-    notes += dict.fromkeys(w for own in residuals.values() for a in own for w in a.warnings())
+    notes += dict.fromkeys(w for own in residuals.values() for a in own
+                           for w in a.warnings(alpha / len(own)))
     return assembled(named, residuals, protocol, alpha, seed, tuple(notes))
 
 
@@ -146,10 +147,11 @@ def assembled(named: dict[str, list[Prediction]],
     for name, own in named.items():
         made = [_scored(p, m) for p, m in zip(own, there, strict=True)]
         scores += made
-        losses[name] = float(np.mean([100.0 - s.fit for s in made]))
         # in units of the noise, of which all models have the same: a quiet output counts fully
         squares[name] = [p.residual[m] ** 2 / float(np.mean(q.sigma[m] ** 2))
                          for p, q, m in zip(own, lists[0], there, strict=True)]
+        loss = float(np.mean(np.concatenate(squares[name])))
+        losses[name] = loss if np.isfinite(loss) else np.inf
     sound = {n: e for n, e in squares.items() if all(np.all(np.isfinite(x)) for x in e)}
     for p, m in zip(lists[0], there, strict=True):
         scores.append(_noise(p, m))

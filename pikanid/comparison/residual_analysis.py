@@ -68,13 +68,17 @@ class ResidualAnalysis:
 
     @property
     def feedback(self) -> tuple[str, ...]:
-        """Inputs that the residual precedes: they may be driven by what is measured.
+        """Inputs that the residual precedes: they may be driven by what is measured."""
+        return self._feedback(self.alpha)
+
+    def _feedback(self, rate: float) -> tuple[str, ...]:
+        """Likewise, at a rate of false alarms.
 
         A misfit of a periodic motion knows a little of its drive's future, too: where the residual
         is no noise, far more is asked for.
         """
         about = [t for t in self.tests if t.kind == "feedback"]
-        rate = self.alpha if self.ok else self.alpha**3
+        rate = rate if self.ok else rate**3
         return tuple(t.of for t in about if t.p_value * len(about) < rate)
 
     @property
@@ -94,13 +98,13 @@ class ResidualAnalysis:
         found = [said[t.kind].format(f"'{t.of}'") + f" ({_p(t.p_value)})" for t in self.failed]
         return f"What {where} is no noise: it is {', '.join(found)}."
 
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences that the user should read."""
+    def warnings(self, rate: float | None = None) -> tuple[str, ...]:
+        """Sentences that the user should read; false ones at that rate, `alpha` by default."""
         return tuple(
             f"The residual of '{self.output}' precedes the input '{name}' in '{self.recording}': "
             "the input seems to depend on what is measured (feedback), which biases what is read "
             "off such data; model the controller too, or excite by an independent signal."
-            for name in self.feedback)
+            for name in self._feedback(self.alpha if rate is None else rate))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain content for JSON."""

@@ -27,7 +27,8 @@ class Validation:
 
     Attributes:
         scores: One for every model, recording and output; the baseline's and the noise's too.
-        ranking: Names of models and baseline, best first: by mean NRMSE over all outputs.
+        ranking: Names of models and baseline, best first: by mean squared error, every output in
+            units of its noise.
         pairs: Which of two models has the smaller squared error, and how sure that is.
         predictions: What was scored, by model.
         residuals: Analysis of what each model leaves, by model; empty for predictions ahead.
@@ -81,6 +82,20 @@ class Validation:
             words += f"{';' if beaten else ','} its lead over {_and(equal)} may be chance"
         return words + "."
 
+    def left(self) -> tuple[tuple[str, bool], ...]:
+        """What every model leaves, in sentences, and whether that is noise; where all of several
+        outputs and recordings are, in one.
+        """
+        found: list[tuple[str, bool]] = []
+        for name, own in self.residuals.items():
+            good = [a for a in own if a.ok]
+            if len(good) > 2:
+                share = "all" if len(good) == len(own) else f"{len(good)} of {len(own)}"
+                found.append((f"What '{name}' leaves of {share} outputs is noise, independent of "
+                              "the inputs.", True))
+            found += [(a.sentence(), a.ok) for a in own if not a.ok or len(good) <= 2]
+        return tuple(found)
+
     def to_frame(self) -> pd.DataFrame:
         """One row a score."""
         import pandas as pd
@@ -123,7 +138,7 @@ class Validation:
         widths = [max(len(row[k]) for row in (headers, *cells)) for k in range(len(headers))]
         lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
                  for row in (headers, *cells)]
-        left = [a.sentence() for own in self.residuals.values() for a in own]
+        left = [sentence for sentence, _ in self.left()]
         return "\n".join([self.sentence(), str(self.protocol), "", *lines, "", *left,
                           *(f"note: {n}" for n in self.notes)])
 

@@ -35,8 +35,7 @@ def page(found: Validation, title: str) -> str:
 
 def _residuals(found: Validation) -> str:
     """What every model leaves, in sentences; in pictures what the best of them does."""
-    said = "".join(f"<li>{escape(a.sentence())}</li>"
-                   for own in found.residuals.values() for a in own)
+    said = "".join(f"<li>{escape(sentence)}</li>" for sentence, _ in found.left())
     best = next((name for name in found.ranking if found.residuals.get(name)), None)
     if best is None:
         return ""

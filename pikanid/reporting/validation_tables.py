@@ -37,11 +37,10 @@ def show_validation(out: Console, found: Validation) -> None:
     if found.pairs:
         out.print()
         out.print(pairs(found).to_rich())
-    left = [a for own in found.residuals.values() for a in own]
+    left = found.left()
     if left:
         out.print()
-    for analysis in left:
-        out.print(analysis.sentence(), style="green" if analysis.ok else "yellow", markup=False,
-                  soft_wrap=True)
+    for sentence, good in left:
+        out.print(sentence, style="green" if good else "yellow", markup=False, soft_wrap=True)
     for note in found.notes:
         out.print(f"Note: {note}", style="yellow", markup=False, soft_wrap=True)
