@@ -52,6 +52,8 @@ def test_signals_are_found_by_pattern(rig: Path) -> None:
     assert Recording.read(rig, {"y": "*theta"}).names == ("y",)
     with pytest.raises(errors.BadRecording, match=r"fits several channels: .*; give one of"):
         Recording.read(rig, {"y": "*[/a]*"})
+    if rig.suffix in (".mf4", ".h5"):
+        assert Recording.read(rig, {"y": "encoder"}).names == ("y",)  # the only one of its group
     with pytest.raises(errors.BadRecording, match="has no column 'phi'; it has: "):
         Recording.read(rig, {"y": "phi"})
 

@@ -148,12 +148,22 @@ def test_stamps_of_a_simulated_clock_are_put_on_the_recorders(tmp_path: Path) ->
 def test_times_that_go_back_are_told(tmp_path: Path) -> None:
     made = benches.types(2).types["sensor_msgs/msg/Range"]
     benches.ros2(tmp_path / "bag", {"/range": ("sensor_msgs/msg/Range", [
-        (0.1 * k, made(header=benches.header(2, 0.1 * (k if k != 7 else 3)), radiation_type=0,
-                       field_of_view=0.0, min_range=0.0, max_range=9.0, range=float(k),
-                       variance=0.0))
-        for k in range(10)])})
-    with pytest.raises(errors.BadRecording, match=r"sample 8: the time .* goes back"):
+        (0.1 * k, made(header=benches.header(2, 0.1 * k - (1.55 if k > 20 else 0)),
+                       radiation_type=0, field_of_view=0.0, min_range=0.0, max_range=9.0,
+                       range=float(k), variance=0.0))
+        for k in range(40)])})
+    with pytest.raises(errors.BadRecording, match=r"sample 22: the time .* goes back"):
         Recording.read(tmp_path / "bag", {"y": "/range.range"})
+
+
+def test_messages_that_overtake_each_other_are_put_in_order(tmp_path: Path) -> None:
+    kind, messages = benches.rig_topics(2)["/joints"]
+    late = [(at + 0.03 * (k % 3 == 1), message) for k, (at, message) in enumerate(messages)]
+    benches.ros2(tmp_path / "bag", {"/joints": (kind, sorted(late, key=lambda one: one[0]))})
+    rec = Recording.read(tmp_path / "bag", {"theta": "/joints"})
+    np.testing.assert_allclose(rec["theta"].time, benches.FAST, atol=1e-9)
+    np.testing.assert_array_equal(rec["theta"].values, np.deg2rad(benches.THETA))
+    assert "were not recorded in the order of their stamps" in rec.notes[0]
 
 
 def test_a_bag_without_messages(tmp_path: Path) -> None:

@@ -97,6 +97,11 @@ def note_other_stamps(seconds: float) -> str:
             "added to them.")
 
 
+def note_overtaken(topic: str, number: int) -> str:
+    return (f"{number} messages of '{topic}' were not recorded in the order of their stamps: they "
+            "are put in it.")
+
+
 def note_two_clocks(topics: Sequence[str]) -> str:
     return ("Messages without a stamp are on the recorder's clock, which counts delays in: "
             f"{listed(topics)}.")

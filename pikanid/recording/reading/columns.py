@@ -171,7 +171,8 @@ class TimeBases:
         if source is None:
             if self.request.rate is not None:
                 return np.arange(n) / self.request.rate, "", False
-            headers = [other.column.header or other.name for other in self.available]
+            headers = [other.column.header or other.name for other in self.available
+                       if not (other.column.is_clock and other.column.path)]
             return None, errors.no_time(self.where, headers), True
         if len(source.column.values) != n:
             wanted = len(source.column.values)

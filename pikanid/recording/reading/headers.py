@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from pikanid import errors
 from pikanid.formula import units
-from pikanid.recording.reading.signals import asked
+from pikanid.recording.reading.signals import fits, is_part
 from pikanid.recording.reading.table import Column
 
 # "theta [deg]" or "theta (deg)"; the unit itself may hold one pair of parentheses.
@@ -62,32 +62,38 @@ def find(wanted: str, available: list[Named], where: str) -> Named:
     Raises:
         BadRecording: If there is none, or several; the message lists those that there are.
     """
-    fits = matching(wanted, available)
-    if len(fits) > 1:
+    known = matching(wanted, available)
+    if len(known) > 1:
         raise errors.BadRecording(errors.several_columns(
-            where, wanted, [found.column.path or found.column.header for found in fits]))
-    if not fits:
+            where, wanted, [found.column.path or found.column.header for found in known]))
+    if not known:
         raise errors.BadRecording(missing(wanted, available, where))
-    return fits[0]
+    return known[0]
 
 
 def matching(wanted: str, available: list[Named]) -> list[Named]:
-    """The column that is called so; where none is, those that the pattern fits, but for clocks that
-    a file keeps beside its signals.
+    """The column that is called so; where none is, those that the pattern fits, or else those of
+    whose path it is a part; clocks that a file keeps beside its signals are found by name only.
     """
     calls = [(found.column.header, found.name, found.column.path, found.column.alias)
              for found in available]
     exact = [found for found, names in zip(available, calls, strict=True) if wanted in names]
-    return exact[:1] or [
-        found for found, names in zip(available, calls, strict=True)
-        if asked(wanted, *names) and not (found.column.is_clock and found.column.path)]
+    signals = [(found, names) for found, names in zip(available, calls, strict=True)
+               if not _is_beside(found)]
+    return (exact[:1] or [found for found, names in signals if fits(wanted, *names)]
+            or [found for found, names in signals
+                if found.column.path and is_part(wanted, found.column.path)])
 
 
 def missing(wanted: str, available: list[Named], where: str) -> str:
     """The sentence that says which columns there are."""
-    headers = [found.column.header or found.name for found in available]
+    headers = [found.column.header or found.name for found in available if not _is_beside(found)]
     close = difflib.get_close_matches(wanted, headers, n=1, cutoff=0.5)
     return errors.missing_channel(where, wanted, headers, close)
+
+
+def _is_beside(found: Named) -> bool:
+    return found.column.is_clock and bool(found.column.path)
 
 
 def _split(column: Column, number: int) -> tuple[str, str]:

@@ -92,6 +92,7 @@ def listing(path: str | os.PathLike[str], sheet: str | int | None = None,
             remark = errors.times_to_be_told() if is_gap else remark
         if not remark and isinstance(one.unit, units.Unread):
             remark = errors.unit_to_be_told(one.unit)
+        remark = remark.removeprefix(f"'{where}'").lstrip(":, ")
         at = Channel(one.name or "?", np.empty(0), np.empty(0)) if time is None else Channel(
             one.name, time, np.zeros(len(time)))
         found.append(Listed(

@@ -2,7 +2,7 @@
 
 A number in the messages of a topic is a signal, ``/imu.angular_velocity.z``; a topic that carries
 one number is called as the topic is.  Messages with a header are on the clock of its stamp, others
-on the recorder's; time 0 is the first message that was recorded.
+on the recorder's; time 0 is the earliest of all.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from pikanid.recording.reading.table import Options, Table
 _ROS_1 = ".bag"
 _PACKED = b"\x28\xb5\x2f\xfd"  # how zstd begins
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
+_OVERTAKES = 8  # limit: places by which a message may be early among those recorded
 _APART = 3600 * 10**9  # definition: nanoseconds that no delay takes: stamps of another clock
 
 
@@ -81,17 +82,42 @@ class _Topic:
         stamps = 10**9 * seconds + rest
         return stamps if np.all(stamps > 0) else None
 
+    @cached_property
+    def order(self) -> np.ndarray:
+        """(N,) places of the messages in the order of their stamps; as recorded where that differs
+        by more than messages overtake each other: then the clock was set back.
+        """
+        recorded = np.arange(len(self.messages))
+        if self.stamps is None:
+            return recorded
+        sorted_ = np.argsort(self.stamps, kind="stable")
+        return sorted_ if np.max(np.abs(sorted_ - recorded)) <= _OVERTAKES else recorded
+
+    def overtaken(self) -> int:
+        """How many messages are not where they were recorded."""
+        return int(np.count_nonzero(self.order != np.arange(len(self.messages))))
+
+    def in_order(self) -> _Topic:
+        """The topic with its messages in that order."""
+        if not self.overtaken():
+            return self
+        return _Topic(self.name, self.kind, self.types, self.cdr,
+                      [self.messages[k] for k in self.order], [self.logged[k] for k in self.order])
+
 
 def contents(content: bytes, where: str) -> Contents:
     """Every number of every topic."""
     topics = _topics(content)
     if not topics:
         raise errors.BadRecording(errors.no_signals(where))
-    zero = min(topic.logged[0] for topic in topics)
+    moved = {t.name: t.overtaken() for t in topics}
+    topics = [t.in_order() for t in topics]
     stamped = [topic for topic in topics if topic.stamps is not None]
     late = min((int(np.min(np.array(t.logged) - t.stamps)) for t in stamped), default=0)
     late = late if abs(late) > _APART else 0
+    zero = min(int(np.min(t.logged if t.stamps is None else t.stamps + late)) for t in topics)
     notes = [errors.note_other_stamps(late / 1e9)] if late else []
+    notes += [errors.note_overtaken(name, number) for name, number in moved.items() if number]
     if 0 < len(stamped) < len(topics):
         notes.append(errors.note_two_clocks([t.name for t in topics if t.stamps is None]))
     return Contents([s for t in topics for s in _signals(t, zero, late)], zero / 1e9, tuple(notes))

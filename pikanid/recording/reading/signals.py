@@ -6,6 +6,7 @@ all and fetches the samples of those that are asked for.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from fnmatch import fnmatchcase
 
 from pikanid.recording.channel import Array
 
+_BETWEEN = re.compile(r"[/.]")
 TIME_NAMES = ("t", "time", "times", "timestamp", "timestamps", "zeit")
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +71,35 @@ class Contents:
 
 
 def asked(text: str, *names: str) -> bool:
-    """Whether a text is one of the names of a signal, or a pattern that fits one of them.
+    """Whether a text is one of the names of a signal, a pattern that fits one of them, or a part.
 
     >>> asked("Rig/*", "Rig/theta", "theta"), asked("x[0]", "x[0]"), asked("phi", "theta")
     (True, True, False)
     """
-    return text in names or any(fnmatchcase(name, text) for name in names)
+    return text in names or fits(text, *names) or is_part(text, *names)
+
+
+def fits(pattern: str, *names: str) -> bool:
+    """Whether a pattern of a shell fits a name.
+
+    >>> fits("*.z", "/imu.angular_velocity.z")
+    True
+    """
+    return any(fnmatchcase(name, pattern) for name in names)
+
+
+def is_part(text: str, *paths: str) -> bool:
+    """Whether a text is a whole part of a path: a group, a topic, a field, or several in a row.
+
+    >>> is_part("/joints", "/joints.position.theta"), is_part("position.theta", "/joints.position")
+    (True, False)
+    >>> is_part("joint", "/joints.position.theta"), is_part("", "/joints")
+    (False, False)
+    """
+    def whole(parts: str) -> str:
+        return "/" + "/".join(filter(None, _BETWEEN.split(parts))) + "/"
+
+    return whole(text) != "//" and any(whole(text) in whole(path) for path in paths)
 
 
 def distinct(signals: Sequence[Signal]) -> list[tuple[str, str]]:
