@@ -23,6 +23,7 @@ from pikanid.problem.problem import Experiment, Samples
 
 LAGS = 25  # definition: as MATLAB's resid, unless it is said
 FEW = 20  # numerical: samples of a residual, at least, for an analysis
+EXACT = 1e-9  # numerical: of an output's range: a smaller residual is rounding, not noise
 COLOUR = 15  # numerical: order of the noise, at most, in the test of feedback
 
 
@@ -53,7 +54,7 @@ def analyse(contender: Contender, run: Run, lags: int, alpha: float, rho: float 
         sigma = np.ones(len(cut.t)) if cut.sigma is None else cut.sigma
         residual = cut.y - run.response.y[rows]
         white = whitened(cut.t, residual, sigma, here, away, covariance, rho)
-        if white.scale > 0:
+        if np.std(residual) > EXACT * np.ptp(s.y):
             found.append(_of_output(contender, run, cut, residual, white, lags, alpha))
     return found
 
