@@ -261,3 +261,9 @@ def test_clean_recordings_of_several_outputs_are_told_in_one_sentence() -> None:
     wrong = pk.validate(model.with_values(l_theta=0.05), runs, baseline=False)
     assert sum(good for _, good in wrong.left()) == 2  # phi of both runs
     assert any("'theta'" in sentence for sentence, good in wrong.left() if not good)
+
+
+def test_a_model_that_the_linear_baseline_beats_is_told_so(recorded: pk.Recording) -> None:
+    found = pk.validate(oscillator().with_values(k=90.0), recorded)
+    assert found.best == BASELINE
+    assert found.sentence().startswith("No model beats the linear baseline")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pikanid.comparison.bootstrap import Pair
-from pikanid.comparison.predictions import Prediction, Protocol
+from pikanid.comparison.predictions import BASELINE, Prediction, Protocol
 from pikanid.comparison.residual_analysis import ResidualAnalysis
 from pikanid.comparison.scores import Score
 
@@ -76,6 +76,8 @@ class Validation:
             mean = np.mean([s.fit for s in self.scores if s.model == first])
             return f"'{first}' fits by {mean:.4g} % (NRMSE)."
         words = f"Best is '{first}'"
+        if first == BASELINE:
+            words = f"No model beats the linear baseline: best is '{first}'"
         if beaten:
             words += f", significantly better than {_and(beaten)}"
         if equal:
