@@ -92,6 +92,23 @@ def test_channels_that_cannot_be_used(tmp_path: Path, name: str, told: str) -> N
     assert not mark.exists()
 
 
+def test_mdf_3(tmp_path: Path) -> None:
+    from asammdf import MDF
+    from asammdf.blocks.conversion_utils import from_dict
+
+    counts = np.arange(len(T)).astype("u2")
+    with MDF(version="3.30") as file:
+        file.append([signal(T, "y", unit="Nm"), signal(counts, "k", conversion=from_dict(
+            {"formula": "X1*2 + sqrt(X1)"}))])
+        file.append([signal(T[::5], "u", t=T[::5], unit="V")])
+        file.save(tmp_path / "run.mdf", overwrite=True)
+    rec = Recording.read(tmp_path / "run.mdf")
+    np.testing.assert_allclose(rec["k"].values, 2.0 * counts + np.sqrt(counts))
+    np.testing.assert_allclose(rec["u"].time, T[::5], atol=1e-12)
+    np.testing.assert_array_equal(rec["y"].values, T)
+    assert rec["y"].unit == "N*m"
+
+
 def test_a_file_without_channels(tmp_path: Path) -> None:
     benches.mdf(tmp_path / "run.mf4", {})
     with pytest.raises(errors.BadRecording, match="holds no signals"):

@@ -49,7 +49,8 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
             held-out are the same.
         SimulationFailed: The model cannot be simulated, or not as exactly as the noise asks.
     """
-    notes: list[str] = []
+    notes = list(dict.fromkeys(f"Recording '{rec.name}': {note}" for rec in (*train, *(later or ()))
+                               for note in rec.notes))
     proves = later is not None
     if later is not None:
         check_pair(train, later)

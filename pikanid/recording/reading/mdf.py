@@ -7,6 +7,7 @@ whitelist of `pikanid.formula`, never evaluated as code.
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,10 +22,10 @@ from pikanid.recording.reading import foreign
 from pikanid.recording.reading.signals import Clock, Contents, Signal
 from pikanid.recording.reading.table import Options, Table
 
-# What formulas of conversions are made of.
-_KNOWN = {"X", "X1", "P1", "P2", "P3", "P4", "P5", "P6", "P7"}
+_CONSTANTS = {"P1", "P2", "P3", "P4", "P5", "P6", "P7"}  # of the conversions without a text
 _TIME = (0, 1)  # definition: kinds of master channels that hold times, of the MDF 4 format
-_NUMBERS = range(6)  # definition: types of data that are numbers, of the MDF 4 format
+# Types of data that are numbers, of either format.
+_NUMBERS = {3: {0, 1, 2, 3, *range(9, 17)}, 4: {*range(6)}}  # definition: of the MDF format
 
 
 def read(content: bytes, where: str, options: Options) -> Table:
@@ -69,7 +70,7 @@ def _group(file: Any, k: int, where: str) -> Iterator[Signal]:
         if index == master:
             continue
         name = str(channel.name)
-        is_number = getattr(channel, "data_type", 0) in _NUMBERS
+        is_number = channel.data_type in _NUMBERS[4 if file.version >= "4" else 3]
         yield Signal(f"{label}/{name}", name, count, _samples(file, k, index),
                      str(file.get_channel_unit(group=k, index=index)).strip() or None, clock,
                      "" if is_number else errors.no_number_signal(where, f"{label}/{name}"))
@@ -111,11 +112,13 @@ def _formula(text: str) -> Array:
     from pikanid.formula.expressions import parse, symbol
 
     known = sys._getframe(1).f_locals
-    names = sorted(_KNOWN & known.keys())
-    expression = parse(text, names, "a conversion formula")
-    value = sp.lambdify([symbol(n) for n in names], expression, "numpy")(*(
-        np.asarray(known[n], float) for n in names))
-    return np.broadcast_to(np.asarray(value, float), np.shape(known["X"]))
+    counts = np.asarray(known["X" if "X" in known else "X1"], float)
+    at = {"X": counts, **{name: np.asarray(known[name], float)
+                          for name in sorted(_CONSTANTS & known.keys())}}
+    # the one variable is X or X1, which asammdf may have numbered once more
+    expression = parse(re.sub(r"\bX1*\b", "X", text), list(at), "a conversion formula")
+    value = sp.lambdify([symbol(name) for name in at], expression, "numpy")(*at.values())
+    return np.broadcast_to(np.asarray(value, float), counts.shape)
 
 
 def _refused(*_: object, **__: object) -> None:
