@@ -98,7 +98,7 @@ def attempt(path: Path) -> str:
         return text
 
 
-@pytest.mark.parametrize("number", [4, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [4, pytest.param(60, marks=pytest.mark.slow)])
 def test_damaged_files_are_read_or_refused_in_a_sentence(
         rig: Path, tmp_path: Path, number: int) -> None:
     whole = rig if rig.is_file() else next(rig.glob("*.db3"))
