@@ -266,7 +266,7 @@ def test_hidden_effects_are_strong_after_a_refit(effect: Effect) -> None:
 def test_an_effect_that_cannot_be_strong_is_refused() -> None:
     e, noise, rng = two_pulse(), Noise("white", SIGMA), np.random.default_rng(0)
     shape = variants("boundary_layer")[0].drawn(rng, Scales(0.2, 1.0, 5.0, 14.8))
-    with pytest.raises(errors.SimulationFailed, match="weaker"):
+    with pytest.raises(errors.SimulationFailed, match="visible"):
         strong(shape, rng, Rig(), e, noise)
 
 

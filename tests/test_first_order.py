@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import pikanid as pk
 from pikanid.errors import BadModel
-from pikanid.formula.expressions import TIME
+from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model.parts import Output
@@ -133,3 +133,16 @@ def test_no_law_is_looked_for_that_units_forbid() -> None:
     forbidden = offered("K") - offered("degC")
     assert {"coulomb_friction", "quadratic_drag", "stribeck_friction"} <= forbidden
     assert {"static_bias", "sensor_offset", "parameter_drift"} <= offered("degC")
+
+
+def test_a_parameter_drifts_in_every_equation_that_it_stands_in() -> None:
+    motor = pk.systems.dc_motor()
+    t = np.arange(200) * 0.01
+    recording = pk.Recording.from_arrays(
+        t, {"u": np.where(t > 0.2, 1.0, 0.0), "omega": np.sin(t)}, {"u": "V", "omega": "rad/s"})
+    drifts = [c for c in candidates(sites(motor, (recording,))) if c.ids == ("parameter_drift",)]
+    assert sorted(c.variant for c in drifts) == ["J", "b", "k"]
+    k = next(c for c in drifts if c.variant == "k")
+    extended = k.applied(motor)
+    for state in ("i", "omega"):
+        assert extended.equations[state].has(symbol(k.parameters[0].name))

@@ -7,8 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from pikanid import errors
-from pikanid.mismatch.beyond.force_shape import force_shape
+from pikanid.mismatch.beyond.force_shape import ForceShape, force_shape
 from pikanid.mismatch.beyond.patch import patch
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.parallel import blas_on_one_thread, threads
 from pikanid.mismatch.judge.verdict import Answer
@@ -98,14 +100,19 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
         return reported(case, detection, Answer("none", (), ()), case.sites[0], None)
     ranked = with_noise_of_the_rest(case, searched(case, tell), quiet, tell)
     tell("confirmation")
-    answer = confirmed(case, ranked)
-    site = affected(case.base, answer.given, case.sites, case.candidates)
-    shape = force_shape(case.base, site, case.candidates)
+    answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
     mend = None
-    if shape is not None and answer.verdict == "unnamed":
-        tell("laws outside the catalogue")
-        answer = with_laws_outside(case, answer, shape, site)
-    answer = with_sure_part(case, answer, site)
-    if shape is not None and answer.verdict == "unnamed" and case.later is not None:
+    if answer.verdict == "unnamed" and case.later is not None:
         mend = patch(case.base, case.model, shape, site, case.records, case.later, case.predicted)
     return replace(reported(case, detection, answer, site, shape), patch=mend)
+
+
+def _beyond(case: Case, answer: Answer, tell: Callable[[str], None]
+            ) -> tuple[Answer, Site, ForceShape]:
+    """Where the answer acts, laws of no catalogue, and what is surely there beside a remainder."""
+    site = affected(case.base, answer.given, case.sites, case.candidates)
+    shape = force_shape(case.base, site, case.candidates)
+    if answer.verdict == "unnamed":
+        tell("laws outside the catalogue")
+        answer = with_laws_outside(case, answer, shape, site)
+    return with_sure_part(case, answer, site), site, shape

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from pikanid.model.parts import Parameter
+
+STEP = 0.1  # numerical: share of a range, from no effect to an effect
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,21 @@ class Effect:
         """The parameter that measures the effect, its value that at no effect."""
         found = next(p for p in self.parameters if p.name == self.null[0])
         return dataclasses.replace(found, value=self.null[1])
+
+    @property
+    def guess(self) -> float:
+        """Of the size."""
+        return next(p.value for p in self.parameters if p.name == self.null[0])
+
+    @property
+    def start(self) -> float:
+        """Size at which the effect is there: its guess, or, where that is no effect, a step from it
+        into the range of the size.
+        """
+        none, high = self.null[1], self.size.bounds[1]
+        if self.guess != none:
+            return self.guess
+        return none + (STEP * (high - none) if none < high < math.inf else 1.0)
 
     @property
     def expression(self) -> str:

@@ -80,18 +80,29 @@ def static_bias(site: Site) -> list[Candidate]:
 
 
 def parameter_drift(site: Site) -> list[Candidate]:
-    """A parameter that changes steadily with time."""
+    """A parameter that changes steadily with time, in every equation that it stands in."""
     def one(p: str) -> Candidate:
-        r = Parameter(site.name(f"r_{p}"), 0.0, "1/s")
+        within = [n for n in site.model.state_names if site.model.equations[n].has(symbol(p))]
+        # one and the same seen from each of several equations
+        place = site if within == [site.v] else replace(site, suffix="")
+        r = Parameter(place.name(f"r_{p}"), 0.0, "1/s")
         text = f"{p}*(1 + {r.name}*t)"
-        return Candidate(
-            ("parameter_drift",), f"drift of {p}", f"{p} -> {text}", "dynamics", site, (r,),
-            lambda m: m.replace(equations={**m.equations, site.v: m.equations[site.v].xreplace(
-                {symbol(p): m.formula(text, "drift")})}),
-            lambda w: [TangentDirection({r.name: 1.0}, force=w.by_parameter[site.v, p] * w.t)],
-            variant=p)
+
+        def directions(view: View) -> list[TangentDirection]:
+            forces = np.column_stack([view.by_parameter[n, p] * view.t if n in within
+                                      else np.zeros(len(view.t)) for n in view.x])
+            return [TangentDirection({r.name: 1.0}, forces=forces)]
+
+        return Candidate(("parameter_drift",), f"drift of {p}", f"{p} -> {text}", "dynamics",
+                         place, (r,), lambda m: changing(m, p, text), directions, variant=p)
 
     return [one(p) for p in site.free_in_force]
+
+
+def changing(model: Model, parameter: str, text: str) -> Model:
+    """The model with a formula in the place of a parameter in all its equations."""
+    new = {symbol(parameter): model.formula(text, "change of a parameter")}
+    return model.replace(equations={n: e.xreplace(new) for n, e in model.equations.items()})
 
 
 def wall_impact(site: Site) -> list[Candidate]:

@@ -18,9 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 from pikanid.formula import units
-from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Begin, Candidate, Family, Powers
-from pikanid.mismatch.catalogue.forces import INF, wall_force
+from pikanid.mismatch.catalogue.forces import INF, changing, wall_force
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, State
@@ -165,9 +164,7 @@ def _settling(drift: Candidate) -> Candidate:
         return [{a.name: -change, tau.name: share * (last - first)} for share in SETTLED]
 
     made = _decoy(drift, "settling_parameter", f"{p} -> {text}", (a, tau), starts, drift.families)
-    return replace(made, static=False, extend=lambda m: m.replace(equations={
-        **m.equations, site.v: m.equations[site.v].xreplace(
-            {symbol(p): m.formula(text, "settling")})}))
+    return replace(made, static=False, extend=lambda m: changing(m, p, text))
 
 
 def _bent(scale: Candidate, channel: str, n: int) -> Candidate:

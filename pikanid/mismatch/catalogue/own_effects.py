@@ -51,7 +51,6 @@ def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
     size = effect.size
     others = tuple(p for p in effect.parameters if p.name != size.name)
     probes = tuple(_probes(others))
-    start = _start_of(effect, size)
 
     def extend(model: Model) -> Model:
         return model.with_effect(effect, nominal)
@@ -64,7 +63,7 @@ def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
         (effect.key,), effect.name, effect.expression, _channel(effect), site, (size, *others),
         extend, directions, effect.variant, families=(effect.family or effect.name,), probes=probes,
         argument=_argument(effect, site, nominal),
-        levels=tuple({size.name: start, **probe} for probe in probes))
+        levels=tuple({size.name: effect.start, **probe} for probe in probes))
 
 
 def _site(effect: Effect, sites: Sequence[Site]) -> Site:
@@ -85,17 +84,6 @@ def _channel(effect: Effect) -> Channel:
     if effect.add or effect.replace or effect.states or effect.initial:
         return "dynamics"
     return "input" if effect.inputs else "sensor"
-
-
-def _start_of(effect: Effect, size: Parameter) -> float:
-    """The guess of the size, where that is another value than at no effect."""
-    guess = next(p.value for p in effect.parameters if p.name == size.name)
-    if guess != size.value:
-        return guess
-    high = size.bounds[1]
-    if math.isfinite(high) and high > size.value:
-        return size.value + WITHIN[0] * (high - size.value)
-    return size.value + 1.0
 
 
 def _probes(parameters: Sequence[Parameter]) -> list[dict[str, float]]:

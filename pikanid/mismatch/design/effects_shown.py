@@ -39,8 +39,8 @@ class ShownEffect:
         times: By output (N,) [s].
         failure: Why the model with the effect cannot be simulated at that size, if it cannot.
         derivative: Relative difference of the derivative by the size at no effect, as it is
-            integrated with the model and as simulations on both sides show it; NaN where nothing
-            reaches an output.
+            integrated with the model and as a simulation on the side of the effect shows it; NaN
+            where nothing reaches an output.
     """
 
     effect: Effect
@@ -92,16 +92,15 @@ def _ranges(model: Model, recording: Recording) -> Ranges:
 
 
 def _shown(model: Model, effect: Effect, drive: Recording, nominal: Recording) -> ShownEffect:
-    size = effect.size
-    guess = next(p.value for p in effect.parameters if p.name == size.name)
+    size, start = effect.size, effect.start
     extended = model.with_effect(effect)
     try:
-        there = simulate(extended.with_values({size.name: guess}), drive)
-        derivative = _derivative(extended, size.name, size.value, guess, nominal)
+        there = simulate(extended.with_values({size.name: start}), drive)
+        derivative = _derivative(extended, size.name, size.value, start, nominal)
     except errors.SimulationFailed as failure:
-        return ShownEffect(effect, guess, {}, {}, {}, float("nan"), str(failure))
+        return ShownEffect(effect, start, {}, {}, {}, float("nan"), str(failure))
     names = model.output_names
-    return ShownEffect(effect, guess, {o: nominal[o].time for o in names},
+    return ShownEffect(effect, start, {o: nominal[o].time for o in names},
                        {o: nominal[o].values for o in names}, {o: there[o].values for o in names},
                        derivative)
 

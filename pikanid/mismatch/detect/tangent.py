@@ -16,7 +16,7 @@ import numpy as np
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.detect.simulated_signs import (
+from pikanid.mismatch.detect.own_signs import (
     added_forces,
     equations_alone,
     simulated_signs,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,14 +76,14 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
     # Variables of a workspace are unrelated: a mapping then names all that are wanted.
     every = table.shared_time or not request.wanted
     if every or request.also:
-        taken = [*mapped.values(), *bases.clocks()]
+        taken, named_clocks = [*mapped.values(), *bases.clocks()], clocks_by_name(available)
         signals += [
             (found.name, found, False)
             for found in available
             if found not in taken
             and (every or found.name in request.also)
             and found.name not in mapped
-            and found.name.casefold() not in TIME_NAMES
+            and found not in named_clocks
             and not found.name.startswith((OWN_TIME, OWN_SIGMA))
         ]
     made: list[Channel] = []
@@ -142,6 +142,20 @@ def _channel(key: str, found: Named, time: Array, request: Request,
     )
 
 
+def clocks_by_name(available: Sequence[Named]) -> list[Named]:
+    """The columns whose names say that they are times; ``T`` says so only where its unit is one of
+    time, or none, and there is no ``t``: it may be a temperature.
+    """
+    def elsewhere(c: Named) -> bool:
+        told = bool(c.unit) and not c.column.is_clock and units.is_unit(c.unit)
+        return told and not units.convertible(c.unit, "s")
+
+    possible = [c for c in available if c.name.casefold() in TIME_NAMES]
+    written = {c.name for c in possible}
+    return [c for c in possible if c.name == c.name.casefold()
+            or not (c.name.casefold() in written or elsewhere(c))]
+
+
 @dataclass(frozen=True)
 class TimeBases:
     """Finds and checks the times of each column."""
@@ -192,7 +206,7 @@ class TimeBases:
             if found.column.time is not None and other.column.header == found.column.time:
                 return other
         for name in TIME_NAMES:
-            for other in self.available:
+            for other in clocks_by_name(self.available):
                 if other.name.casefold() == name and other is not found and self._fits(other, n):
                     return other
         return None

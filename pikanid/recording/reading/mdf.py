@@ -21,6 +21,7 @@ from pikanid.recording.formats import called
 from pikanid.recording.reading import foreign
 from pikanid.recording.reading.signals import Clock, Contents, Signal
 from pikanid.recording.reading.table import Options, Table
+from pikanid.storage.outputs import atomically
 
 _CONSTANTS = {"P1", "P2", "P3", "P4", "P5", "P6", "P7"}  # of the conversions without a text
 _TIME = (0, 1)  # definition: kinds of master channels that hold times, of the MDF 4 format
@@ -49,7 +50,7 @@ def contents(content: bytes, where: str) -> Contents:
         module.__dict__.update(evaluate=_formula, lambdify=_refused)
     # A file by name: what a logger that lost its power left is finished in a copy of it.
     path = Path("measurement.mf4")
-    path.write_bytes(content)
+    atomically(path, content)
     measurement: Any = MDF  # which passes arguments on that its annotations leave out
     file = measurement(path, process_bus_logging=False)
     began = file.header.start_time.timestamp()

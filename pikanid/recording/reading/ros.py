@@ -28,6 +28,7 @@ from pikanid.recording.reading import foreign
 from pikanid.recording.reading.ros_messages import Types, Walk, columns
 from pikanid.recording.reading.signals import Clock, Contents, Signal
 from pikanid.recording.reading.table import Options, Table
+from pikanid.storage.outputs import atomically
 
 _ROS_1 = ".bag"
 _PACKED = b"\x28\xb5\x2f\xfd"  # how zstd begins
@@ -175,7 +176,7 @@ def _files(content: bytes) -> Iterator[tuple[Path, bool]]:
         if found is None or found.file != "ros":
             raise ValueError("no part of a bag")
         path = Path(f"part{k}{found.endings[0]}")
-        path.write_bytes(part)
+        atomically(path, part)
         yield path, found is not by_ending(_ROS_1)
 
 

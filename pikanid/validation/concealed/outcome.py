@@ -42,6 +42,13 @@ FORMULAS = {
     "cable_drag": r"max\(theta - \w+, 0\)\*\*2",
     "cogging": r"sin\([^)]*\*theta\b",
     "quadratic_input": r"u_\w\*\*2",
+    "one_way_gain": r"Abs\(\w+\)",
+    "local_force": r"exp\(",
+    "periodic_force": r"sin\([^)]*\bt\b",
+    "product_of_states": r"\w+\*\w+\*\w+",
+    "bilinear_input": r"\w+\*\w+\*\w+",
+    "one_sided_spring": r"max\(\w+ - \w+, 0\)\*\*2",
+    "rippled_sensor": r"sin\(",
 }
 
 Effects = list[set[str]]

@@ -96,7 +96,7 @@ class Workbench:
         shape, size = law.drawn(rng), law.size
         null = law.effect.null[1]
         signs = [s for s in (1.0, -1.0) if size.bounds[0] <= null + s * 1e-12 <= size.bounds[1]]
-        unit = float(rng.choice(signs)) * (abs(size.value - null) or 1.0)
+        unit = float(rng.choice(signs)) * abs(law.effect.start - null)
         rows = len(self.clean)
         noise = min(s / np.ptp(y) for s, y in zip(
             self.scene.sigma.values(), self.outputs([], self.scene.experiment).values(),
@@ -135,7 +135,7 @@ class Workbench:
             if not law.known or any(_same(law, h.law) for h in hidden):
                 continue
             for _ in range(SHAPES if law.shapes else 1):
-                rival = Hidden(law, {**law.drawn(rng), law.size.name: law.size.value or 1.0})
+                rival = Hidden(law, {**law.drawn(rng), law.size.name: law.effect.start})
                 try:
                     moved = self.seen([rival]) - self.clean
                 except errors.SimulationFailed:

@@ -51,8 +51,8 @@ class Law:
 
     @property
     def size(self) -> Parameter:
-        """That measures it, with its guess."""
-        return next(p for p in self.effect.parameters if p.name == self.effect.null[0])
+        """That measures it, at no effect."""
+        return self.effect.size
 
     @property
     def shapes(self) -> tuple[Parameter, ...]:
