@@ -39,7 +39,7 @@ INSIDE = tuple(map(tuple, _MISMATCH))
 
 # Seconds to import, or optional: never at the top of a module that `import pikanid` can reach.
 HEAVY = ("torch", "kan", "pandas", "matplotlib", "pint", "numba", "sklearn", "pyarrow", "h5py",
-         "xarray", "asammdf", "rosbags", "nptdms")
+         "xarray", "asammdf", "rosbags", "nptdms", "cv2")
 
 # Where a library may be named at all.
 ONLY_IN = {
