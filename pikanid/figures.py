@@ -29,6 +29,7 @@ ENDINGS = (".png", ".svg", ".pdf")
 WIDTHS = (2.2, 1.7, 1.3, 1.0, 0.8, 0.7)  # layout: line widths, in points
 DASHES = ("-", (0, (5, 3)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 3)),
           (0, (8, 4)))  # layout: dashes and gaps, in line widths
+WIDE = 1.96  # definition: standard deviations of a 95 % band
 DPI = 130  # layout: pixels an inch
 
 

@@ -34,6 +34,17 @@ def test_python_example(
     assert "l_theta" in capsys.readouterr().out
 
 
+def test_first_screen_shows_a_diagnosis_of_what_is_shipped() -> None:
+    root = Path(__file__).resolve().parents[1]
+    first = README[:README.index("## Install")]
+    words = block("sh").split()
+    assert words[:2] == ["pikanid", "diagnose"]
+    for word in words:
+        assert (root / word).is_file() or not word.endswith(".csv")
+    picture = re.search(r"!\[[^]]+\]\(([^)]+)\)", first)
+    assert picture and (root / picture[1]).read_bytes().startswith(b"\x89PNG")
+
+
 def test_model_file() -> None:
     model = pk.Model.from_dict(tomllib.loads(block("toml")))
     assert model.free_names == ("l",)

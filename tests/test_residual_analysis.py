@@ -16,6 +16,8 @@ from pikanid import errors
 from pikanid.comparison.correlations import _moments, autocorrelation, jointly, with_columns
 from pikanid.comparison.spectrum import spectrum
 from pikanid.comparison.whitened import White, whitened
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps.opening import open_case
 
 N, SIGMA = 300, 2e-3
 NONE = np.empty((N, 0))
@@ -179,6 +181,20 @@ def test_a_missing_effect_is_seen(rho: float) -> None:
         seen += not found.ok
     assert seen == 5
     assert "no noise" in found.sentence() and found.feedback == ()
+
+
+@pytest.mark.parametrize("term", ["0.0", "-1.0*theta_dot*abs(theta_dot)", "-1.0*sign(theta_dot)",
+                                  "-400.0*theta**3"])
+def test_it_rejects_where_a_diagnosis_does(term: str) -> None:
+    """At the same 1 %: both see what is left out, and neither sees what is not there."""
+    model = pk.systems.sloshing()
+    true = model.with_term("theta_dot", term)
+    rec = with_noise(pk.simulate(true, pk.excitation.multisine(duration=10.0)), 0.0,
+                     np.random.default_rng(1))
+    (left,) = pk.NLS(starts=1).fit(model, rec).resid(rec)
+    case = open_case(model, (rec,), None, None, lambda text: None, DEFAULTS)
+    diagnosed = case.detected().p_value < DEFAULTS.alpha
+    assert diagnosed == (not left.ok) == (term != "0.0")
 
 
 @pytest.mark.parametrize("gain", [0.0, 20.0])

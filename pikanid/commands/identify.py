@@ -10,24 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pikanid import errors
-from pikanid.commands.options import (
-    Columns,
-    FileRate,
-    Json,
-    ModelName,
-    OwnTimes,
-    Quiet,
-    Sheet,
-    Sigma,
-    Start,
-    Stop,
-    Stride,
-    Units,
-    Values,
-    adjusted,
-)
+from pikanid.commands.grouped import grouped
+from pikanid.commands.interrupts import became, interrupted_by_kill
+from pikanid.commands.options import Json, ModelName, Quiet, Sigma, Values, adjusted
 from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.commands.reading import Reading, every_source
+from pikanid.figures import ENDINGS, image_for
 from pikanid.recording.formats import readable
 from pikanid.storage.version import __version__
 from pikanid.strategies import STRATEGIES
@@ -39,6 +27,7 @@ if TYPE_CHECKING:
     from pikanid.strategies.strategy import Strategy
 
 ALL = "all"
+INTERRUPTED = "interrupted"  # definition: why a strategy has no estimate, in files
 EXAMPLES = """Examples:
 
   pikanid identify run.csv --model sloshing --sigma 0.1deg
@@ -54,6 +43,7 @@ EXAMPLES = """Examples:
 Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
 
 
+@grouped
 def identify(
     recordings: Annotated[list[str], typer.Argument(
         metavar="RECORDING...", help=f"{readable()}; several are fitted jointly, "
@@ -72,18 +62,14 @@ def identify(
     free: Annotated[list[str], typer.Option(
         metavar="NAME", show_default=False,
         help="estimate a parameter, or the initial value of a state")] = [],  # noqa: B006
-    column: Columns = [],  # noqa: B006
-    unit: Units = [],  # noqa: B006
-    rate: FileRate = None,
-    sheet: Sheet = None,
-    start: Start = None,
-    stop: Stop = None,
-    own_times: OwnTimes = False,
-    decimate: Stride = 1,
+    *,
+    files: Reading,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the starting points")] = 0,
     json_: Json = None,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", help="draw data, fit and residuals (.png, .svg, .pdf)")] = None,
+    report: Annotated[str | None, typer.Option(
+        metavar="FILE.html", help="write a page for people")] = None,
     save: Annotated[str | None, typer.Option(
         metavar="FILE",
         help="keep the whole estimate (.json, .json.gz), for Estimate.load")] = None,
@@ -96,16 +82,15 @@ def identify(
     if save is not None and len(names) > 1:
         raise errors.BadSetting(errors.save_needs_one_strategy())
     check_outputs({"--json": (json_, [".json"]),
-                   "--plot": (plot, [".png", ".svg", ".pdf"]),
+                   "--plot": (plot, ENDINGS), "--report": (report, [".html"]),
                    "--save": (save, [".json", ".json.gz"])}, every_source(*recordings, model))
     from pikanid.model import systems
 
     chosen = adjusted(systems.find(model), set_, fix, free)
     if not chosen.free_names:
         raise errors.BadModel(errors.nothing_free(chosen.name))
-    files = Reading(column, unit, rate, sheet, start, stop, decimate, own_times)
     given = [files.recording(text, chosen, sigma=sigma) for text in recordings]
-    return _fit_and_tell(chosen, given, names, protocol, seed, json_, plot, save, quiet)
+    return _fit_and_tell(chosen, given, names, protocol, seed, json_, plot, report, save, quiet)
 
 
 def _check_choice(option: str, value: str, known: Sequence[str]) -> None:
@@ -123,20 +108,25 @@ def _make(name: str, protocol: str, seed: int) -> Strategy:
 
 
 def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str], protocol: str,
-                  seed: int, json_: str | None, plot: str | None, save: str | None,
-                  quiet: bool) -> int:
+                  seed: int, json_: str | None, plot: str | None, report: str | None,
+                  save: str | None, quiet: bool) -> int:
     from pikanid.reporting.console import complain, console, working
 
     begun = time.perf_counter()
     estimates: list[Estimate] = []
     failed: dict[str, str] = {}
-    with working("fitting", len(names), quiet) as step:
-        for name in names:
+    stopped: BaseException | None = None
+    with working("fitting", len(names), quiet) as step, interrupted_by_kill():
+        for k, name in enumerate(names):
             step(name)
             try:
                 found = _make(name, protocol, seed).fit(model, given)
-            except errors.PikanidError as problem:
-                if len(names) == 1:
+            except BaseException as problem:
+                if became(problem) and estimates:
+                    stopped = problem
+                    failed |= dict.fromkeys(names[k:], INTERRUPTED)
+                    break
+                if not isinstance(problem, errors.PikanidError) or len(names) == 1:
                     raise
                 failed[name] = str(problem)
                 continue
@@ -146,18 +136,20 @@ def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str]
         complain(next(iter(failed.values())))
         return errors.PikanidError.exit_code
     seconds = time.perf_counter() - begun
-    _write(model, given, estimates, failed, len(names) > 1, seconds, json_, plot, save)
+    _write(model, given, estimates, failed, len(names) > 1, seconds, json_, plot, report, save)
     if not quiet and json_ != STDOUT:
         from pikanid.reporting.tables import show_estimates
 
         show_estimates(console(), estimates, failed)
+    if stopped is not None:
+        raise stopped
     # With several strategies the question is whether the model explains the recording at all.
     return 0 if any(estimate.ok for estimate in estimates) else errors.EXIT_MISFIT
 
 
 def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimate],
            failed: dict[str, str], several: bool, seconds: float, json_: str | None,
-           plot: str | None, save: str | None) -> None:
+           plot: str | None, report: str | None, save: str | None) -> None:
     from pikanid.reporting import strict_json
 
     files: dict[str, bytes] = {}
@@ -166,11 +158,13 @@ def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimat
                if several else strict_json.of_one(estimates[0], labels))
     if plot is not None:
         from pikanid.estimate.plots import plot_strategies
-        from pikanid.figures import image_for
-
         figure = (plot_strategies({e.strategy: e.fits for e in estimates}, model.name)
                   if len(estimates) > 1 else estimates[0].plot())
         files[plot] = image_for(figure, plot)
+    if report is not None:
+        from pikanid.reporting.estimate_page import page
+
+        files[report] = page(estimates, failed, ", ".join(labels)).encode()
     if save is not None:
         from pikanid.estimate import file as estimate_file
 

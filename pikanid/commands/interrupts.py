@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -35,6 +36,19 @@ def none_lost() -> Iterator[None]:
         sys.unraisablehook = before
         for timer in waiting:
             timer.cancel()
+
+
+@contextmanager
+def interrupted_by_kill() -> Iterator[None]:
+    """Inside, a request to terminate is an interrupt, so that what is finished can be kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only there can Python take signals
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def became(failure: BaseException | None) -> bool:

@@ -44,8 +44,7 @@ def analyse(contender: Contender, run: Run, lags: int, alpha: float, rho: float 
         rows = slice(a + first, b)
         if not run.finished or b - a - first < max(FEW, 3 * len(run.own)):
             continue
-        cut = Samples(s.output, s.t[first:], s.y[first:],
-                      None if s.sigma is None else s.sigma[first:])
+        cut = s.part(slice(first, None))
         J, own = run.response.sensitivity[rows], len(run.own)
         seen = contender.held_out(s.t, s.y, contender.model.outputs[s.output].name) is False
         here = J if seen else J[:, :own]

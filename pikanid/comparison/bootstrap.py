@@ -16,6 +16,7 @@ import numpy as np
 
 DRAWS = 2000  # numerical: resampled series
 SIGNIFICANT = 2.0  # numerical: √(log10 N/N) that a correlation exceeds to count (Politis and White)
+QUIET = 5  # numerical: correlations in a row that do not count; √(log10 N) is never more
 LONGEST = 0.25  # numerical: share of a series that a block may have
 
 
@@ -54,9 +55,8 @@ def block_length(series: np.ndarray) -> int:
     size = 1 << (2 * n - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(x, size)) ** 2
     R = np.fft.irfft(spectrum, size)[:longest + 1] / n
-    quiet = max(5, int(np.sqrt(np.log10(n))))
     small = np.abs(R[1:] / R[0]) < SIGNIFICANT * np.sqrt(np.log10(n) / n)
-    runs = np.convolve(small, np.ones(quiet, int), "valid") == quiet if len(small) >= quiet else (
+    runs = np.convolve(small, np.ones(QUIET, int), "valid") == QUIET if len(small) >= QUIET else (
         np.zeros(1, bool))
     m = int(np.argmax(runs)) if runs.any() else longest
     M = min(2 * max(m, 1), longest)

@@ -13,7 +13,14 @@ from pikanid.comparison.analyse import LAGS, analyse
 from pikanid.comparison.bootstrap import pairs
 from pikanid.comparison.contender import contenders
 from pikanid.comparison.horizon import usual_window
-from pikanid.comparison.predictions import BASELINE, Baseline, Prediction, Protocol, of_model
+from pikanid.comparison.predictions import (
+    BASELINE,
+    Baseline,
+    Prediction,
+    Protocol,
+    least_noise,
+    of_model,
+)
 from pikanid.comparison.residual_analysis import ResidualAnalysis
 from pikanid.comparison.runs import Start, free_run
 from pikanid.comparison.scores import Score, score
@@ -69,7 +76,7 @@ def validate(models: Any, recordings: Recording | Sequence[Recording], *,
     (('right', 'wrong'), [96.6, 84.7])
     """
     records = several(recordings)
-    trained = several(training) if isinstance(training, Recording) or len(training) else ()
+    trained = _given(training)
     _check(first, initial, horizon, window, origins, lags, alpha)
     found = contenders(models, trained)
     states = max(len(c.model.states) for c in found)
@@ -125,13 +132,17 @@ def resid(models: Any, recordings: Recording | Sequence[Recording], *,
     >>> found.ok, found.test("whiteness").dof
     (True, 25)
     """
-    trained = several(training) if isinstance(training, Recording) or len(training) else ()
+    trained = _given(training)
     _check(first, initial, None, None, 1, lags, alpha)
     if rho is not None and not -1 < rho < 1:
         raise errors.BadSetting(errors.bad_value("'rho'", rho, "a number between -1 and 1"))
     return tuple(
         analysis for c in contenders(models, trained) for r in several(recordings)
         for analysis in analyse(c, free_run(c, r, first, initial), lags, alpha, rho, first))
+
+
+def _given(training: Recording | Sequence[Recording]) -> tuple[Recording, ...]:
+    return several(training) if isinstance(training, Recording) or len(training) else ()
 
 
 def assembled(named: dict[str, list[Prediction]],
@@ -168,7 +179,7 @@ def _quieter(named: dict[str, list[Prediction]], there: list[np.ndarray]
     found: dict[str, list[Prediction]] = {name: [] for name in named}
     for same, m in zip(zip(*named.values(), strict=True), there, strict=True):
         left = [difference_noise(p.residual[m]) for p in same if np.isfinite(p.residual[m]).all()]
-        least = 1e-9 * max(float(np.ptp(same[0].measured)), 1e-300)
+        least = least_noise(same[0].measured)
         for name, p in zip(named, same, strict=True):
             sigma = p.sigma if p.sigma_source == "given" else np.minimum(
                 p.sigma, max(min(left, default=np.inf), least))

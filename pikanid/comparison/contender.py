@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from pikanid import errors
 from pikanid.model import Model
+from pikanid.optimise.propagation import finite
 from pikanid.problem.problem import FreeParameter
 from pikanid.recording import Recording
 
@@ -53,7 +55,7 @@ class Estimated(Protocol):
         """The model at the estimates."""
 
     @property
-    def fits(self) -> Sequence[Any]:
+    def fits(self) -> Sequence[Fitted]:
         """Fitted outputs."""
 
 
@@ -128,12 +130,21 @@ def contenders(models: Any, training: Sequence[Recording]) -> tuple[Contender, .
         if set(other.model.output_names) != set(outputs):
             raise errors.BadModel(errors.other_outputs(
                 found[0].name, outputs, other.name, other.model.output_names))
-    names: dict[str, int] = {}
-    unique = []
-    for one in found:
-        names[one.name] = count = names.get(one.name, 0) + 1
-        unique.append(one if count == 1 else replace(one, name=f"{one.name} ({count})"))
-    return tuple(unique)
+    return tuple(replace(one, name=name) for one, name in zip(
+        found, told_apart([one.name for one in found]), strict=True))
+
+
+def told_apart(names: Sequence[str]) -> list[str]:
+    """Names of which no two are alike.
+
+    >>> told_apart(["fit", "fit", "other"])
+    ['fit', 'fit (2)', 'other']
+    """
+    made: list[str] = []
+    for name in names:
+        numbered = (f"{name} ({k})" for k in count(2))
+        made.append(name if name not in made else next(n for n in numbered if n not in made))
+    return made
 
 
 def _contender(name: str, given: Any, training: Sequence[Recording]) -> Contender:
@@ -144,14 +155,10 @@ def _contender(name: str, given: Any, training: Sequence[Recording]) -> Contende
     if not isinstance(given, Estimated):
         raise errors.BadModel(errors.no_model_or_estimate(type(given).__name__))
     keep = [k for k, f in enumerate(given.free) if f.recording is None]
-    covariance = np.array(given.covariance)[np.ix_(keep, keep)]
-    # what ended at a bound has no standard error, what the data do not show an infinite one
-    unknown = ~np.isfinite(np.diag(covariance))
-    covariance[unknown] = covariance[:, unknown] = 0.0
-    fits: Sequence[Fitted] = given.fits
+    covariance = finite(np.array(given.covariance)[np.ix_(keep, keep)])
     return Contender(name or given.fitted_model.name, given.fitted_model,
                      tuple(given.free[k].name for k in keep), covariance,
-                     tuple(Seen(f.output, f.t, f.measured) for f in fits))
+                     tuple(Seen(f.output, f.t, f.measured) for f in given.fits))
 
 
 def _samples(model: Model, recordings: Sequence[Recording]) -> tuple[Seen, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pikanid.figures import BAND, MEASURED, labelled, new_figure, stroke, tidy
+from pikanid.figures import BAND, MEASURED, WIDE, labelled, new_figure, stroke, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from pikanid.comparison.predictions import Prediction
 
 MANY = 2000  # layout: samples beyond which markers merge: then a thin line
-WIDE = 1.96  # definition: standard deviations of a 95 % band
 
 
 def plot_validation(predictions: Mapping[str, Sequence[Prediction]]) -> Figure:

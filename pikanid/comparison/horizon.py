@@ -104,8 +104,7 @@ def _between(experiment: Experiment, begin: float, end: float, after: bool = Fal
     for s in experiment.samples:
         low = int(np.searchsorted(s.t, begin, "right" if after else "left"))
         high = int(np.searchsorted(s.t, end, "right"))
-        sigma = None if s.sigma is None else s.sigma[low:high]
-        kept.append(Samples(s.output, s.t[low:high], s.y[low:high], sigma))
+        kept.append(s.part(slice(low, high)))
     return replace(experiment, samples=tuple(kept))
 
 

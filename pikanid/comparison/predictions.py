@@ -129,8 +129,12 @@ def noise_of(recording: Recording, model: Model, samples: Samples) -> tuple[np.n
         sigma = estimate(recording.as_output(output.name, unit)).sigma
     except errors.BadRecording:
         sigma = difference_noise(samples.y)
-    least = 1e-9 * max(float(np.ptp(samples.y)), 1e-300)
-    return np.full(len(samples.t), max(sigma, least)), "estimated"
+    return np.full(len(samples.t), max(sigma, least_noise(samples.y))), "estimated"
+
+
+def least_noise(values: np.ndarray) -> float:
+    """σ that an output (N,) has at least: rounding."""
+    return 1e-9 * max(float(np.ptp(values)), 1e-300)
 
 
 class Baseline:

@@ -123,12 +123,7 @@ def until(experiment: Experiment, count: int) -> Experiment:
     """The experiment with the first `count` samples of each output alone; 0 for all."""
     if not count:
         return experiment
-    return replace(experiment, samples=tuple(_cut(s, 0, count) for s in experiment.samples))
-
-
-def _cut(s: Samples, begin: int, end: int) -> Samples:
-    sigma = None if s.sigma is None else s.sigma[begin:end]
-    return Samples(s.output, s.t[begin:end], s.y[begin:end], sigma)
+    return replace(experiment, samples=tuple(s.part(slice(count)) for s in experiment.samples))
 
 
 def weights(samples: tuple[Samples, ...]) -> np.ndarray:

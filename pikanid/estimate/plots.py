@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from pikanid.figures import BAND, COLOURS, MEASURED, labelled, new_figure, stroke, tidy
+from pikanid.figures import BAND, COLOURS, MEASURED, WIDE, labelled, new_figure, stroke, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 # Beyond this many samples markers merge into a band: draw a thin line instead.
 MANY = 2000  # layout: samples of an output
-WIDE = 1.96  # definition: standard deviations of a 95 % band
 
 
 class FitLike(Protocol):

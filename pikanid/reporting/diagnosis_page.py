@@ -2,33 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
 from pikanid.estimate.estimate import rounded
-from pikanid.figures import embedded
+from pikanid.reporting.document import document, drawn
 
 if TYPE_CHECKING:
     from pikanid.mismatch.report.diagnosis import Diagnosis
     from pikanid.mismatch.report.findings import Explanation
-
-_STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1f2937; max-width: 60rem; margin: 2rem auto;
-       padding: 0 1rem; }
-h1 { font-size: 1.5rem; }
-h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
-.verdict { font-size: 1.15rem; background: #f3f4f6; border-left: 6px solid #1d4ed8;
-           padding: .8rem 1rem; }
-.named, .none { border-color: #15803d; }
-.unnamed { border-color: #c2410c; }
-.unconfirmed, .partial { border-color: #b45309; }
-table { border-collapse: collapse; margin: .5rem 0; } td, th { padding: .2rem .8rem .2rem 0;
-        text-align: left; } th { font-weight: 600; border-bottom: 1px solid #ddd; }
-table { font-variant-numeric: tabular-nums; } .wide { overflow-x: auto; }
-code { background: #f3f4f6; padding: .1rem .3rem; } img { max-width: 100%; }
-.small { color: #6b7280; font-size: .9rem; }
-"""
 
 
 def page(dx: Diagnosis, title: str) -> str:
@@ -47,14 +29,7 @@ def page(dx: Diagnosis, title: str) -> str:
             f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes)) + "</ul>",
         f'<p class="small">p = {dx.p_value:.2g} at a false-alarm rate of {dx.alpha:g}; '
         f"{dx.seconds:.1f} s. {escape(str(dx.settings))}</p>"]
-    return document(title, parts)
-
-
-def document(title: str, parts: Sequence[str]) -> str:
-    """A page of HTML of its parts."""
-    return ('<!doctype html><html lang="en"><head><meta charset="utf-8">'
-            f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>"
-            + "".join(parts) + "</body></html>\n")
+    return document(title, parts, dx.before.model, [f.recording for f in dx.before.fits])
 
 
 def _where(dx: Diagnosis) -> str:
@@ -76,7 +51,9 @@ def _force(dx: Diagnosis) -> str:
     if force is None or not force.resolved:
         return " There the residual is louder than noise."
     worth = (f" It leaves {force.left:.2g} of χ² per degree of freedom: no force explains "
-             "everything." if force.left > dx.settings.beyond.unexplained else "")
+             "everything." if (
+                 force.left > dx.settings.beyond.unexplained
+                 and dx.verdict not in ("named", "set")) else "")
     band = 100 * (1 - dx.settings.band)
     return (f" There the simultaneous {band:g} % band of the force that would explain it excludes "
             f"zero (means over {force.resolution:.2g} s). What a sensor or an input gets wrong can "
@@ -99,9 +76,10 @@ def _surely(dx: Diagnosis) -> str:
                     f"<td>{'no other explains it' if p.dominance is None else f'{p.dominance:.2g}'}"
                     "</td></tr>")
     left = "".join(f"<li>{escape(line)}.</li>" for line in dx.remainder.lines())
-    return ("<h2>Surely there</h2><table><tr><th>family</th><th>here as</th><th>values, with "
-            "standard errors that count the remainder</th><th>times as much left without it</th>"
-            f"</tr>{''.join(rows)}</table><p>{escape(dx.remainder.sentence())}.</p>"
+    return ("<h2>Surely there</h2><div class=wide><table><tr><th>family</th><th>here as</th>"
+            "<th>values, with standard errors that count the remainder</th>"
+            "<th>times as much left without it</th>"
+            f"</tr>{''.join(rows)}</table></div><p>{escape(dx.remainder.sentence())}.</p>"
             f"<ul>{left}</ul>")
 
 
@@ -114,7 +92,7 @@ def _what(dx: Diagnosis) -> str:
     if dx.rejected:
         rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(why)}</td></tr>"
                        for title, why in dx.not_given)
-        text += f"<p>Tried and not given:</p><table>{rows}</table>"
+        text += f"<p>Tried and not given:</p><div class=wide><table>{rows}</table></div>"
     return text
 
 
@@ -127,7 +105,7 @@ def _explanation(h: Explanation, odds: str) -> str:
                        f"<code>{escape(e.expression)}</code></li>" for e in h.effects)
     return (f"<p><b>{escape(h.title)}</b>{escape(odds)}</p>"
             f"<ul>{formulas}</ul>"
-            f"<table>{rows}</table>")
+            f"<div class=wide><table>{rows}</table></div>")
 
 
 def _parameters(dx: Diagnosis) -> str:
@@ -138,12 +116,12 @@ def _parameters(dx: Diagnosis) -> str:
         f"<tr><td>{escape(f.label)}</td><td>{before[f.label]}</td>"
         f"<td>{after[f.label]}</td><td>{escape(f.unit)}</td></tr>"
         for f in dx.after.free if f.label in before)
-    return ("<table><tr><th>parameter</th><th>before</th><th>after</th><th></th></tr>"
-            f"{rows}</table>")
+    return ("<div class=wide><table><tr><th>parameter</th><th>before</th><th>after</th><th></th>"
+            f"</tr>{rows}</table></div>")
 
 
 def _figure(dx: Diagnosis) -> str:
-    return f"<h2>Proof</h2>{embedded(dx.plot(), 'residuals before and after', 110)}"
+    return f"<h2>Proof</h2>{drawn(dx.plot(), 'residuals before and after')}"
 
 
 def _proof(dx: Diagnosis) -> str:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pikanid.figures import new_figure
-from pikanid.mismatch.report.findings import DiagnosisData
+from pikanid.figures import labelled, new_figure
+from pikanid.mismatch.report.findings import DiagnosisData, Proof
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 BEFORE, AFTER, MOVED = "#c2410c", "#1d4ed8", "#15803d"
 DATA, LOUD = "#9ca3af", "#fde68a"
+STRETCHES = 6  # layout: of a held-out recording, of which one is shown
 
 
 def plot_diagnosis(dx: DiagnosisData) -> matplotlib.figure.Figure:
@@ -48,22 +49,26 @@ def plot_diagnosis(dx: DiagnosisData) -> matplotlib.figure.Figure:
                          label=why if k == 0 else None)
     if dx.held_out is not None:
         proof, below = dx.held_out, axes[first:]
-        below[0].plot(proof.t, proof.measured, ".", color=DATA, ms=2, label="measured")
+        name = labelled(next(iter(proof.outputs)), proof.unit)
+        unit = f" {proof.unit}".rstrip()
+        below[0].plot(proof.t, proof.measured, ".", color=DATA, ms=3, label="measured",
+                      zorder=3)
         below[0].plot(proof.t, proof.before, color=BEFORE, lw=1, label="nominal model")
-        below[0].set(ylabel=proof.unit or "output", title="Held-out recording: prediction")
+        below[0].set(ylabel=name, xlim=_furthest(proof), title="Held-out recording: prediction, "
+                     "where the nominal model is furthest off")
         below[1].plot(proof.t, proof.measured - proof.before, color=BEFORE, lw=0.8,
-                     label=f"nominal, RMSE {proof.rmse_before:.3g}")
+                     label=f"nominal: {proof.rmse_before:.3g}{unit}")
         if dx.hypotheses:
             below[0].plot(proof.t, proof.after, color=AFTER, lw=1, label="extended model")
             below[1].plot(proof.t, proof.measured - proof.after, color=AFTER, lw=0.8,
-                         label=f"extended, RMSE {proof.rmse_after:.3g}")
+                         label=f"extended: {proof.rmse_after:.3g}{unit}")
         if dx.hypotheses and proof.sensitive(dx.settings):
             below[0].plot(proof.t, proof.moved, color=MOVED, lw=1, label="within its errors")
             below[1].plot(proof.t, proof.measured - proof.moved, color=MOVED, lw=0.8,
-                          label=f"within its errors, RMSE {proof.rmse_moved:.3g}")
+                          label=f"within its errors: {proof.rmse_moved:.3g}{unit}")
         below[1].axhspan(-2 * proof.noise, 2 * proof.noise, color=DATA, alpha=0.3, lw=0,
                         label="±2σ of the noise")
-        below[1].set(ylabel=proof.unit or "residual", title="Held-out recording: what is left")
+        below[1].set(ylabel=name, title="Held-out recording: what is left, and its RMSE")
     for axis in axes:
         axis.margins(x=0.01)
         if axis.get_autoscaley_on():
@@ -74,13 +79,21 @@ def plot_diagnosis(dx: DiagnosisData) -> matplotlib.figure.Figure:
     return figure
 
 
+def _furthest(proof: Proof) -> tuple[float, float]:
+    """The stretch [s] in which the nominal model leaves most, of those of equal length."""
+    edges = np.linspace(proof.t.min(), proof.t.max(), STRETCHES + 1)
+    which = np.clip(np.searchsorted(edges, proof.t, side="right") - 1, 0, STRETCHES - 1)
+    worst = int(np.argmax(np.bincount(which, (proof.measured - proof.before) ** 2, STRETCHES)))
+    return float(edges[worst]), float(edges[worst + 1])
+
+
 def _train(axis: matplotlib.axes.Axes, dx: DiagnosisData) -> None:
     fit = dx.before.fits[0]
     axis.plot(fit.t, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
     if dx.hypotheses:
         after = dx.after.fits[0]
         axis.plot(after.t, after.residual, color=AFTER, lw=0.8, label="extended model")
-    axis.set(ylabel=fit.unit or "residual", title="What the model leaves of the recording")
+    axis.set(ylabel=labelled(fit.output, fit.unit), title="What the model leaves of the recording")
 
 
 def _force(axis: matplotlib.axes.Axes, force: ForceOverTime, level: float) -> None:
@@ -95,8 +108,8 @@ def _force(axis: matplotlib.axes.Axes, force: ForceOverTime, level: float) -> No
     # a spike, as where a recording begins beside its model, must not flatten all the rest
     reach = np.quantile(np.abs(force.values) + force.critical * force.std, 0.98)
     axis.set_ylim(-1.1 * reach, 1.7 * reach)
-    axis.set(ylabel=force.unit, title="Force that would explain it, without what the free "
-             "parameters can do")
+    axis.set(ylabel=labelled("force", force.unit),
+             title="Force that would explain it, without what the free parameters can do")
 
 
 def _shape(figure: matplotlib.figure.FigureBase, shape: ForceShape, patch: Patch | None) -> None:
@@ -120,4 +133,4 @@ def _shape(figure: matplotlib.figure.FigureBase, shape: ForceShape, patch: Patch
         axis.set_title("KAN patch, refitted", fontsize="medium")
         axis.set_xlabel(f"{patch.argument}\n(nothing beyond)")
         axis.grid(alpha=0.2)
-    axes[0].set_ylabel(shape.unit)
+    axes[0].set_ylabel(labelled("force", shape.unit))
