@@ -37,6 +37,25 @@ def test_pandas_takes_every_clock_and_gives_a_shared_one_back() -> None:
     np.testing.assert_array_equal(again["θ"].time, one["θ"].time)
 
 
+@pytest.mark.parametrize("header", ["T [degC]", "T"])
+@pytest.mark.parametrize("kind", ["named", "dates", "seconds"])
+def test_beside_an_index_of_times_a_temperature_is_no_time(header: str, kind: str) -> None:
+    import pandas as pd
+
+    index = {"named": pd.Index(T, name="time"), "seconds": pd.to_timedelta(T, unit="s"),
+             "dates": pd.Timestamp("2026-01-15") + pd.to_timedelta(T, unit="s")}[kind]
+    rec = Recording.from_frame(pd.DataFrame({header: 20.0 + T, "y": -T}, index=index))
+    assert rec.names == ("T", "y")
+    np.testing.assert_allclose(rec["y"].time, T, atol=1e-9)
+
+
+def test_beside_numbers_of_rows_a_column_is_the_time() -> None:
+    import pandas as pd
+
+    frame = pd.DataFrame({"T [s]": T, "y": -T}, index=np.arange(len(T)) + 7)
+    np.testing.assert_array_equal(Recording.from_frame(frame)["y"].time, T)
+
+
 # --- xarray ----------------------------------------------------------------------------------
 
 
@@ -48,6 +67,15 @@ def test_xarray_there_and_back_is_the_same() -> None:
     xarray()
     rec = two_clocks()
     assert Recording.from_xarray(rec.to_xarray(), name="run") == rec
+
+
+def test_a_dimension_of_temperatures_is_no_time() -> None:
+    xr = xarray()
+    data = xr.DataArray(np.outer([1.0, 2.0], T), {
+        "T": ("T", [20.0, 30.0], {"units": "degC"}), "time": T}, ["T", "time"], name="y")
+    rec = Recording.from_xarray(data)
+    assert rec.names == ("y[20.0]", "y[30.0]")
+    np.testing.assert_array_equal(rec["y[30.0]"].values, 2 * T)
 
 
 def test_dates_count_from_the_earliest() -> None:

@@ -139,7 +139,7 @@ def test_fifty_thousand_rows_come_back(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("header", "names"), [
     ("t [s],T [degC]", ("T",)), ("t,T", ("T",)), ("T,x", ("x",)), ("T [s],x", ("x",)),
-    ("t [s],Time [K]", ("Time",))])
+    ("t [s],Time [K]", ("Time",)), ("time,T", ("T",)), ("Zeit [s],T", ("T",))])
 def test_a_temperature_is_no_time(tmp_path: Path, header: str, names: tuple[str, ...]) -> None:
     (tmp_path / "a.csv").write_text(header + "\n0,20\n1,21\n2,21.5\n")
     assert Recording.read(tmp_path / "a.csv").names == names

@@ -49,6 +49,26 @@ def test_times_of_hdf5(tmp_path: Path) -> None:
     assert rec["rate"].unit == "degC" and "words" not in rec and "number" not in rec
 
 
+def test_a_temperature_is_no_time(tmp_path: Path) -> None:
+    def fill(file: Any) -> None:
+        file["T"], file["time"], file["y"] = 20.0 + T, T / 2, -T
+
+    rec = hdf5(tmp_path / "run.h5", fill)
+    np.testing.assert_array_equal(rec["T"].values, 20.0 + T)
+    np.testing.assert_array_equal(rec["y"].time, T / 2)
+
+
+def test_a_temperature_in_tdms_is_no_time(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms", reason="needs the `tdms` extra")
+    made = nptdms.ChannelObject
+    benches.tdms(tmp_path / "run.tdms", [
+        made("A", "T", 20.0 + T, {"unit_string": "degC"}), made("A", "Time", T),
+        made("A", "y", -T)])
+    rec = Recording.read(tmp_path / "run.tdms")
+    assert set(rec.names) == {"T", "y"} and rec["T"].unit == "degC"
+    np.testing.assert_array_equal(rec["y"].time, T)
+
+
 def test_dates_of_netcdf(tmp_path: Path) -> None:
     def fill(file: Any) -> None:
         file["time"], file["y"] = np.arange(5), np.arange(5.0)

@@ -89,6 +89,12 @@ def test_npz(tmp_path: Path) -> None:
     assert Recording.read(path, columns={"theta": "pose.1"}).names == ("theta",)
 
 
+def test_a_temperature_in_an_archive_is_no_time(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", T=20.0 + Y, t=T, y=Y)
+    rec = Recording.read(tmp_path / "run.npz")
+    assert set(rec.names) == {"T", "y"} and rec["y"].time.tolist() == T.tolist()
+
+
 def test_npz_never_unpickles(tmp_path: Path) -> None:
     path = tmp_path / "run.npz"
     np.savez(path, t=T, y=np.array([print, 1], dtype=object))

@@ -225,3 +225,18 @@ def unreadable(what: str, path: str, detail: str) -> str:
 
 def not_installed(what: str, module: str, extra: str) -> str:
     return f"{what} needs '{module}', which is not installed: pip install 'pikanid[{extra}]'."
+
+
+def region_outside(roi: Sequence[int] | None, shape: Sequence[int]) -> str:
+    return (f"The region {roi} (left, top, width, height) does not lie within the picture of "
+            f"{shape[1]} x {shape[0]} pixels.")
+
+
+def bad_frame_rate(rate: float) -> str:
+    return f"A video cannot have {rate:g} frames per second; give the camera's rate."
+
+
+def no_surface(where: str, frames: int, reasons: Sequence[str]) -> str:
+    why = f" ({'; '.join(reasons)})" if reasons else ""
+    return (f"'{where}' shows a surface in fewer than two of {frames} readable frames{why}: check "
+            "the file and the region.")

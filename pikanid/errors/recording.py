@@ -69,7 +69,7 @@ def bad_sigma(name: str) -> str:
 
 
 def unknown_hold(name: str, hold: object) -> str:
-    return f"The hold of channel '{name}' is {hold!r}; it must be 'zero', 'first' or None."
+    return f"The hold of channel '{name}' is {hold!r}; it must be 'zero', 'first', 'cubic' or None."
 
 
 def bad_stride(n: object) -> str:

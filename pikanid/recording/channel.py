@@ -12,7 +12,7 @@ from pikanid import errors
 from pikanid.formula import quantity as units_quantity
 from pikanid.formula import units
 
-Hold = Literal["zero", "first"]
+Hold = Literal["zero", "first", "cubic"]
 Array = NDArray[np.float64]
 
 # Beyond this a square overflows; such values are markers or rubbish, never measurements.
@@ -33,8 +33,8 @@ class Channel:
         unit: Unit text, ``""`` for dimensionless.
         sigma: Standard deviation of the noise in `unit`: scalar, (N,), or None if unknown; on
             making a channel also a text with a unit, such as ``"0.1deg"``.
-        hold: How an input runs between samples, ``"zero"`` or ``"first"``; None leaves it to the
-            model.
+        hold: How an input runs between samples, ``"zero"``, ``"first"`` or ``"cubic"``; None leaves
+            it to the model.
 
     Arrays are copied and cannot be written to.
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from pikanid.recording.reading.columns import Result
+    from pikanid.recording.reading.table import Table
+
 
 class Entering(Leaving):
     """What a `Recording` can be made of; its data live there."""
@@ -56,16 +59,11 @@ class Entering(Leaving):
         Recording 'recording': 0 s to 60 s
           theta  [deg]  2 samples, every 60 s  1 to 2
         """
-        from pikanid.recording.reading import columns as made_of
         from pikanid.recording.reading import frame as frames
 
         if not (hasattr(frame, "columns") and hasattr(frame, "index")):
             raise errors.BadRecording(errors.no_recording(type(frame).__name__))
-        request = made_of.Request(columns or {}, None, units or {})
-        found = made_of.channels(frames.read(frame, name), request, name)
-        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
-                  found.began)
-        return rec.with_sigma(sigma) if sigma else rec
+        return cls._of_table(frames.read(frame, name), columns, units, sigma, name)
 
     @classmethod
     def from_xarray(cls, data: xr.Dataset | xr.DataArray,
@@ -92,16 +90,25 @@ class Entering(Leaving):
         >>> Recording.from_xarray(y)["y"].unit
         'mm'
         """
-        from pikanid.recording.reading import columns as made_of
         from pikanid.recording.reading import labelled
 
         if not (hasattr(data, "coords") and hasattr(data, "dims")):
             raise errors.BadRecording(errors.no_recording(type(data).__name__))
-        request = made_of.Request(columns or {}, None, units or {})
-        found = made_of.channels(labelled.read(data, name), request, name)
-        rec = cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
-                  found.began, found.others)
+        return cls._of_table(labelled.read(data, name), columns, units, sigma, name)
+
+    @classmethod
+    def _of_table(cls, table: Table, columns: Mapping[str, str | int] | None,
+                  units: Mapping[str, str] | None, sigma: Mapping[str, ArrayLike] | None,
+                  name: str) -> Self:
+        from pikanid.recording.reading.columns import Request, channels
+
+        rec = cls._of(name, channels(table, Request(columns or {}, None, units or {}), name))
         return rec.with_sigma(sigma) if sigma else rec
+
+    @classmethod
+    def _of(cls, name: str, found: Result) -> Self:
+        return cls({ch.name: ch for ch in found.channels}, name, found.notes, found.unreadable,
+                   found.began, found.others)
 
     @classmethod
     def from_benchmark(cls, data: Any, inputs: Sequence[str] | None = None,
@@ -177,6 +184,7 @@ class Entering(Leaving):
         [1.5, 2.5]
         """
         from pikanid.recording import reading
+        from pikanid.recording.reading import together
         from pikanid.recording.reading.columns import Request
         from pikanid.recording.reading.table import Options
 
@@ -185,21 +193,17 @@ class Entering(Leaving):
         if isinstance(path, str | os.PathLike) or not isinstance(path, Sequence):
             found = [reading.read(path, asked, options)]
         else:
-            from pikanid.recording.reading import together
-
             found = together.read(path, asked, options)
-        parts = [cls({ch.name: ch for ch in one.channels}, one.stem, one.notes, one.unreadable,
-                     one.began, one.others) for one in found if one.channels]
+        parts = [cls._of(stem, one) for stem, one in found if one.channels]
+        unreadable = {key: why for _, one in found for key, why in one.unreadable.items()}
+        others = tuple(other for _, one in found for other in one.others)
         if not parts:
-            told = [why for one in found for why in one.unreadable.values()]
-            told += [errors.missing_channel(
-                "the files together", text, [o for one in found for o in one.others])
-                for text in asked.also]
-            raise errors.BadRecording(next(iter(told), errors.no_channels(found[0].stem)))
+            told = [*unreadable.values(), *(
+                errors.missing_channel(together.TOGETHER, text, others) for text in asked.also)]
+            raise errors.BadRecording(next(iter(told), errors.no_channels(found[0][0])))
         rec = parts[0] if len(found) == 1 else cls.merge(*parts, by_date=by_date)
-        rec = cls(rec.channels, name or "+".join(one.stem for one in found), rec.notes,
-                  {key: why for one in found for key, why in one.unreadable.items()}, rec.began,
-                  tuple(other for one in found for other in one.others))
+        rec = cls(rec.channels, name or "+".join(stem for stem, _ in found), rec.notes, unreadable,
+                  rec.began, others)
         return rec.with_sigma(sigma) if sigma else rec
 
     @classmethod

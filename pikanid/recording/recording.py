@@ -71,7 +71,7 @@ class Recording(Entering):
             values: Channel name -> (N,) samples.
             units: Channel name -> unit text.
             sigma: Channel name -> noise standard deviation, scalar or (N,).
-            hold: Channel name -> ``"zero"`` or ``"first"``.
+            hold: Channel name -> ``"zero"``, ``"first"`` or ``"cubic"``.
             name: Of the recording.
 
         Raises:

@@ -25,7 +25,8 @@ def held(time: ArrayLike, values: ArrayLike, at: ArrayLike, hold: Hold = "zero",
         values: (N,) samples.
         at: Times [s], any shape.  Before the first and after the last sample the nearest sample
             is held.
-        hold: ``"zero"``: the last sample counts until the next one; ``"first"``: straight lines.
+        hold: ``"zero"``: the last sample counts until the next one; ``"first"``: straight lines;
+            ``"cubic"``: the cubic spline through all samples.
         side: What a zero-order hold gives exactly at a sample: ``"right"`` the new value,
             ``"left"`` the old one.
 
@@ -40,6 +41,10 @@ def held(time: ArrayLike, values: ArrayLike, at: ArrayLike, hold: Hold = "zero",
     t, y, wanted = (np.asarray(a, dtype=float) for a in (time, values, at))
     if hold == "first":
         return np.interp(wanted, t, y)
+    if hold == "cubic" and len(y) > 1:
+        from scipy.interpolate import CubicSpline
+
+        return np.asarray(CubicSpline(t, y)(np.clip(wanted, t[0], t[-1])))
     before = np.searchsorted(t, wanted, side="right" if side == "right" else "left") - 1
     return y[np.clip(before, 0, len(y) - 1)]
 
@@ -57,7 +62,7 @@ def window(channel: Channel, start: float, stop: float, closed: bool = True) -> 
     """The samples with start <= t <= stop (t < stop if not `closed`).
 
     A channel with a declared hold gets a sample at `start` if it has none there, so that the held
-    input is known from the very beginning; with a first-order hold also one at `stop`.
+    input is known from the very beginning; where it is not held to order zero, also one at `stop`.
     """
     slack = ROUNDING * channel.interval if len(channel) > 1 else 0.0
     late = channel.time > start - slack
@@ -65,7 +70,7 @@ def window(channel: Channel, start: float, stop: float, closed: bool = True) -> 
     kept = _pick(channel, late & early)
     if channel.hold is None or len(channel) == 0:
         return kept
-    ends = [start, stop] if channel.hold == "first" else [start]
+    ends = [start] if channel.hold == "zero" else [start, stop]
     for end in ends:
         inside = channel.time[0] < end < channel.time[-1]
         if inside and not np.any(np.abs(kept.time - end) <= slack):

@@ -7,35 +7,18 @@ channels of the table.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
-from pikanid.recording.channel import Channel
-from pikanid.recording.reading.columns import Request, channels
+from pikanid.recording.reading.columns import Request, Result, channels
 from pikanid.recording.reading.door import opened
 from pikanid.recording.reading.reader import reader
 from pikanid.recording.reading.table import Options, Table
 
-__all__ = ["Found", "loaded", "read"]
+__all__ = ["loaded", "read"]
 
 
-@dataclass(frozen=True)
-class Found:
-    """What a file holds: channels, notes, unusable columns, when t = 0 was, what nobody asked for,
-    and the stem of its name.
-    """
-
-    channels: tuple[Channel, ...]
-    notes: tuple[str, ...]
-    unreadable: Mapping[str, str]
-    began: float | None
-    others: tuple[str, ...]
-    stem: str
-
-
-def read(path: str | os.PathLike[str], request: Request, options: Options) -> Found:
-    """Read a file.
+def read(path: str | os.PathLike[str], request: Request, options: Options) -> tuple[str, Result]:
+    """The stem of a file's name, and what it holds.
 
     Args:
         path: Of the file.
@@ -48,9 +31,7 @@ def read(path: str | os.PathLike[str], request: Request, options: Options) -> Fo
         BadSetting: If an argument cannot work.
     """
     table, where, stem = loaded(path, options)
-    result = channels(table, request, where)
-    return Found(result.channels, result.notes, result.unreadable, result.began, result.others,
-                 stem)
+    return stem, channels(table, request, where)
 
 
 def loaded(path: str | os.PathLike[str], options: Options) -> tuple[Table, str, str]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pikanid.recording.reading.headers import TIME_NAMES, are_times
+from pikanid.recording.reading.signals import WIDEST
 from pikanid.recording.reading.table import Column
-
-_TIME_NAMES = ("t", "time", "times")
-_WIDEST = 64  # limit: signals in one matrix; wider ones are images or tables of something else
 
 
 def columns(arrays: Mapping[str, np.ndarray]) -> tuple[Column, ...]:
@@ -22,7 +21,11 @@ def columns(arrays: Mapping[str, np.ndarray]) -> tuple[Column, ...]:
     vectors: dict[str, np.ndarray] = {}
     for path, array in arrays.items():
         vectors.update(_vectors(path, np.asarray(array)))
-    return tuple(Column(path, values, time=_time_of(path, len(values), vectors)) for path,
+    names = {path: path.rpartition(".")[2] for path in vectors}
+    told = are_times([(name, None) for name in names.values()])
+    clocks = sorted((path for path, is_time in zip(names, told, strict=True) if is_time),
+                    key=lambda path: TIME_NAMES.index(names[path].casefold()))
+    return tuple(Column(path, values, time=_time_of(path, vectors, clocks)) for path,
                  values in vectors.items())
 
 
@@ -32,23 +35,17 @@ def _vectors(path: str, array: np.ndarray) -> dict[str, np.ndarray]:
     squeezed = np.squeeze(array).astype(float)
     if squeezed.ndim == 1:
         return {path: squeezed}
-    if squeezed.ndim != 2 or min(squeezed.shape) > _WIDEST:
+    if squeezed.ndim != 2 or min(squeezed.shape) > WIDEST:
         return {}
     signals = squeezed if squeezed.shape[0] < squeezed.shape[1] else squeezed.T
     return {f"{path}.{k + 1}": row.copy() for k, row in enumerate(signals)}
 
 
-def _time_of(path: str, length: int, vectors: Mapping[str, np.ndarray]) -> str | None:
+def _time_of(path: str, vectors: Mapping[str, np.ndarray], clocks: Sequence[str]) -> str | None:
     parts = path.split(".")
     for depth in range(len(parts) - 1, -1, -1):
-        for name in _TIME_NAMES:
-            for candidate in vectors:
-                *around, last = candidate.split(".")
-                if (
-                    around == parts[:depth]
-                    and last.casefold() == name
-                    and candidate != path
-                    and len(vectors[candidate]) == length
-                ):
-                    return candidate
+        for clock in clocks:
+            if (clock.split(".")[:-1] == parts[:depth] and clock != path
+                    and len(vectors[clock]) == len(vectors[path])):
+                return clock
     return None

@@ -10,8 +10,14 @@ import numpy as np
 from pikanid import errors
 from pikanid.formula import units
 from pikanid.recording.channel import LARGEST, Array, Channel
-from pikanid.recording.reading.headers import Named, find, missing, named
-from pikanid.recording.reading.signals import TIME_NAMES
+from pikanid.recording.reading.headers import (
+    TIME_NAMES,
+    Named,
+    are_times,
+    find,
+    missing,
+    named,
+)
 from pikanid.recording.reading.table import Table
 
 OWN_TIME = "t:"  # "t:theta" holds the times of theta alone
@@ -143,17 +149,9 @@ def _channel(key: str, found: Named, time: Array, request: Request,
 
 
 def clocks_by_name(available: Sequence[Named]) -> list[Named]:
-    """The columns whose names say that they are times; ``T`` says so only where its unit is one of
-    time, or none, and there is no ``t``: it may be a temperature.
-    """
-    def elsewhere(c: Named) -> bool:
-        told = bool(c.unit) and not c.column.is_clock and units.is_unit(c.unit)
-        return told and not units.convertible(c.unit, "s")
-
-    possible = [c for c in available if c.name.casefold() in TIME_NAMES]
-    written = {c.name for c in possible}
-    return [c for c in possible if c.name == c.name.casefold()
-            or not (c.name.casefold() in written or elsewhere(c))]
+    """The columns whose names say that they are times."""
+    told = are_times([(c.name, c.unit) for c in available])
+    return [c for c, is_time in zip(available, told, strict=True) if is_time]
 
 
 @dataclass(frozen=True)

@@ -22,14 +22,14 @@ from pikanid.storage import apart
 from pikanid.storage.limits import DAMAGE, MOST_UNPACKED
 
 
-def table(reader: str, module: str, extra: str, kind: str, content: bytes, where: str,
+def table(reader: str, module: str, kind: str, content: bytes, where: str,
           options: Options) -> Table:
     """The table in a file.
 
     Args:
-        reader: The module beside this one that makes `Contents`.
-        module: The library that it needs.
-        extra: Which brings it.
+        reader: The module beside this one that makes `Contents`, called as the extra that brings
+            its library.
+        module: The library.
         kind: What the file is, in sentences.
         content: Bytes of the file.
         where: Its name, for messages.
@@ -40,7 +40,7 @@ def table(reader: str, module: str, extra: str, kind: str, content: bytes, where
         BadSetting: If the library is not installed.
     """
     if find_spec(module) is None:
-        raise errors.BadSetting(errors.not_installed(kind, module, extra))
+        raise errors.BadSetting(errors.not_installed(kind, module, reader))
     try:
         told, arrays = apart.run(f"{__name__}:transferred", content, {
             "reader": reader, "where": where, "wanted": list(options.wanted),

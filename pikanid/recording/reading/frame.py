@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.recording.reading.headers import named
-from pikanid.recording.reading.signals import TIME_NAMES
+from pikanid.recording.reading.headers import TIME_NAMES, are_times, named
 from pikanid.recording.reading.table import Column, Table, from_cells
 
 if TYPE_CHECKING:
@@ -28,13 +28,15 @@ def read(frame: pd.DataFrame, where: str) -> Table:
     if not len(frame):
         raise errors.BadRecording(errors.no_rows(where))
     columns = [_column(str(name), frame.iloc[:, k], where) for k, name in enumerate(frame.columns)]
-    clocked = any(n.name.casefold() in TIME_NAMES for n in named(columns, where))
+    calls = [(n.name, n.unit) for n in named(columns, where)]
     index = frame.index
-    if not clocked and (index.name is not None or not isinstance(index, pd.RangeIndex)):
-        header = str(index.name or "t")
-        times = _column(header, pd.Series(index), where)
-        columns.insert(0, times if named([times], where)[0].name.casefold() in TIME_NAMES
-                       else _column("t", pd.Series(index), where))
+    if index.name is not None or not isinstance(index, pd.RangeIndex):
+        times = _column(str(index.name or "t"), pd.Series(index), where)
+        is_called = named([times], where)[0].name.casefold() in TIME_NAMES
+        # beside such an index a column T is no time
+        calls += [("t", "s")] * (times.is_clock or (is_called and index.name is not None))
+        if not any(are_times(calls)[:len(columns)]):
+            columns.insert(0, times if is_called else replace(times, header="t"))
     return Table(tuple(columns))
 
 

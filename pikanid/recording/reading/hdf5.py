@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,11 @@ import numpy as np
 from pikanid.recording.channel import Array
 from pikanid.recording.formats import called
 from pikanid.recording.reading import foreign
-from pikanid.recording.reading.signals import TIME_NAMES, Clock, Contents, Signal
-from pikanid.recording.reading.table import Options, Table, posix
+from pikanid.recording.reading.headers import are_times
+from pikanid.recording.reading.signals import WIDEST, Clock, Contents, Signal
+from pikanid.recording.reading.table import posix
 
 _DEEPEST = 16  # limit: groups within groups
-_WIDEST = 64  # limit: signals in one matrix; wider ones are images or tables of something else
 _UNITS = ("units", "unit", "Units", "Unit")
 _RATES = ("sampling_rate", "sample_rate", "samplerate", "fs", "Fs", "rate")
 _INTERVALS = ("sampling_interval", "sample_interval", "dt", "increment")
@@ -33,15 +34,7 @@ _SECONDS = {"days": 86400.0, "hours": 3600.0, "minutes": 60.0, "seconds": 1.0,
             "milliseconds": 1e-3, "microseconds": 1e-6,
             "nanoseconds": 1e-9}  # definition: units of time [s]
 
-
-def read(content: bytes, where: str, options: Options) -> Table:
-    """The vectors of a file, named by their paths.
-
-    Raises:
-        BadRecording: If the file is damaged or holds no vectors.
-        BadSetting: If h5py is not installed.
-    """
-    return foreign.table("hdf5", "h5py", "hdf5", called(".h5"), content, where, options)
+read = partial(foreign.table, "hdf5", "h5py", called(".h5"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +65,7 @@ def contents(content: bytes, where: str) -> Contents:
     clocks = _Clocks(vectors)
     signals = []
     for v in vectors:
-        if v.name.casefold() not in TIME_NAMES:
+        if v.path not in clocks.times:
             signals.append(Signal(v.path, v.name, v.count, v.load, v.unit, clocks.of(v)))
     return Contents(signals, clocks.began)
 
@@ -99,7 +92,7 @@ def _vectors(path: str, node: Any) -> Iterator[_Vector]:
                 yield _Vector(f"{path}/{field}", node, shape[0], _read(node, field), None)
     elif node.dtype.kind in "fiub" and len(shape) == 1:
         yield _Vector(path, node, shape[0], _read(node), units)
-    elif node.dtype.kind in "fiub" and len(shape) == 2 and min(shape) <= _WIDEST:
+    elif node.dtype.kind in "fiub" and len(shape) == 2 and min(shape) <= WIDEST:
         axis = int(shape[0] < shape[1])  # along which samples follow each other
         for k in range(shape[1 - axis]):
             yield _Vector(f"{path}.{k + 1}", node, shape[axis], _read(node, (), k, 1 - axis), units)
@@ -117,7 +110,8 @@ class _Clocks:
     """The clock of each vector; vectors with the same times share one."""
 
     def __init__(self, vectors: list[_Vector]) -> None:
-        self.times = {v.path: v for v in vectors if v.name.casefold() in TIME_NAMES}
+        told = are_times([(v.name, v.unit) for v in vectors])
+        self.times = {v.path: v for v, is_time in zip(vectors, told, strict=True) if is_time}
         self.by_node = {v.node.name: v for v in vectors}
         self.made: dict[str, Clock] = {}
         self.dates: dict[str, float | None] = {}

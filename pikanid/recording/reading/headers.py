@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from pikanid import errors
@@ -16,6 +16,8 @@ from pikanid.recording.reading.table import Column
 # "theta [deg]" or "theta (deg)"; the unit itself may hold one pair of parentheses.
 _HEADER = re.compile(
     r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>(?:[^()]|\([^()]*\))*)\))")
+
+TIME_NAMES = ("t", "time", "times", "timestamp", "timestamps", "zeit")
 
 # What test benches write and units are not called, or where it would be read as another one: "Grad"
 # as a thousand million radians, "Nm" as something that is no torque.
@@ -54,6 +56,31 @@ def named(columns: Iterable[Column], where: str) -> list[Named]:
               unit if column.unit is None else _normal(column.unit), column)
         for name, unit, column in split
     ]
+
+
+def are_times(calls: Sequence[tuple[str, str | None]]) -> list[bool]:
+    """Which names, each with its unit, say that they are times.
+
+    One in capitals says so only where its unit, if it has any, is one of time, and where it is not
+    there in small letters, too; ``T``, which may be a temperature, only beside no other.
+
+    >>> are_times([("T", "degC"), ("y", "mm")]), are_times([("T", None), ("y", "mm")])
+    ([False, False], [True, False])
+    >>> are_times([("T", None), ("Time", "s")]), are_times([("t", "s"), ("Time", "K")])
+    ([False, True], [True, False])
+    """
+    told = {name for name, _ in calls if name.casefold() in TIME_NAMES}
+
+    def is_time(name: str, unit: str | None) -> bool:
+        rivals = told if name == "T" else {name.casefold()} & told
+        return name in told and (name == name.casefold() or not (rivals - {name} or _no_time(unit)))
+
+    return [is_time(*call) for call in calls]
+
+
+def _no_time(unit: str | None) -> bool:
+    known = _normal(unit or "s")
+    return units.is_unit(known) and not units.convertible(known, "s")
 
 
 def find(wanted: str, available: list[Named], where: str) -> Named:

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from pikanid import errors
-from pikanid.recording.reading.signals import TIME_NAMES
+from pikanid.recording.reading.headers import are_times
+from pikanid.recording.reading.signals import WIDEST
 from pikanid.recording.reading.table import Column, Table, posix
-
-_WIDEST = 64  # limit: signals in one variable; more are images
 
 
 def read(given: Any, where: str) -> Table:
@@ -43,9 +42,10 @@ def read(given: Any, where: str) -> Table:
 def _time(variable: Any) -> str | None:
     """The dimension that is time; None where there is none with a coordinate."""
     known = [str(d) for d in variable.dims if d in variable.coords]
-    timed = [d for d in known if d.casefold() in TIME_NAMES
-             or variable.coords[d].dtype.kind in "mM"]
-    return next(iter([*timed, *known]), None)
+    dated = [d for d in known if variable.coords[d].dtype.kind in "mM"]
+    told = are_times([(d, variable.coords[d].attrs.get("units")) for d in known])
+    timed = [d for d, is_time in zip(known, told, strict=True) if is_time]
+    return next(iter([*dated, *timed, *known]), None)
 
 
 def _first_date(data: Any) -> np.datetime64 | None:
@@ -77,7 +77,7 @@ def _signals(name: str, variable: Any, along: str, clock: str) -> Iterator[Colum
         return
     labels = (variable.coords[others[0]].values if others[0] in variable.coords
               else range(variable.sizes[others[0]]))
-    for k, label in list(enumerate(labels))[:_WIDEST]:
+    for k, label in list(enumerate(labels))[:WIDEST]:
         header = f"{name}[{label}]"
         values = np.asarray(variable.isel({others[0]: k}).values, float)
         yield Column(header, values, path=header, **more)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,6 @@ from pikanid.recording.channel import Array
 from pikanid.recording.formats import called
 from pikanid.recording.reading import foreign
 from pikanid.recording.reading.signals import Clock, Contents, Signal
-from pikanid.recording.reading.table import Options, Table
 from pikanid.storage.outputs import atomically
 
 _CONSTANTS = {"P1", "P2", "P3", "P4", "P5", "P6", "P7"}  # of the conversions without a text
@@ -28,15 +28,7 @@ _TIME = (0, 1)  # definition: kinds of master channels that hold times, of the M
 # Types of data that are numbers, of either format.
 _NUMBERS = {3: {0, 1, 2, 3, *range(9, 17)}, 4: {*range(6)}}  # definition: of the MDF format
 
-
-def read(content: bytes, where: str, options: Options) -> Table:
-    """The channels of a measurement.
-
-    Raises:
-        BadRecording: If the file is damaged or holds no channels.
-        BadSetting: If asammdf is not installed.
-    """
-    return foreign.table("mdf", "asammdf", "mdf", called(".mf4"), content, where, options)
+read = partial(foreign.table, "mdf", "asammdf", called(".mf4"))
 
 
 def contents(content: bytes, where: str) -> Contents:

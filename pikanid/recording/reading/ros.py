@@ -14,7 +14,7 @@ import sys
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,6 @@ from pikanid.recording.formats import ZIP, by_content, by_ending
 from pikanid.recording.reading import foreign
 from pikanid.recording.reading.ros_messages import Types, Walk, columns
 from pikanid.recording.reading.signals import Clock, Contents, Signal
-from pikanid.recording.reading.table import Options, Table
 from pikanid.storage.outputs import atomically
 
 _ROS_1 = ".bag"
@@ -36,15 +35,7 @@ _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _OVERTAKES = 8  # limit: places by which a message may be early among those recorded
 _APART = 3600 * 10**9  # definition: nanoseconds that no delay takes: stamps of another clock
 
-
-def read(content: bytes, where: str, options: Options) -> Table:
-    """The numbers in a bag.
-
-    Raises:
-        BadRecording: If the bag is damaged or has no numbers.
-        BadSetting: If rosbags is not installed.
-    """
-    return foreign.table("ros", "rosbags", "ros", "a ROS bag", content, where, options)
+read = partial(foreign.table, "ros", "rosbags", "a ROS bag")
 
 
 @dataclass(eq=False)

@@ -15,7 +15,8 @@ from fnmatch import fnmatchcase
 from pikanid.recording.channel import Array
 
 _BETWEEN = re.compile(r"[/.]")
-TIME_NAMES = ("t", "time", "times", "timestamp", "timestamps", "zeit")
+WIDEST = 64  # limit: signals in one matrix; wider ones are images or tables of something else
+
 
 @dataclass(frozen=True, eq=False)
 class Clock:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,20 +17,12 @@ from pikanid import errors
 from pikanid.recording.channel import Array
 from pikanid.recording.formats import called
 from pikanid.recording.reading import foreign
-from pikanid.recording.reading.signals import TIME_NAMES, Clock, Contents, Signal
-from pikanid.recording.reading.table import Options, Table
+from pikanid.recording.reading.headers import are_times
+from pikanid.recording.reading.signals import Clock, Contents, Signal
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 
-
-def read(content: bytes, where: str, options: Options) -> Table:
-    """The channels of a file.
-
-    Raises:
-        BadRecording: If the file is damaged or holds no channels.
-        BadSetting: If npTDMS is not installed.
-    """
-    return foreign.table("tdms", "nptdms", "tdms", called(".tdms"), content, where, options)
+read = partial(foreign.table, "tdms", "nptdms", called(".tdms"))
 
 
 def contents(content: bytes, where: str) -> Contents:
@@ -42,7 +35,8 @@ def contents(content: bytes, where: str) -> Contents:
                if _increment(c.properties) and _is_date(c.properties.get("wf_start_time"))}
     first = min(started.values(), default=None)
     shared: dict[tuple[float, ...], Clock] = {}
-    timed = {c.group_name: c for c in reversed(every) if c.name.casefold() in TIME_NAMES}
+    told = are_times([(c.name, _unit(c.properties)) for c in every])
+    timed = {c.group_name: c for c, is_time in [*zip(every, told, strict=True)][::-1] if is_time}
     signals, began = [], None if first is None else _posix(first)
     for c in every:
         path = f"{c.group_name}/{c.name}"

@@ -9,18 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from pikanid import errors
-from pikanid.recording.reading import Found, loaded
-from pikanid.recording.reading.columns import Request, channels
+from pikanid.recording.reading import loaded
+from pikanid.recording.reading.columns import Request, Result, channels
 from pikanid.recording.reading.headers import Named, matching, missing, named
 from pikanid.recording.reading.table import Options, Table
 
 _CLOCKS = ("t", "time")
-_TOGETHER = "the files together"
+TOGETHER = "the files together"
 
 
 def read(paths: Sequence[str | os.PathLike[str]], request: Request,
-         options: Options) -> list[Found]:
-    """What each file holds.
+         options: Options) -> list[tuple[str, Result]]:
+    """The stem of each file's name, and what it holds.
 
     A channel that several files have is called by file and name, ``camera/theta``.
 
@@ -47,8 +47,8 @@ def read(paths: Sequence[str | os.PathLike[str]], request: Request,
     found = []
     for k, (table, where, stem) in enumerate(tables):
         result = channels(table, own[k], where, partly=True)
-        found.append(Found(result.channels, result.notes, result.unreadable, result.began,
-                           tuple(f"{stem}/{name}" for name in result.others), stem))
+        found.append((stem, replace(
+            result, others=tuple(f"{stem}/{name}" for name in result.others))))
     return _distinct(found, own)
 
 
@@ -76,19 +76,20 @@ def _check_mapping(request: Request, own: Sequence[Request],
     for key, text in request.columns.items():
         files = [k for k, one in enumerate(own) if key in one.columns]
         if not files:
-            raise errors.BadRecording(missing(str(text), every, _TOGETHER))
+            raise errors.BadRecording(missing(str(text), every, TOGETHER))
         if len(files) > 1 and key not in _CLOCKS:
-            raise errors.BadRecording(errors.several_columns(_TOGETHER, str(text), [
+            raise errors.BadRecording(errors.several_columns(TOGETHER, str(text), [
                 one.column.alias for k in files for one in matching(str(text), available[k])]))
     for key in request.units:
         if not any(key in one.units for one in own):
-            raise errors.BadRecording(missing(key, every, _TOGETHER))
+            raise errors.BadRecording(missing(key, every, TOGETHER))
 
 
-def _distinct(found: Sequence[Found], own: Sequence[Request]) -> list[Found]:
+def _distinct(found: Sequence[tuple[str, Result]],
+              own: Sequence[Request]) -> list[tuple[str, Result]]:
     """With channels that several files have under the names of both, unless one was asked for."""
-    count = Counter(ch.name for one in found for ch in one.channels)
-    return [replace(one, channels=tuple(
+    count = Counter(ch.name for _, one in found for ch in one.channels)
+    return [(stem, replace(one, channels=tuple(
         ch if count[ch.name] == 1 or ch.name in request.columns
-        else replace(ch, name=f"{one.stem}/{ch.name}")
-        for ch in one.channels)) for one, request in zip(found, own, strict=True)]
+        else replace(ch, name=f"{stem}/{ch.name}")
+        for ch in one.channels))) for (stem, one), request in zip(found, own, strict=True)]
