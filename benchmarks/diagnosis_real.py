@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.recording import datasets
 from pikanid.validation.study import pendulum
 
-MODELS = {
+MODELS: dict[str, dict[str, Any]] = {
     "pendulum": {
         "name": "viscous pendulum",
         "states": {"theta": {"unit": "rad", "initial": "free"},

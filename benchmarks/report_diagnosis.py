@@ -17,7 +17,6 @@ import math
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,10 +30,12 @@ from provenance import provenance
 
 from pikanid.errors import DatasetUnavailable
 from pikanid.figures import new_figure, save_figure
+from pikanid.model.systems import sloshing
 from pikanid.storage.outputs import atomically
 from pikanid.validation.concealed.generate import generate
 from pikanid.validation.concealed.score import Score, Share, judge, reliability, tally
 from pikanid.validation.concealed.seal import Settings
+from pikanid.validation.own_model.trial import answered
 
 DEGREE = math.pi / 180
 LONGEST = 5  # diagnoses of a set that are timed again by themselves
@@ -206,7 +207,7 @@ parameters' error. Intervals are Wilson's at 95 %.
 
 
 def _diagnosed(one: Set, work: Path, cases: int, workers: int
-               ) -> Iterator[tuple[Score, dict[str, Any]]]:
+               ) -> Iterator[tuple[Score, Mapping[str, Any]]]:
     from pikanid.validation.concealed.deck import DEFAULT_MIX
 
     folder = work / one.name
@@ -214,30 +215,8 @@ def _diagnosed(one: Set, work: Path, cases: int, workers: int
                         dict(one.mix or DEFAULT_MIX))
     made = generate(folder / "recordings", folder / "truth.json", settings, seed=one.seed,
                     workers=workers)
-    truth = json.loads(made.truth.read_text())
-    (folder / "answers").mkdir(exist_ok=True)
-    waiting = [(str(made.folder), str(folder / "answers"), case["id"]) for case in truth["cases"]]
-    with ProcessPoolExecutor(workers) as pool:
-        for case, text in zip(truth["cases"], pool.map(_answer, waiting), strict=True):
-            answer = json.loads(text)
-            yield judge(case, answer), answer
-
-
-def _answer(job: tuple[str, str, str]) -> str:
-    folder, answers, case = job
-    kept = Path(answers) / f"{case}.json"
-    if kept.exists():
-        return kept.read_text()
-    import pikanid as pk
-
-    train, other = (pk.Recording.read(f"{folder}/{case}_{part}.csv")
-                    for part in ("train", "held_out"))
-    begun = time.process_time()
-    answer = pk.diagnose(pk.systems.sloshing(), train, other, workers=1).to_dict()
-    answer["cpu"] = time.process_time() - begun
-    text = json.dumps(answer)
-    kept.write_text(text)
-    return text
+    for case, answer in answered(made.folder, made.truth, sloshing(), folder / "answers", workers):
+        yield judge(case, answer), answer
 
 
 def _alone(folder: Path, cases: Sequence[str]) -> str:
@@ -266,7 +245,7 @@ def _timed(folder: Path, case: str) -> float:
     return time.perf_counter() - begun
 
 
-def _section(one: Set, found: list[tuple[Score, dict[str, Any]]]) -> str:
+def _section(one: Set, found: list[tuple[Score, Mapping[str, Any]]]) -> str:
     scores = [score for score, _ in found]
     seconds = np.array([answer["cpu"] for _, answer in found])
     lines = [f"\n## {one.name}: {one.excitation}, sigma = {one.sigma / DEGREE:g} deg, "

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import diagnosis_real
 import numpy as np
 from provenance import provenance
 from scipy.signal import lfilter
@@ -32,25 +33,12 @@ TESTS = {"held_out": "multisine", "arrow": "arrow",
          "arrow_no_extrapolation": "arrow, no extrapolation"}
 SIGMA, RHOS, LEVELS = 2e-3, (0.0, 0.6), (0.01, 0.05)
 
+NOMINAL = diagnosis_real.MODELS["silverbox"]
 OSCILLATOR = pk.Model.from_dict({
-    "name": "linear oscillator",
-    "states": {"x": {"unit": "V", "initial": "free"}, "v": {"unit": "V/s", "initial": "free"}},
-    "inputs": {"u": {"unit": "V", "hold": "first"}},
-    "parameters": {"omega": {"unit": "rad/s", "guess": 400.0, "bounds": [10.0, 2000.0]},
-                   "zeta": {"guess": 0.05, "bounds": [0.0, 5.0]},
-                   "b": {"unit": "1/s^2", "guess": 160000.0},
-                   "u0": {"unit": "V", "guess": 0.0},
-                   "y0": {"unit": "V", "value": 0.0}},
-    "equations": {"x": "v", "v": "b*(u + u0) - 2*zeta*omega*v - omega**2*x"},
+    **NOMINAL, "name": "linear oscillator", "inputs": {"u": {"unit": "V", "hold": "first"}},
+    "parameters": {**NOMINAL["parameters"], "y0": {"unit": "V", "value": 0.0}},
     "outputs": {"y": {"unit": "V", "expression": "x + y0"}}})
-PENDULUM = pk.Model.from_dict({
-    "name": "viscous pendulum",
-    "states": {"theta": {"unit": "rad", "initial": "free"},
-               "theta_dot": {"unit": "rad/s", "initial": "free"}},
-    "parameters": {"w2": {"unit": "1/s^2", "guess": 40.0, "bounds": [1.0, 1000.0]},
-                   "d": {"unit": "1/s", "guess": 0.05, "bounds": [0.0, 10.0]}},
-    "equations": {"theta": "theta_dot", "theta_dot": "-w2*sin(theta) - d*theta_dot"},
-    "outputs": {"theta": {"unit": "rad", "expression": "theta"}}})
+PENDULUM = pk.Model.from_dict(diagnosis_real.MODELS["pendulum"])
 
 
 @dataclass(frozen=True)

@@ -158,7 +158,7 @@ def test_what_cannot_be_mapped_is_refused() -> None:
         model.map_input("u_x", gain="k")
     with pytest.raises(errors.BadModel, match="theta"):
         model.map_input("u_x", delay="theta")
-    with pytest.raises(errors.BadModel, match="'zero' or 'first'"):
-        model.map_input("u_x", hold="cubic")
+    with pytest.raises(errors.BadModel, match="'zero', 'first' or 'cubic'"):
+        model.map_input("u_x", hold="smooth")
     with pytest.raises(TypeError):
         model.map_input("u_x", gian=2)

@@ -21,7 +21,7 @@ from pikanid import errors
 from pikanid.cli import main
 from pikanid.recording import Recording
 from pikanid.validation.concealed import case, seal
-from pikanid.validation.concealed import case as of_one
+from pikanid.validation.concealed import generate as of_set
 from pikanid.validation.concealed import making as room
 from pikanid.validation.concealed.deck import DEFAULT_MIX
 from pikanid.validation.concealed.effects import IDS
@@ -124,20 +124,20 @@ def test_sealed_sets_differ_and_keep_their_seed_in_the_truth(tmp_path: Path) -> 
 
 def test_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     generate(tmp_path / "whole", tmp_path / "whole.json", LONGER, seed=11, workers=1)
-    make, done = of_one.make, []
+    make, done = case.make, []
 
-    def stopped(order: of_one.Order) -> object:
+    def stopped(order: case.Order) -> object:
         if len(done) == 3:
             raise KeyboardInterrupt
         done.append(order.name)
         return make(order)
 
-    monkeypatch.setattr(of_one, "make", stopped)
+    monkeypatch.setattr(of_set, "make", stopped)
     with pytest.raises(KeyboardInterrupt):
         generate(tmp_path / "d", tmp_path / "t.json", LONGER, seed=11, workers=1)
     assert not (tmp_path / "t.json").exists()
     assert content(tmp_path / "d") == {}  # nothing half-made is given away
-    monkeypatch.setattr(of_one, "make", make)
+    monkeypatch.setattr(of_set, "make", make)
     # What a killed run may leave behind: a recording without its entry, a half-written file.
     progress = tmp_path / "t.json.unfinished"
     (progress / "006_train.csv").write_text("half")

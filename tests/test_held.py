@@ -10,12 +10,15 @@ import oracle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
-from pikanid import errors
+from pikanid import errors, simulate
 from pikanid.model import Model
-from pikanid.problem.held import HeldInput, PiecewiseInput, acting
+from pikanid.problem.held import PIECES, HeldInput, PiecewiseInput, acting, held_input
 from pikanid.problem.problem import Problem, bind
 from pikanid.recording import Channel, Recording
+from pikanid.recording.resampling import held
 from pikanid.validation.concealed import signals
 
 T = np.array([0.2, 0.5, 0.6, 1.1, 1.3])
@@ -109,3 +112,43 @@ def test_fewer_samples_than_parameters_are_refused() -> None:
     with pytest.raises(errors.BadRecording, match=r"2.*3|3.*2"):
         Problem(model, few)
     Problem(model, [few, few])
+
+
+def test_a_smooth_input_is_the_spline_through_its_samples() -> None:
+    t = np.sort(np.random.default_rng(3).uniform(0.0, 4.0, 40))
+    u = np.sin(5 * t)
+    spline = CubicSpline(t, u)
+    smooth = held_input("u", t, u, "cubic")
+    np.testing.assert_allclose(smooth.at(t), u, atol=1e-12)
+    between = np.linspace(t[0], t[-1], 999)
+    bend = np.abs(spline(between, 2)).max() * np.diff(t).max() ** 2 / 8
+    straight = np.abs(np.interp(between, t, u) - spline(between)).max()
+    off = np.abs(smooth.at(between) - spline(between)).max()
+    assert off < bend / PIECES**2 and off < straight / 10
+    np.testing.assert_allclose(held(t, u, between, "cubic"), spline(between), atol=1e-12)
+    assert smooth.at(np.array([t[0] - 1, t[-1] + 1])) == pytest.approx([u[0], u[-1]])
+
+
+def test_one_sample_is_a_constant_whatever_its_hold() -> None:
+    assert held_input("u", np.array([0.3]), np.array([7.0]), "cubic").at(T).tolist() == [7.0] * 5
+    assert held([0.3], [7.0], [0.0, 1.0], "cubic").tolist() == [7.0, 7.0]
+
+
+def test_a_band_limited_input_is_followed_by_a_cubic_hold() -> None:
+    """Against DOP853 with the sines themselves, three to ten samples to a period."""
+    model = Model.from_dict({
+        "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}}, "inputs": {"u": {"unit": "m/s^2"}},
+        "parameters": {"k": {"unit": "1/s^2", "value": 90.0}, "d": {"unit": "1/s", "value": 0.8}},
+        "equations": {"x": "v", "v": "u - k*x - d*v"},
+        "outputs": {"x": {"unit": "m", "expression": "x"}}})
+    rates, t = np.array([6.0, 11.0, 20.0]), 0.1 * np.arange(101)
+
+    def push(s: np.ndarray | float) -> np.ndarray:
+        return np.sin(np.multiply.outer(np.asarray(s), rates)).sum(-1)
+
+    truth = solve_ivp(lambda s, z: [z[1], push(s) - 90.0 * z[0] - 0.8 * z[1]], (0, 10), [0.0, 0.0],
+                      "DOP853", t, rtol=1e-10, atol=1e-12).y[0]
+    off = {hold: np.std(simulate(model, Recording.from_arrays(
+        t, {"u": push(t)}, {"u": "m/s^2"}, hold={"u": hold}))["x"].values - truth) / np.std(truth)
+        for hold in ("zero", "first", "cubic")}
+    assert off["zero"] > 0.3 and off["first"] > 0.05 and off["cubic"] < 0.02

@@ -256,9 +256,11 @@ def test_the_cubic_spring_of_the_silverbox_is_found(recordings_folder: object) -
 
     (row,) = diagnosis_real.silverbox()
     assert row.verdict == "partial"
-    assert row.hypotheses == ("surely input_hold and cubic_stiffness",)
-    # both official tests, the extrapolating one too
-    assert all(float(part.split()[1]) <= 1.1 for part in row.remark.split(", "))
+    # the input is band-limited; damping that rises with the speed shows beside, of whatever form
+    assert row.hypotheses[0].startswith("surely input_hold and cubic_stiffness")
+    assert "second_mode" not in row.hypotheses[0] and "power_drag" not in row.hypotheses[0]
+    # both official tests, the extrapolating one too; in straight lines they are 0.9 mV
+    assert all(float(part.split()[1]) <= 0.4 for part in row.remark.split(", "))
 
 
 def test_a_force_that_nothing_follows_is_not_looked_for() -> None:

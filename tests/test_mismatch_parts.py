@@ -5,23 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pikanid import Recording
+from pikanid import Recording, excitation, simulate
 from pikanid.mismatch.beyond.patch import DEGREE, INTERVALS, FreeCurve
 from pikanid.mismatch.beyond.penalised import Penalised, _prior
+from pikanid.mismatch.catalogue.friction import coulomb_friction
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import averaged, oversampling
 from pikanid.mismatch.design.separation import mean_precision, unexplained
 from pikanid.mismatch.design.sizing import _next
 from pikanid.mismatch.detect.residual_tests import frequency_bands
 from pikanid.mismatch.detect.tangent import _middle
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.progressive_horizon import lost
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside
+from pikanid.mismatch.judge.partial import families_of
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import systems
 from pikanid.noise.level import NoiseModel
@@ -171,3 +174,22 @@ def test_noise_of_repeats_has_the_level_that_it_was_drawn_with(rho: float) -> No
     assert spectra.beyond(old) > 0.01
     assert spectra.beyond(NoiseModel(0.7, rho, 0.05, 0.01, "stated")) < 1e-6
     assert rho or spectra.apart == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("width", "blurred"), [(0.01, False), (0.2, False), (0.45, True),
+                                                (5.0, True)])
+def test_friction_rounded_over_all_speeds_is_not_dry(width: float, blurred: bool) -> None:
+    model = systems.sloshing()
+    speed = np.sin(np.linspace(0.0, 60.0, 6000))
+    site = sites(model, (simulate(model, excitation.two_pulse()),))[0]
+    sharp, rounded = coulomb_friction(site)
+    names = [p.name for p in rounded.parameters]
+    whitened = SimpleNamespace(
+        motion=lambda theta: {site.v: speed},
+        problem=SimpleNamespace(free=[SimpleNamespace(name=n) for n in names]))
+    minimum: Any = SimpleNamespace(theta=np.array([1.0, width]))
+    for effect in (sharp, rounded):
+        h = Hypothesis((effect,), model, cast(Any, whitened), minimum, 0.0)
+        assert h.blurred == (frozenset({rounded.key}) if blurred and effect is rounded
+                             else frozenset())
+    assert (families_of(rounded, h, 0.3) == ("drag",)) is blurred

@@ -116,7 +116,7 @@ def test_what_cannot_be_seen_is_not_hidden(motor_rig: Rig) -> None:
 def test_a_case_is_a_function_of_its_order_and_its_truth_is_judged(motor_rig: Rig) -> None:
     order = Order("001", 3, 0, "single", motor_rig)
     case = make(order)
-    assert case.recordings == order.made().recordings
+    assert case.recordings == make(order).recordings
     hidden, = case.truth["effects"]  # type: ignore[misc]
     answer = {"verdict": "named", "mismatch": True, "hypotheses": [
         {"effects": [{"ids": [hidden["id"]]}], "probability": 0.9}]}

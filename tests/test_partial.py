@@ -41,7 +41,7 @@ DRAG = effect("quadratic_drag", "drag")
 def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: float = 0.95,
             later: float | None = None) -> Weighed:
     """An explanation that leaves so much [σ²], and so much of each held-out sample [σ]."""
-    h: Any = SimpleNamespace(effects=effects, values={})
+    h: Any = SimpleNamespace(effects=effects, values={}, blurred=frozenset())
     predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
                                      inert=frozenset())
     return Weighed(h, predicted, left, 0.0, weight, share,
@@ -125,7 +125,7 @@ def test_a_curve_without_a_name_has_a_slope_of_its_own(names: tuple[str, ...], s
     curve, scale = effect("sensor_saturation", "sensor curve"), effect("sensor_gain", "gain")
     present = tuple(Present(e.families[0], e, own, {}, 1.0, 1.0, 9.0, 1.0, 0.95)
                     for e, own in ((curve, names), (scale, ("sensor_gain",))))
-    h: Any = SimpleNamespace(effects=(curve, scale))
+    h: Any = SimpleNamespace(effects=(curve, scale), blurred=frozenset())
     found = _without_scale(Part(present, (), h, 1.0, 0.95))
     assert {p.family for p in found.present} == sure
     assert {d.family for d in found.doubtful} == {"sensor curve", "gain"} - sure

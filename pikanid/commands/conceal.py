@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -77,19 +78,19 @@ def conceal(
     from pikanid.validation.concealed.seal import Settings
 
     if model is not None:
-        rig = _rig(model, inputs, held_out_inputs, noise, set_, catalogue)
         from pikanid.validation.own_model import generate as own
         from pikanid.validation.own_model.case import CLASSES
 
-        wanted = own.OwnSet(rig, cases, parse_mix(mix, CLASSES) if mix is not None else None)
-        with working("concealing", cases, quiet) as step:
-            made = own.generate(out, truth, wanted, seed, workers, step=step)
+        rig = _rig(model, inputs, held_out_inputs, noise, set_, catalogue)
+        shares = None if mix is None else parse_mix(mix, CLASSES)
+        make = partial(own.generate, out, truth, own.OwnSet(rig, cases, shares))
     else:
-        shares = parse_mix(mix) if mix is not None else dict(DEFAULT_MIX)
-        settings = Settings(cases, excitation, quantity(sigma, "rad", "--sigma"), shares)
+        settings = Settings(cases, excitation, quantity(sigma, "rad", "--sigma"),
+                            dict(DEFAULT_MIX) if mix is None else parse_mix(mix))
         check(settings)
-        with working("concealing", cases, quiet) as step:
-            made = generate(out, truth, settings, seed, workers, step=step)
+        make = partial(generate, out, truth, settings)
+    with working("concealing", cases, quiet) as step:
+        made = make(seed, workers, step)
     if not quiet:
         kept = f" ({made.kept} were there already)" if made.kept else ""
         kind = "sealed" if seed is None else "open"

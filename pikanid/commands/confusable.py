@@ -6,26 +6,20 @@ from typing import Annotated
 
 import typer
 
+from pikanid.commands.grouped import grouped
 from pikanid.commands.options import (
     Catalogues,
-    Columns,
     Duration,
     Excitation,
     Json,
     ModelName,
-    OwnTimes,
     Quiet,
-    Rate,
-    Sheet,
     Sigma,
-    Start,
-    Stop,
-    Units,
     Values,
     adjusted,
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
-from pikanid.commands.reading import Reading, every_source
+from pikanid.commands.reading import Driven, every_source
 from pikanid.commands.simulate import excited, sigmas
 
 EXAMPLES = """Examples:
@@ -35,6 +29,7 @@ EXAMPLES = """Examples:
   pikanid confusable --model my.toml --excitation motion.csv --sigma 0.1deg --json told.json"""
 
 
+@grouped
 def confusable(
     model: ModelName,
     excitation: Excitation = "two_pulse",
@@ -42,13 +37,8 @@ def confusable(
     set_: Values = [],  # noqa: B006
     catalogue: Catalogues = [],  # noqa: B006
     duration: Duration = 5.0,
-    rate: Rate = None,
-    column: Columns = [],  # noqa: B006
-    unit: Units = [],  # noqa: B006
-    sheet: Sheet = None,
-    start: Start = None,
-    stop: Stop = None,
-    own_times: OwnTimes = False,
+    *,
+    files: Driven,
     strength: Annotated[float, typer.Option(
         metavar="N", help="how many σ strong effects are made before they are compared")] = 30.0,
     quick: Annotated[bool, typer.Option(
@@ -63,7 +53,6 @@ def confusable(
     from pikanid.reporting.console import console, working
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
-    files = Reading(column, unit, rate, sheet, start, stop, own_times=own_times)
     drive = excited(chosen, excitation, duration, files)
     with working("looking", 28, quiet) as step:
         found = run(chosen, drive, sigmas(chosen, sigma) or None, strength=strength,

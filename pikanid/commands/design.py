@@ -7,22 +7,12 @@ from typing import Annotated
 
 import typer
 
-from pikanid.commands.options import (
-    Columns,
-    OwnTimes,
-    Quiet,
-    Sheet,
-    Sigma,
-    Start,
-    Stop,
-    Stride,
-    Units,
-    assignments,
-    quantity,
-)
+from pikanid.commands.grouped import grouped
+from pikanid.commands.options import Quiet, Sigma, assignments, quantity
 from pikanid.commands.outputs import check_outputs
-from pikanid.commands.reading import Reading, every_source
+from pikanid.commands.reading import Recorded, every_source
 from pikanid.commands.simulate import sigmas
+from pikanid.figures import ENDINGS, image_for
 from pikanid.recording.formats import written_endings
 
 EXAMPLES = """Examples:
@@ -35,6 +25,7 @@ One model: the profile from which its free parameters are learnt best (D-optimal
 that tells them apart best. A model stands for its values; refit it before."""
 
 
+@grouped
 def design(
     models: Annotated[list[str], typer.Argument(
         metavar="NAME|FILE.toml...", help="a model, or hypotheses to be told apart",
@@ -60,13 +51,8 @@ def design(
         help="largest value that an output may reach, as theta=15deg")] = [],  # noqa: B006
     duration: Annotated[float, typer.Option(metavar="S", help="of the profile [s]")] = 20.0,
     rate: Annotated[float, typer.Option(metavar="HZ", help="its sampling rate")] = 100.0,
-    column: Columns = [],  # noqa: B006
-    unit: Units = [],  # noqa: B006
-    sheet: Sheet = None,
-    start: Start = None,
-    stop: Stop = None,
-    own_times: OwnTimes = False,
-    decimate: Stride = 1,
+    *,
+    files: Recorded,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of random profiles")] = 0,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", help="figure to write (.png, .svg, .pdf)")] = None,
@@ -74,10 +60,9 @@ def design(
 ) -> int:
     """Choose the next experiment among feasible ones, and write it ready to run."""
     check_outputs({"--out": (out, written_endings()),
-                   "--plot": (plot, [".png", ".svg", ".pdf"])},
+                   "--plot": (plot, ENDINGS)},
                   every_source(*models, *recorded, *candidate))
     from pikanid import errors
-    from pikanid.figures import image_for
     from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
     from pikanid.mismatch.design.profiles import Bounds
     from pikanid.model import systems
@@ -91,7 +76,6 @@ def design(
     first = found[models[0]]
     limits = {name: quantity(value, first.output(name).unit, f"--limit {name}")
               for name, value in assignments("--limit", limit, "theta=15deg").items()}
-    files = Reading(column, unit, None, sheet, start, stop, decimate, own_times)
     past = [files.recording(text, *found.values()) for text in recorded]
     # a profile holds inputs alone: nothing to thin
     whole = replace(files, decimate=1)

@@ -6,20 +6,13 @@ from typing import Annotated
 
 import typer
 
+from pikanid.commands.grouped import grouped
 from pikanid.commands.options import (
     Catalogues,
-    Columns,
-    FileRate,
     Json,
     ModelName,
-    OwnTimes,
     Quiet,
-    Sheet,
     Sigma,
-    Start,
-    Stop,
-    Stride,
-    Units,
     Values,
     adjusted,
     quantity,
@@ -41,6 +34,7 @@ EXAMPLES = """Examples:
 Exit codes: 0 diagnosed, whatever was found; 2 bad input."""
 
 
+@grouped
 def diagnose(
     train: Annotated[list[str], typer.Argument(
         metavar="TRAIN...", help=f"recordings to explain: {readable()}; files joined by + "
@@ -63,14 +57,8 @@ def diagnose(
         help="rate of false alarms, 0.01 by default", show_default=False)] = None,
     set_: Values = [],  # noqa: B006
     catalogue: Catalogues = [],  # noqa: B006
-    column: Columns = [],  # noqa: B006
-    unit: Units = [],  # noqa: B006
-    rate: FileRate = None,
-    sheet: Sheet = None,
-    start: Start = None,
-    stop: Stop = None,
-    own_times: OwnTimes = False,
-    decimate: Stride = 1,
+    *,
+    files: Reading,
     workers: Annotated[int | None, typer.Option(
         metavar="N", min=1, show_default=False,
         help="threads; by default two where there are as many cores")] = None,
@@ -89,7 +77,6 @@ def diagnose(
     taken = Settings() if settings is None else Settings.read(settings)
     taken = taken if alpha is None else taken.with_values({"alpha": alpha})
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
-    files = Reading(column, unit, rate, sheet, start, stop, decimate, own_times)
     records, others = ([files.recording(text, chosen, sigma=sigma) for text in texts]
                        for texts in (train, held_out))
     stretch = None

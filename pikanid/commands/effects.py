@@ -8,25 +8,20 @@ from typing import Annotated
 import typer
 
 from pikanid import errors
+from pikanid.commands.grouped import grouped
 from pikanid.commands.options import (
     Catalogues,
-    Columns,
     Duration,
     Excitation,
     ModelName,
-    OwnTimes,
     Quiet,
-    Rate,
-    Sheet,
-    Start,
-    Stop,
-    Units,
     Values,
     adjusted,
 )
 from pikanid.commands.outputs import check_outputs
-from pikanid.commands.reading import Reading, every_source
+from pikanid.commands.reading import Driven, every_source
 from pikanid.commands.simulate import excited
+from pikanid.figures import ENDINGS, save_figure
 
 EXAMPLES = """Examples:
 
@@ -37,26 +32,22 @@ EXAMPLES = """Examples:
 Exit codes: 0 all is well; 2 bad input."""
 
 
+@grouped
 def effects(
     model: ModelName,
     catalogue: Catalogues = [],  # noqa: B006
     excitation: Excitation = "two_pulse",
     set_: Values = [],  # noqa: B006
     duration: Duration = 5.0,
-    rate: Rate = None,
-    column: Columns = [],  # noqa: B006
-    unit: Units = [],  # noqa: B006
-    sheet: Sheet = None,
-    start: Start = None,
-    stop: Stop = None,
-    own_times: OwnTimes = False,
+    *,
+    files: Driven,
     plot: Annotated[str | None, typer.Option(
         metavar="FILE", show_default=False,
         help="draw what each effect does at its guess (.png, .svg, .pdf)")] = None,
     quiet: Quiet = False,
 ) -> int:
     """Check the effects that a model file lists: symbols, units, derivatives; show what they do."""
-    check_outputs({"--plot": (plot, [".png", ".svg", ".pdf"])},
+    check_outputs({"--plot": (plot, ENDINGS)},
                   [*every_source(excitation), model, *catalogue])
     from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown
     from pikanid.model import systems
@@ -66,11 +57,8 @@ def effects(
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
     if not chosen.effects:
         raise errors.BadModel(errors.no_effects(chosen.name))
-    files = Reading(column, unit, rate, sheet, start, stop, own_times=own_times)
     shown = effects_shown(chosen, excited(chosen, excitation, duration, files))
     if plot is not None and not all(one.failure for one in shown):
-        from pikanid.figures import save_figure
-
         save_figure(effects_figure(shown, chosen), plot)
     if quiet:
         return 0

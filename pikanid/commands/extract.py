@@ -9,6 +9,7 @@ import typer
 from pikanid import errors
 from pikanid.commands.options import Json
 from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.figures import ENDINGS, image_for
 from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def extract(
     from pikanid.reporting.console import console
     from pikanid.symbolic import extract as read
 
-    check_outputs({"--plot": (plot, (".png", ".svg", ".pdf")),
+    check_outputs({"--plot": (plot, ENDINGS),
                    "--json": (json_, (".json",))},
                   [p for p in (source, data) if p])
     network = _load(source)
@@ -59,8 +60,6 @@ def extract(
     reading = read(network, x, y, inputs=names or None, alpha=alpha)
     files = {}
     if plot is not None:
-        from pikanid.figures import image_for
-
         files[plot] = image_for(reading.plot(), plot)
     written(files, json_, _content(reading))
     if json_ != STDOUT:

@@ -4,12 +4,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pikanid import errors
-from pikanid.commands.options import assignments, by_output, quantity
+from pikanid.commands.options import (
+    Columns,
+    FileRate,
+    OwnTimes,
+    Rate,
+    Sheet,
+    Start,
+    Stop,
+    Stride,
+    Units,
+    assignments,
+    by_output,
+    quantity,
+)
 
 if TYPE_CHECKING:
     from pikanid.model import Model
@@ -18,18 +31,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Reading:
-    """What the options say about files: texts of --column and --unit as they were given, sampling
-    rate [Hz], sheet, window [s], stride of the outputs, and whether dates count for nothing.
-    """
+    """The options that say how files are read: see `pikanid.commands.grouped`."""
 
-    column: Sequence[str] = ()
-    unit: Sequence[str] = ()
-    rate: float | None = None
-    sheet: str | None = None
-    start: float | None = None
-    stop: float | None = None
-    decimate: int = 1
-    own_times: bool = False
+    column: Columns = field(default_factory=list)
+    unit: Units = field(default_factory=list)
+    rate: FileRate = None
+    sheet: Sheet = None
+    start: Start = None
+    stop: Stop = None
+    own_times: OwnTimes = False
+    decimate: Stride = 1
 
     def recording(self, text: str, *models: Model, sigma: Sequence[str] = ()) -> Recording:
         """The recording in a file, or in several joined by ``+``, for models.
@@ -70,6 +81,23 @@ class Reading:
         if self.decimate > 1:
             rec = rec.decimate(self.decimate, channels=model.output_names)
         return _with_sigma(rec, model, sigma)
+
+
+@dataclass(frozen=True)
+class Driven(Reading):
+    """Where a file drives a model: its outputs are not used, and a built-in excitation has a rate,
+    too.
+    """
+
+    rate: Rate = None
+    decimate: int = field(default=1, init=False)
+
+
+@dataclass(frozen=True)
+class Recorded(Reading):
+    """Where ``--rate`` is that of a profile to be made."""
+
+    rate: float | None = field(default=None, init=False)
 
 
 def sources(text: str) -> list[str]:

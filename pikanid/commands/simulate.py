@@ -7,26 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pikanid import errors
+from pikanid.commands.grouped import grouped
 from pikanid.commands.options import (
-    Columns,
     Duration,
     Excitation,
     ModelName,
-    OwnTimes,
     Quiet,
-    Rate,
-    Sheet,
     Sigma,
-    Start,
-    Stop,
-    Units,
     Values,
     adjusted,
     by_output,
     quantity,
 )
 from pikanid.commands.outputs import check_outputs
-from pikanid.commands.reading import Reading, every_source
+from pikanid.commands.reading import Driven, every_source
 from pikanid.recording.formats import written_endings
 
 if TYPE_CHECKING:
@@ -45,6 +39,7 @@ EXAMPLES = """Examples:
 A file given as --excitation holds the inputs; the outputs are sampled at its times."""
 
 
+@grouped
 def simulate(
     model: ModelName,
     out: Annotated[str, typer.Option(
@@ -55,13 +50,8 @@ def simulate(
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of the noise")] = 0,
     set_: Values = [],  # noqa: B006
     duration: Duration = 5.0,
-    rate: Rate = None,
-    column: Columns = [],  # noqa: B006
-    unit: Units = [],  # noqa: B006
-    sheet: Sheet = None,
-    start: Start = None,
-    stop: Stop = None,
-    own_times: OwnTimes = False,
+    *,
+    files: Driven,
     quiet: Quiet = False,
 ) -> int:
     """Simulate a model and write what would be recorded."""
@@ -71,7 +61,6 @@ def simulate(
     from pikanid.simulation import simulate as run
 
     chosen = adjusted(systems.find(model), set_)
-    files = Reading(column, unit, rate, sheet, start, stop, own_times=own_times)
     drive = excited(chosen, excitation, duration, files)
     made = run(chosen, drive, sigma=sigmas(chosen, sigma), seed=seed)
     if not chosen.inputs:
@@ -86,7 +75,7 @@ def simulate(
     return 0
 
 
-def excited(model: Model, name: str, duration: float, files: Reading) -> Recording:
+def excited(model: Model, name: str, duration: float, files: Driven) -> Recording:
     """The inputs to simulate under: the built-in excitation `name`, or the recording it names,
     read as `files` says; its rate is that of a built-in one too.
     """

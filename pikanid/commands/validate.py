@@ -8,25 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pikanid.commands.options import (
-    Columns,
-    FileRate,
-    Json,
-    OwnTimes,
-    Quiet,
-    Sheet,
-    Sigma,
-    Start,
-    Stop,
-    Stride,
-    Units,
-)
+from pikanid.commands.grouped import grouped
+from pikanid.commands.options import Json, Quiet, Sigma
 from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.commands.reading import Reading, every_source
+from pikanid.figures import ENDINGS, image_for
 from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
-    from pikanid.model import Model
     from pikanid.recording import Recording
 
 SAVED = (".json", ".json.gz")
@@ -44,6 +33,7 @@ Models and saved estimates are compared as they are; with --train, models are fi
 Exit codes: 0 compared, whatever was found; 2 bad input."""
 
 
+@grouped
 def validate(
     model: Annotated[list[str], typer.Argument(
         metavar="MODEL...", show_default=False,
@@ -68,14 +58,8 @@ def validate(
     lags: Annotated[int, typer.Option(
         metavar="L", min=1, help="of the residual analysis, in samples")] = 25,
     sigma: Sigma = [],  # noqa: B006
-    column: Columns = [],  # noqa: B006
-    unit: Units = [],  # noqa: B006
-    rate: FileRate = None,
-    sheet: Sheet = None,
-    start: Start = None,
-    stop: Stop = None,
-    own_times: OwnTimes = False,
-    decimate: Stride = 1,
+    *,
+    files: Reading,
     seed: Annotated[int, typer.Option(
         metavar="N", min=0, help="of the bootstrap that compares models")] = 0,
     json_: Json = None,
@@ -86,39 +70,35 @@ def validate(
     quiet: Quiet = False,
 ) -> int:
     """Compare models on recordings: fit per cent, RMSE, AIC, a linear baseline, the noise."""
-    check_outputs({"--json": (json_, [".json"]), "--plot": (plot, [".png", ".svg", ".pdf"]),
+    check_outputs({"--json": (json_, [".json"]), "--plot": (plot, ENDINGS),
                    "--report": (report, [".html"])}, every_source(*model, *data, *train))
     from pikanid.comparison import validate as run
+    from pikanid.comparison.contender import told_apart
+    from pikanid.model import Model
     from pikanid.reporting.console import console, working
 
     given = [_model(name) for name in model]
-    bare = [_bare(g) for g in given]
-
-    reading = Reading(column, unit, rate, sheet, start, stop, decimate, own_times)
-    records, training = ([reading.recording(text, *bare, sigma=sigma) for text in texts]
+    bare = [g if isinstance(g, Model) else g.model for g in given]
+    records, training = ([files.recording(text, *bare, sigma=sigma) for text in texts]
                          for texts in (data, train))
     with working("validating", len(given) + 1, quiet) as step:
         compared: dict[str, Any] = {}
-        for name, one in zip(model, given, strict=True):
+        for name, label, one in zip(model, told_apart([_label(n) for n in model]), given,
+                                    strict=True):
             step(name)
-            label, count = _label(name), 2
-            while label in compared:
-                label, count = f"{_label(name)} ({count})", count + 1
             compared[label] = _fitted(one, training)
         step("comparing")
         found = run(compared, records, training=training, first=first,
                     initial="free" if free_start else "model", horizon=horizon, window=window,
                     lags=lags, seed=seed)
-    files: dict[str, bytes] = {}
+    made: dict[str, bytes] = {}
     if plot is not None:
-        from pikanid.figures import image_for
-
-        files[plot] = image_for(found.plot(), plot)
+        made[plot] = image_for(found.plot(), plot)
     if report is not None:
         from pikanid.reporting.validation_page import page
 
-        files[report] = page(found, ", ".join(r.name for r in records)).encode()
-    written(files, json_, found.to_dict())
+        made[report] = page(found, ", ".join(r.name for r in records)).encode()
+    written(made, json_, found.to_dict())
     if not quiet and json_ != STDOUT:
         from pikanid.reporting.validation_tables import show_validation
 
@@ -134,13 +114,6 @@ def _model(name: str) -> Any:
     return Estimate.load(name) if name.lower().endswith(SAVED) else systems.find(name)
 
 
-def _bare(given: Any) -> Model:
-    from pikanid.model import Model
-
-    found: Model = given if isinstance(given, Model) else given.model
-    return found
-
-
 def _label(name: str) -> str:
     return Path(name).name.split(".")[0] or name
 
@@ -150,8 +123,5 @@ def _fitted(given: Any, training: Sequence[Recording]) -> Any:
     from pikanid.model import Model
     from pikanid.strategies import NLS
 
-    if not isinstance(given, Model) or not training:
-        return given
-    if not given.free_names:
-        return given
-    return NLS().fit(given, training)
+    is_to_fit = isinstance(given, Model) and training and given.free_names
+    return NLS().fit(given, training) if is_to_fit else given

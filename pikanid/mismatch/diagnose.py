@@ -101,6 +101,12 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
     ranked = with_noise_of_the_rest(case, searched(case, tell), quiet, tell)
     tell("confirmation")
     answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
+    if answer.part is not None and case.adequate(late := answer.part.hypothesis) and all(
+            late.fit != h.fit for h in ranked):
+        # found only now, it explains all: the noise had been read through what it explains
+        tell("noise once more")
+        ranked = with_noise_of_the_rest(case, case.search.ranked(), quiet, tell)
+        answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
     mend = None
     if answer.verdict == "unnamed" and case.later is not None:
         mend = patch(case.base, case.model, shape, site, case.records, case.later, case.predicted)

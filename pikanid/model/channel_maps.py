@@ -36,8 +36,8 @@ def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
     They apply in the order of the keywords: u -> behind a play of ±backlash -> changing no faster
     than rate_limit [1/s] -> gain·u -> + offset -> limited to ±saturation -> dead zone of ±dead_zone
     -> function (a formula of the input's name) -> first-order lag [s]; `delay` [s] shifts the
-    recorded signal, `hold` ("zero", "first") says how it is interpolated.  Play, limited rate and
-    delay act on the recorded signal, before all other maps.
+    recorded signal, `hold` ("zero", "first", "cubic") says how it runs between samples.  Play,
+    limited rate and delay act on the recorded signal, before all other maps.
 
     Raises:
         BadModel: Unknown input or symbol, or a second backlash or rate limit.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import Any
+from typing import Any, get_args
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -17,6 +17,7 @@ from pikanid.formula.limits import MAX_NAME
 from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm
 from pikanid.model.lookup import Lookup
+from pikanid.model.parts import Hold
 from pikanid.storage.entries import Entry, is_integer
 
 # Far more than any model has, and few enough that checking them takes no time.
@@ -99,9 +100,9 @@ def validate(model: Lookup) -> None:
         for what, formula in (("delay", item.delay), ("backlash", item.backlash),
                               ("rate limit", item.rate_limit)):
             _check_symbols(formula, constants, f"The {what} of input '{item.name}'", model)
-        if item.hold not in ("zero", "first"):
+        if item.hold not in get_args(Hold):
             raise errors.BadModel(errors.bad_value(
-                f"The hold of input '{item.name}'", item.hold, "'zero' or 'first'"))
+                f"The hold of input '{item.name}'", item.hold, "'zero', 'first' or 'cubic'"))
     for p in model.parameters:
         if not p.bounds[0] < p.bounds[1] or (p.free and not p.bounds[0] <= p.value <= p.bounds[1]):
             raise errors.BadModel(errors.bad_bounds(p.name, p.value, p.bounds))

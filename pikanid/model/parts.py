@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 import sympy as sp
 
-Hold = Literal["zero", "first"]
+Hold = Literal["zero", "first", "cubic"]
 Scope = Literal["shared", "recording"]
 Formula: TypeAlias = "str | float | sp.Expr"
 
@@ -26,7 +26,11 @@ class State:
 
 @dataclass(frozen=True)
 class Input:
-    """A recorded input.  `hold` says what happens between its samples, `delay` [s] shifts it.
+    """A recorded input.  `delay` [s] shifts it.
+
+    `hold` says what happens between its samples: it stays ("zero"), runs in straight lines
+    ("first"), or smoothly ("cubic": a cubic spline, for signals without power near half the
+    sampling rate).
 
     `backlash`, in the input's unit, is half the play that the recorded signal has to cross before
     anything moves, each time that it turns round; behind it the signal changes no faster than

@@ -8,9 +8,6 @@ import numpy as np
 def propagated(sensitivity: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Standard deviation √diag(J C Jᵀ) (N,) of outputs, to first order, from that of parameters.
 
-    What has no standard error (NaN: it ended at a bound; infinite: nothing shows it) counts as
-    known.
-
     Args:
         sensitivity: J (N, n).
         covariance: C (n, n).
@@ -18,8 +15,19 @@ def propagated(sensitivity: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     >>> propagated(np.array([[1.0, 0.0], [3.0, 4.0]]), np.eye(2)).tolist()
     [1.0, 5.0]
     """
+    C = finite(covariance)
+    return np.asarray(np.sqrt(np.maximum(
+        np.einsum("ij,jk,ik->i", sensitivity, C, sensitivity, optimize=True), 0.0)))
+
+
+def finite(covariance: np.ndarray) -> np.ndarray:
+    """C (n, n), in which what has no standard error (NaN: it ended at a bound; infinite: nothing
+    shows it) counts as known.
+
+    >>> finite(np.array([[np.inf, 0.5], [0.5, 2.0]])).tolist()
+    [[0.0, 0.0], [0.0, 2.0]]
+    """
     unknown = ~np.isfinite(np.diag(covariance))
     C = np.array(covariance)
     C[unknown] = C[:, unknown] = 0.0
-    return np.asarray(np.sqrt(np.maximum(
-        np.einsum("ij,jk,ik->i", sensitivity, C, sensitivity, optimize=True), 0.0)))
+    return C

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 Side = Literal["left", "right"]
+PIECES = 4  # numerical: straight ones between two samples of a smooth input
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,28 @@ class HeldInput:
     @functools.cached_property
     def _spacing(self) -> float:
         return float(np.min(np.diff(self.time))) if len(self.time) > 1 else 1.0
+
+
+def held_input(name: str, time: np.ndarray, values: np.ndarray,
+               hold: Literal["zero", "first", "cubic"]) -> HeldInput:
+    """An input from samples (N,), whatever happens between them.
+
+    The cubic spline of a `hold` "cubic" runs in `PIECES` straight pieces between two samples: they
+    are off it by at most h²/(8·PIECES²)·max|u''| (C. de Boor, A Practical Guide to Splines, 2001,
+    ch. III), a sixteenth of what straight lines between the samples are.
+
+    >>> t = np.arange(4.0)
+    >>> smooth = held_input("u", t, t**2, "cubic")
+    >>> smooth.at(np.array([0.5, 1.5])).round(9).tolist()
+    [0.25, 2.25]
+    """
+    if hold != "cubic" or len(time) < 2:
+        return HeldInput(name, time, values, "zero" if hold == "cubic" else hold)
+    from scipy.interpolate import CubicSpline
+
+    steps = np.diff(time)[:, None] * np.arange(PIECES) / PIECES
+    fine = np.append((time[:-1, None] + steps).ravel(), time[-1])
+    return HeldInput(name, fine, CubicSpline(time, values)(fine), "first")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pikanid import errors
 from pikanid.model import Input, Model, Output
 from pikanid.problem.arguments import a_model, several
 from pikanid.problem.evaluated import InitialState, delays, initial_state, paths
-from pikanid.problem.held import HeldInput, PiecewiseInput, acting
+from pikanid.problem.held import HeldInput, PiecewiseInput, acting, held_input
 from pikanid.recording import Recording
 
 
@@ -29,6 +29,11 @@ class Samples:
     t: np.ndarray
     y: np.ndarray
     sigma: np.ndarray | None
+
+    def part(self, rows: slice | np.ndarray) -> Samples:
+        """Some of them."""
+        return Samples(self.output, self.t[rows], self.y[rows],
+                       None if self.sigma is None else self.sigma[rows])
 
 
 @dataclass(frozen=True)
@@ -229,7 +234,7 @@ def _held(recording: Recording, item: Input) -> HeldInput:
     if not known and item.default is not None:
         return HeldInput(item.name, np.array([recording.start]), np.array([item.default]), "zero")
     channel = recording.as_input(item.name, _unit(recording, item))
-    return HeldInput(item.name, channel.time, channel.values, channel.hold or item.hold)
+    return held_input(item.name, channel.time, channel.values, channel.hold or item.hold)
 
 
 def _samples(recording: Recording, output: Output, index: int) -> Samples:

@@ -79,9 +79,7 @@ def _cut(problem: Problem, model: Model, count: int) -> tuple[list[Segment], np.
         for k in range(count):
             low, high, last = edges[k], edges[k + 1], k == count - 1
             masks = [(s.t >= low) & ((s.t < high) | last) for s in e.samples]
-            samples = [dataclasses.replace(s, t=s.t[m], y=s.y[m],
-                                           sigma=None if s.sigma is None else s.sigma[m])
-                       for s, m in zip(e.samples, masks, strict=True)]
+            samples = [s.part(m) for s, m in zip(e.samples, masks, strict=True)]
             end = np.array([high])
             samples += [Samples(n_outputs + i, end, np.zeros(1), None)
                         for i in range(len(model.states))]

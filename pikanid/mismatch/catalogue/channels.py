@@ -9,7 +9,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model.parts import Parameter
-from pikanid.problem.held import HeldInput, acting
+from pikanid.problem.held import PIECES, HeldInput, acting
 
 INF = float("inf")
 
@@ -202,20 +202,31 @@ def input_backlash(site: Site) -> list[Candidate]:
 
 
 def input_hold(site: Site) -> list[Candidate]:
-    """The input runs between samples otherwise than the model takes it to."""
+    """The input runs between samples otherwise than the model takes it to.
+
+    Over an interval h from a sample on, a smooth input has the mean u + h u'/2 + h² u''/6.  Held to
+    order one it has h² u''/12 more, and held to order zero h u'/2 + h² u''/6 less.
+    """
     found = []
     for u in site.inputs:
         now = site.model.input(u).hold
-        other = "first" if now == "zero" else "zero"
-        sense = 0.5 if now == "zero" else -0.5
+        for other, words, order in (("zero", "steps", "zero"), ("first", "straight lines", "one"),
+                                    ("cubic", "a smooth curve", "three")):
+            if other == now:
+                continue
 
-        def directions(view: View, u: str = u, sense: float = sense) -> list[TangentDirection]:
-            change = np.zeros(len(view.t))
-            change[:-1] = sense * np.diff(view.u[u])
-            return [TangentDirection({}, push={u: change}, one_sided=True, scales=False)]
+            def directions(view: View, u: str = u, now: str = now, other: str = other
+                           ) -> list[TangentDirection]:
+                step = PIECES if now == "cubic" else 1  # stops between two samples
+                rise = step * np.diff(view.u[u], append=view.u[u][-1])
+                bend = step * np.diff(rise, prepend=rise[0])
+                lead = {"zero": -rise / 2 + bend / 12, "first": bend / 12, "cubic": 0 * rise}
+                return [TangentDirection({}, push={u: lead[other] - lead[now]}, one_sided=True,
+                                         scales=False)]
 
-        words = "straight lines" if other == "first" else "steps"
-        found.append(_input(site, u, "input_hold", f"the input runs in {words} between samples",
-                            (), f"{u} held to order {'one' if other == 'first' else 'zero'}",
-                            directions, hold=other))
+            found.append(_input(
+                site, u, "input_hold", f"the input runs in {words} between samples", (),
+                f"{u} held to order {order}", directions, f"hold {u}",
+                variant="smooth" if other == "cubic" else
+                "steps" if now == "cubic" and other == "zero" else "", hold=other))
     return found

@@ -111,10 +111,13 @@ def with_twins(candidates: Iterable[Candidate], effects: Iterable[Effect]) -> li
     listed, groups = list(candidates), dict[str, str]()
     for c in listed:
         groups |= dict.fromkeys(c.ids, c.twin)
+    changed: set[str] = set()
     for effect in effects:
         if effect.twins:
             one = (effect.key, *effect.twins)
             joined = {groups[i] for i in one if groups[i]}
             name = min(joined, default=effect.key)
-            groups |= {i: name for i, group in groups.items() if i in one or group in joined}
-    return [replace(c, twin=groups[c.ids[0]]) for c in listed]
+            moved = {i: name for i, group in groups.items() if i in one or group in joined}
+            changed |= moved.keys()
+            groups |= moved
+    return [replace(c, twin=groups[c.ids[0]]) if c.ids[0] in changed else c for c in listed]

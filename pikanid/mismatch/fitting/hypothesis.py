@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -78,6 +79,22 @@ class Hypothesis:
         """Whether so much is left that no test is needed to see it."""
         certain = self.whitened.settings.fits.certain
         return self.minimum.chi2 > certain * max(self.whitened.rows, 1)
+
+    @functools.cached_property
+    def blurred(self) -> frozenset[str]:
+        """Keys of laws whose shape was left open and that, over the speeds of the motion, resemble
+        viscous damping more than the law that they have their name from.
+        """
+        return frozenset(e.key for e in self.effects if e.refines and self._blurs(e))
+
+    def _blurs(self, effect: Candidate) -> bool:
+        if effect.resistance is None:
+            return False
+        speed = np.abs(self.whitened.motion(self.minimum.theta)[effect.site.v])
+        force = effect.resistance(speed, *(self.values[p.name] for p in effect.parameters[1:]))
+        viscous, dry = (np.sum(force * law) / max(float(np.linalg.norm(law)), 1e-300)
+                        for law in (speed, np.sign(speed)))
+        return bool(viscous > dry)
 
     @property
     def pinned(self) -> bool:

@@ -112,7 +112,9 @@ class Explanations:
 
 
 def families_of(effect: Candidate, h: Hypothesis, dry: float) -> tuple[Family, ...]:
-    """Of an effect as it was fitted: a force that hardly rises with speed is dry friction."""
+    """Of an effect as it was fitted: dry friction is what hardly rises with speed."""
+    if effect.key in h.blurred:
+        return ("drag",)
     if isinstance(effect.exponent, Parameter) and h.values[effect.exponent.name] <= dry:
         return ("dry friction",)
     return effect.families
@@ -268,9 +270,11 @@ def _examined(family: Family, lead: Weighed, found: Sequence[Weighed], rule: Par
         _contains(e, effect) for e in w.hypothesis.effects)]
     own = sum(w.weight for w in same)
     within = dominance(lead, rivals, rule)
-    # what needs a law outside the catalogue beside it has no name of its own
-    exact = all(e.known for e in members) and not (
-        smaller(own, 1 - rule.rate) or smaller(within, rule.within)
+    # what needs a law outside the catalogue beside it has no name of its own, and a free exponent
+    # takes up what other laws leave
+    asked = rule.dominance if isinstance(effect.exponent, Parameter) else rule.within
+    exact = all(e.known for e in members) and effect.key not in lead.hypothesis.blurred and not (
+        smaller(own, 1 - rule.rate) or smaller(within, asked)
         or smaller(lead.share, rule.exact))
     compared = {e.key: e.name for w in holders for e in w.hypothesis.effects
                 if e.key != effect.key and family in families_of(e, w.hypothesis, rule.dry)}

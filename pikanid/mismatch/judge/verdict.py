@@ -82,7 +82,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         return criterion(h, predict(h), scale, asks) if predict(h) or not checked else np.inf
 
     def passes(h: Hypothesis) -> bool:
-        if smaller(test(h).p_value, adequate):
+        if h.blurred:
+            reasons[h.key] = "what it calls dry friction rises with all speeds of the motion"
+        elif smaller(test(h).p_value, adequate):
             reasons[h.key] = "leaves something unexplained in the recording"
         elif checked and ((seen := predict(h)) is None
                           or smaller(seen.detection.p_value, adequate)):

@@ -115,7 +115,8 @@ class PartSettings:
         chance: Rate at which a family that is not there may dominate.
         spread: Of ln κ of families that are not there, which is about half-normal.
         share: Of the held-out misfit's square that must be explained.
-        within: κ of an effect among explanations that hold the same family.
+        within: κ of an effect among explanations that hold the same family; of a law with a free
+            exponent `dominance` is asked.
         exact: Share of the held-out misfit's square that a name must explain.
         form: κ of a free curve of the same state beside a named effect: from there on the form is
             another one, and only the family is sure.

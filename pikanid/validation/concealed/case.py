@@ -55,10 +55,6 @@ class Order:
     excitation: str
     sigma: float
 
-    def made(self) -> Case:
-        """The case."""
-        return make(self)
-
 
 @dataclass(frozen=True, eq=False)
 class Case:

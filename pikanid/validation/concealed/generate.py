@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.validation.concealed.case import Order
+from pikanid.validation.concealed.case import Order, make
 from pikanid.validation.concealed.deck import deal
 from pikanid.validation.concealed.excitations import CHOICES
 from pikanid.validation.concealed.making import MOST_CASES, MadeSet, make_set
@@ -34,8 +35,10 @@ def generate(out: str | Path, truth: str | Path, settings: Settings, seed: int |
             other settings.
     """
     check(settings)
-    return make_set(out, truth, asdict(settings), lambda key: orders_of(settings, key), seed,
-                    workers, step)
+    return make_set(
+        out, truth, asdict(settings),
+        lambda key: {order.name: partial(make, order) for order in orders_of(settings, key)},
+        seed, workers, step)
 
 
 def check(settings: Settings) -> None:

@@ -20,43 +20,18 @@ import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 from pikanid import errors
 from pikanid.storage.cache import own_folder
 from pikanid.storage.outputs import STAGED, atomically
 from pikanid.storage.workers import unordered
 from pikanid.validation.concealed import files, seal
+from pikanid.validation.concealed.case import Case
 from pikanid.validation.concealed.seal import Secret
 
 MOST_CASES = 100_000  # limit: of one set
-
-
-class Made(Protocol):
-    """What a case has become."""
-
-    @property
-    def recordings(self) -> Mapping[str, bytes]:
-        """File name -> content."""
-        ...
-
-    @property
-    def truth(self) -> Mapping[str, object]:
-        """Entry of the truth file."""
-        ...
-
-
-class Order(Protocol):
-    """What a case is to be; a process can be sent it."""
-
-    @property
-    def name(self) -> str:
-        """Number of the case, as in its files' names."""
-        ...
-
-    def made(self) -> Made:
-        """The case: a function of the order alone."""
-        ...
+Maker = Callable[[], Case]
 
 
 @dataclass(frozen=True)
@@ -77,7 +52,7 @@ class MadeSet:
 
 
 def make_set(out: str | Path, truth: str | Path, settings: Mapping[str, Any],
-             orders_of: Callable[[Secret], Sequence[Order]], seed: int | None = None,
+             cases_of: Callable[[Secret], Mapping[str, Maker]], seed: int | None = None,
              workers: int | None = None,
              step: Callable[[str], None] = lambda text: None) -> MadeSet:
     """Write the recordings of a set to a folder and the truth about it to a file elsewhere.
@@ -86,7 +61,8 @@ def make_set(out: str | Path, truth: str | Path, settings: Mapping[str, Any],
         out: Folder of the recordings and the seal.
         truth: File outside of it.
         settings: Of the set, as they stand in the truth file; `cases` is their number.
-        orders_of: What each case is to be, from the secret.
+        cases_of: From the secret: number of each case, as in its files' names, and what makes it;
+            a process can be sent it.
         seed: Known seed of an open set; None for a sealed one.
         workers: Processes; as many as there are cores by default.
         step: Called with the number of a case before the next one is begun.
@@ -102,17 +78,17 @@ def make_set(out: str | Path, truth: str | Path, settings: Mapping[str, Any],
         _remove(progress, folder, file)  # of a run that was killed after its last step but one
         return made
     key = _begin(progress, folder, settings, seed)
-    orders = orders_of(key)
-    waiting = [order for order in orders if not _finished(progress, order)]
+    makers = cases_of(key)
+    waiting = {name: make for name, make in makers.items() if not _finished(progress, name)}
     step("the first cases")
     for name in _made_in_parallel(waiting, progress, workers):
         step(name)
-    cases = [json.loads(_entry(progress, order).read_bytes()) for order in orders]
+    cases = [json.loads(_entry(progress, name).read_bytes()) for name in makers]
     content = seal.truth_content(settings, key, cases)
     _hand_over(cases, progress, folder, seal.seal_content(content, key.sealed))
     atomically(file, content, private=key.sealed)
     _remove(progress, folder, file)
-    return MadeSet(folder, file, len(waiting), len(orders) - len(waiting))
+    return MadeSet(folder, file, len(waiting), len(makers) - len(waiting))
 
 
 def _check_places(folder: Path, file: Path) -> None:
@@ -161,27 +137,27 @@ def _begin(progress: Path, folder: Path, settings: Mapping[str, Any], seed: int 
     return key
 
 
-def _entry(progress: Path, order: Order) -> Path:
-    return progress / f"{order.name}.json"
+def _entry(progress: Path, name: str) -> Path:
+    return progress / f"{name}.json"
 
 
-def _finished(progress: Path, order: Order) -> bool:
-    entry = _entry(progress, order)
+def _finished(progress: Path, name: str) -> bool:
+    entry = _entry(progress, name)
     return entry.exists() and seal.intact(progress, json.loads(entry.read_bytes()))
 
 
-def _made_in_parallel(orders: Sequence[Order], progress: Path,
+def _made_in_parallel(makers: Mapping[str, Maker], progress: Path,
                       workers: int | None) -> Iterable[str]:
-    number = min(workers or os.cpu_count() or 1, max(len(orders), 1))
-    return unordered(_make_one, [(order, progress) for order in orders], number)
+    number = min(workers or os.cpu_count() or 1, max(len(makers), 1))
+    return unordered(_make_one, [(*one, progress) for one in makers.items()], number)
 
 
-def _make_one(order: Order, progress: Path) -> str:
-    case = order.made()
-    for name, content in case.recordings.items():
-        atomically(progress / name, content, private=True)
-    atomically(_entry(progress, order), files.canonical(case.truth), private=True)
-    return order.name
+def _make_one(name: str, make: Maker, progress: Path) -> str:
+    case = make()
+    for file, content in case.recordings.items():
+        atomically(progress / file, content, private=True)
+    atomically(_entry(progress, name), files.canonical(case.truth), private=True)
+    return name
 
 
 def _hand_over(cases: Sequence[Mapping[str, object]], progress: Path, folder: Path,

@@ -12,7 +12,6 @@ from pikanid import errors
 from pikanid.recording import Recording
 from pikanid.validation.concealed.arrays import Array
 from pikanid.validation.concealed.case import Case
-from pikanid.validation.concealed.visibility import FROM_RIVAL
 from pikanid.validation.own_model.hidden import Hidden, Workbench, nameable
 from pikanid.validation.own_model.law import Law
 from pikanid.validation.own_model.rig import Rig
@@ -30,10 +29,6 @@ class Order:
     index: int
     kind: str
     rig: Rig
-
-    def made(self) -> Case:
-        """The case."""
-        return make(self)
 
 
 def make(order: Order) -> Case:
@@ -78,7 +73,7 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
         "noise": dict(scene.sigma), "effects": [_entry(h) for h in hidden],
         "visibility": {"nominal": nominal, "effects": alone, "best_rival": list(rival[0]),
                        "best_rival_distance": _finite(distance)},
-        "nameable": nameable(hidden, nominal, distance, FROM_RIVAL)})
+        "nameable": nameable(hidden, nominal, distance)})
 
 
 def _chosen(kind: str, laws: Sequence[Law], rng: np.random.Generator) -> list[Law]:

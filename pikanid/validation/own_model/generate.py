@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from pikanid.recording import Recording
 from pikanid.validation.concealed.deck import counts
 from pikanid.validation.concealed.making import MOST_CASES, MadeSet, make_set
 from pikanid.validation.concealed.seal import Secret
-from pikanid.validation.own_model.case import CLASSES, Order
+from pikanid.validation.own_model.case import CLASSES, Order, make
 from pikanid.validation.own_model.rig import Rig
 
 DEFAULT_MIX: Mapping[str, float] = {
@@ -81,7 +82,10 @@ def generate(out: str | Path, truth: str | Path, wanted: OwnSet, seed: int | Non
         SimulationFailed: If the model cannot be simulated in these experiments.
     """
     wanted.rig.scene(wanted.rig.nominal.values)
-    return make_set(out, truth, wanted.content, wanted.orders, seed, workers, step)
+    return make_set(
+        out, truth, wanted.content,
+        lambda key: {order.name: partial(make, order) for order in wanted.orders(key)},
+        seed, workers, step)
 
 
 def _digest(experiment: Recording) -> str:

@@ -12,7 +12,7 @@ from pikanid import errors
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.validation.concealed.arrays import Array
-from pikanid.validation.concealed.visibility import FROM_NOMINAL
+from pikanid.validation.concealed.visibility import FROM_NOMINAL, FROM_RIVAL
 from pikanid.validation.own_model.distance import Fit, Scene, beyond, refit, sensitivities
 from pikanid.validation.own_model.law import Law
 from pikanid.validation.own_model.plant import Plant
@@ -164,7 +164,7 @@ def _same(a: Law, b: Law) -> bool:
     return a.id == b.id or a.id in b.twins
 
 
-def nameable(hidden: Sequence[Hidden], nominal: float, rival: float, from_rival: float) -> bool:
+def nameable(hidden: Sequence[Hidden], nominal: float, rival: float) -> bool:
     """Whether a diagnosis could tell: every law known, far enough from what else there is."""
     return (bool(hidden) and all(h.law.known for h in hidden) and nominal >= FROM_NOMINAL
-            and rival >= from_rival)
+            and rival >= FROM_RIVAL)

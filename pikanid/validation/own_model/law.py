@@ -101,7 +101,7 @@ def _law(effect: Effect, model: Model, known: bool, single: bool) -> Law | None:
         return Law(effect, known, "input", next(iter(effect.inputs)), twins)
     if effect.outputs:
         return Law(effect, known, "sensor", next(iter(effect.outputs)), twins)
-    places = [n for n in (*effect.add, *effect.replace, *effect.initial)]
+    places = (*effect.add, *effect.replace, *effect.initial)
     state = next((n for n in places if n in model.state_names), "")
     # a parameter that changes acts in the equation that its form was bound to first
     return Law(effect, known, "dynamics", state or effect.variant.split(",")[0], twins)

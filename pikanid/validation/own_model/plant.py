@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from scipy.integrate import ode
+from scipy.interpolate import CubicSpline
 
 from pikanid import errors
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
+from pikanid.model.parts import Hold
 from pikanid.recording import Channel, Recording
 from pikanid.validation.concealed.arrays import Array
 
@@ -116,26 +118,18 @@ class Plant:
         Raises:
             SimulationFailed: If the motion diverges or is too stiff.
         """
-        return self._simulated(values, experiment)[0]
+        return self.simulated(values, experiment)[0]
 
-    def ranges(self, values: Mapping[str, float],
-               experiment: Recording) -> dict[str, tuple[float, float]]:
-        """Lowest and highest value of each state.
-
-        Raises:
-            SimulationFailed: As `outputs`.
-        """
-        return self._simulated(values, experiment)[1]
-
-    def _simulated(self, values: Mapping[str, float], experiment: Recording,
-                   ) -> tuple[dict[str, Array], dict[str, tuple[float, float]]]:
+    def simulated(self, values: Mapping[str, float], experiment: Recording,
+                  ) -> tuple[dict[str, Array], dict[str, tuple[float, float]]]:
+        """The same, and the lowest and the highest value of each state."""
         model = self.model
         p = [{**model.values, **values}[n] for n in model.parameter_names]
         nothing = [0.0] * len(model.states)
         late = self._delays(0.0, nothing, [0.0] * len(model.inputs), p)
         start = experiment.start
-        signals = [_Signal(_channel(experiment, i.name), i.default, i.hold, start, delay)
-                   for i, delay in zip(model.inputs, late, strict=False)]
+        signals = [_Signal(experiment.channels.get(i.name), i.default, i.hold,
+                           start, delay) for i, delay in zip(model.inputs, late, strict=False)]
         reads = [_instants(experiment, o.name) - delay
                  for o, delay in zip(model.outputs, late[len(signals):], strict=True)]
         wanted = np.maximum(np.concatenate(reads), start)
@@ -189,15 +183,23 @@ class Plant:
 class _Signal:
     """A recorded input, held as its model says and shifted by a delay."""
 
-    def __init__(self, channel: Channel | None, default: float | None, hold: str, start: float,
+    def __init__(self, channel: Channel | None, default: float | None, hold: Hold, start: float,
                  delay: float) -> None:
         if channel is None:
             if default is None:
                 raise errors.BadRecording(errors.conceal_needs_inputs())
             self.switches, self.values = np.array([start]), np.array([default])
         else:
-            self.switches, self.values = channel.time + delay, np.asarray(channel.values)
-        self.first = hold == "first" and len(self.values) > 1
+            hold = channel.hold or hold
+            time, values = channel.time, np.asarray(channel.values)
+            if hold == "cubic" and len(values) > 1:  # fine enough for the integrator's tolerance
+                spline = CubicSpline(time, values)
+                count = len(time)
+                time = np.interp(np.linspace(0, count - 1, 32 * (count - 1) + 1),
+                                 np.arange(count), time)
+                values = spline(time)
+            self.switches, self.values = time + delay, values
+        self.first = hold != "zero" and len(self.values) > 1
 
     def piece(self, t: float) -> tuple[float, float, float]:
         """An instant, the value there and the slope from t on to the next switch."""
@@ -214,12 +216,6 @@ class _Signal:
         """Value from t on."""
         at, value, slope = self.piece(t)
         return value + slope * (t - at)
-
-
-def _channel(experiment: Recording, name: str) -> Channel | None:
-    if name not in experiment:
-        return None
-    return experiment[name]
 
 
 def _instants(experiment: Recording, output: str) -> Array:

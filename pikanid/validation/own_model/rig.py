@@ -83,8 +83,8 @@ class Rig:
         Raises:
             SimulationFailed: If the motion diverges.
         """
-        nominal, plant = self.nominal, Plant(self.nominal)
-        ranges, seen = plant.ranges(values, self.train), plant.outputs(values, self.train)
+        nominal = self.nominal
+        seen, ranges = Plant(nominal).simulated(values, self.train)
         inputs = [n for n in nominal.input_names if n in self.train]
         used = {*nominal.input_names, *nominal.output_names, *nominal.state_names}
         extra = [n for n in self.train.names if n not in used]

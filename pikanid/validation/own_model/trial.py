@@ -53,6 +53,16 @@ def trials(folder: str | Path, truth: str | Path, model: Model, answers: str | P
     Raises:
         BadSetting: If the truth cannot be read.
     """
+    return [_trial(case, answer)
+            for case, answer in answered(folder, truth, model, answers, workers, step)]
+
+
+def answered(folder: str | Path, truth: str | Path, model: Model, answers: str | Path,
+             workers: int = 1, step: Callable[[str], None] = lambda text: None,
+             ) -> list[tuple[Mapping[str, Any], Mapping[str, Any]]]:
+    """Every case of a set with its answer, and the processor seconds that took as ``"cpu"``; the
+    arguments are those of `trials`.
+    """
     cases = cases_of(truth)
     kept = Path(answers)
     kept.mkdir(parents=True, exist_ok=True)
@@ -60,7 +70,7 @@ def trials(folder: str | Path, truth: str | Path, model: Model, answers: str | P
     for done in unordered(_answer, [(str(folder), case, model, str(kept)) for case in waiting],
                           min(workers, max(len(waiting), 1))):
         step(done)
-    return [_trial(case, json.loads((kept / f"{case['id']}.json").read_bytes())) for case in cases]
+    return [(case, json.loads((kept / f"{case['id']}.json").read_bytes())) for case in cases]
 
 
 def places(found: Iterable[Trial]) -> Share:
