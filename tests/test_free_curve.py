@@ -8,7 +8,13 @@ import pytest
 
 import pikanid as pk
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.beyond.free_curve import share_lacking, with_free_curve
+from pikanid.mismatch.beyond.free_curve import (
+    share_lacking,
+    with_free_curve,
+    with_free_input,
+    with_free_sensor,
+)
+from pikanid.mismatch.catalogue.channels import sensor_nonlinearity
 from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
@@ -21,9 +27,13 @@ MAGNET = "-20*(theta/0.06)/(1 + (theta/0.06)**2)**2"  # as strong as gravity, ab
 
 def base_of(term: str) -> tuple[Hypothesis, Site]:
     """The nominal fit to a recording of a rig with a further force."""
+    return fitted_to(pk.systems.sloshing().with_term("theta_dot", term))
+
+
+def fitted_to(rig: pk.Model) -> tuple[Hypothesis, Site]:
+    """The nominal fit to a recording of a rig."""
     model = pk.systems.sloshing()
-    run = pk.simulate(model.with_term("theta_dot", term),
-                      pk.excitation.planar_moves(8, 10.0, seed=2), sigma=SIGMA, seed=2)
+    run = pk.simulate(rig, pk.excitation.planar_moves(8, 10.0, seed=2), sigma=SIGMA, seed=2)
     records = Records((run,), ({"theta": NoiseModel(SIGMA, 0.0, 0.0, 0.01, "")},), DEFAULTS)
     base = fitted(model, (), records, [{}], 1)
     assert base is not None
@@ -54,3 +64,25 @@ def test_a_curve_that_is_fitted_explains_a_force_of_its_state() -> None:
     found = with_free_curve(base.model, base, (), "theta", site)
     assert found is not None and not base.whitened.rows > base.minimum.chi2
     assert found.minimum.chi2 == pytest.approx(found.whitened.rows, rel=0.1)
+
+
+def test_a_curve_of_the_sensor_explains_what_no_cubic_does() -> None:
+    base, site = fitted_to(pk.systems.sloshing().map_output(
+        "theta", function="theta + 0.03*sin(13*theta + 0.4)"))
+    cubic = fitted(base.model, sensor_nonlinearity(site), base.whitened.records, [base.point], 1)
+    assert cubic is not None
+    found = with_free_sensor(base.model, cubic, site)
+    assert found is not None and cubic.minimum.chi2 > 1.2 * cubic.whitened.rows
+    assert found.minimum.chi2 == pytest.approx(found.whitened.rows, rel=0.1)
+
+
+def test_a_curve_of_an_input_explains_how_it_saturates_softly() -> None:
+    base, site = fitted_to(pk.systems.sloshing().map_input("u_x", function="3*tanh(u_x/3)"))
+    found = with_free_input(base.model, base, "u_x", site)
+    assert found is not None and base.minimum.chi2 > 1.5 * base.whitened.rows
+    assert found.minimum.chi2 == pytest.approx(found.whitened.rows, rel=0.1)
+
+
+def test_an_input_at_rest_has_no_curve() -> None:
+    base, site = base_of("0")
+    assert with_free_input(base.model, base, "u_z", site) is None

@@ -1,4 +1,4 @@
-"""Free curves of a state, which stand for laws that nobody has listed: refitted, or read off.
+"""Free curves of states, inputs, outputs: in place of laws that nobody has listed.
 
 Where a model is far off, no first step leads to the curve.  Then it is read off the motion: the
 smoothed output gives the coordinate and its rate, and the curve is what the integral of the
@@ -9,7 +9,7 @@ Dattner and C. A. J. Klaassen, Electron. J. Stat. 9, 2015).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -44,6 +44,31 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
     visited = h.whitened.motion(h.minimum.theta)[argument]
     curve = FreeCurve(argument, float(visited.min()), float(visited.max()), h.model, FINE)
     return fitted(nominal, [*effects, curve.candidate(site)], h.whitened.records, [h.point], 1)
+
+
+def with_free_input(nominal: Model, h: Hypothesis, name: str, site: Site) -> Hypothesis | None:
+    """A hypothesis and a free curve of an input in what acts, refitted from where it stands."""
+    problem = h.whitened.problem
+    at = nominal.input_names.index(name)
+    visited = np.concatenate([e.held[at].values for e in problem.experiments])
+    return _beside(nominal, h, name, visited, nominal.input(name).unit, FreeCurve.of_input, site)
+
+
+def with_free_sensor(nominal: Model, h: Hypothesis, site: Site) -> Hypothesis | None:
+    """A hypothesis and a free curve of the site's output in what it shows, refitted."""
+    problem, output = h.whitened.problem, site.output
+    visited = np.concatenate([s.y for e in problem.experiments for s in e.samples
+                              if problem.model.outputs[s.output].name == output.name])
+    return _beside(nominal, h, output.name, visited, output.unit, FreeCurve.of_sensor, site)
+
+
+def _beside(nominal: Model, h: Hypothesis, name: str, visited: np.ndarray, unit: str,
+            effect: Callable[[FreeCurve, Site], Candidate], site: Site) -> Hypothesis | None:
+    low, high = float(visited.min()), float(visited.max())
+    if low == high:
+        return None
+    curve = FreeCurve(name, low, high, h.model, FINE, unit)
+    return fitted(nominal, [*h.effects, effect(curve, site)], h.whitened.records, [h.point], 1)
 
 
 def share_lacking(base: Hypothesis, argument: str, site: Site) -> float:

@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline
 from pikanid.approximators.bspline import knots_from_breakpoints
 from pikanid.formula import units
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
-from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
@@ -99,14 +99,16 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
 
 
 class FreeCurve:
-    """Cubic splines of a state as truncated powers, of the argument scaled to ±1.
+    """Cubic splines of a state, an input or an output as truncated powers, of the argument scaled
+    to ±1.
 
     Without the straight line, which belongs to the free parameters.
     """
 
     def __init__(self, argument: str, low: float, high: float, model: Model,
-                 intervals: int = INTERVALS):
-        self.argument, self.unit = argument, model.state(argument).unit
+                 intervals: int = INTERVALS, unit: str | None = None):
+        self.argument = argument
+        self.unit = model.state(argument).unit if unit is None else unit
         self.low, self.high = low, high
         self.inner = np.linspace(-1.0, 1.0, intervals + 1)[1:-1]
         self.name = "delta"
@@ -124,19 +126,41 @@ class FreeCurve:
             np.maximum(z - k, 0.0) ** 3 for k in self.inner)])
 
     def candidate(self, site: Site) -> Candidate:
-        """The edge as an effect whose coefficients are estimated."""
+        """The edge as a force whose coefficients are estimated."""
+        return self._effect(site, "dynamics", site.force_unit,
+                            lambda m: m.with_term(site.v, self.formula))
+
+    def of_input(self, site: Site) -> Candidate:
+        """The edge as what an input does beside what is recorded of it."""
+        return self._effect(site, "input", self.unit, lambda m: m.map_input(
+            self.argument, function=f"{self.argument} + {self.formula}"))
+
+    def of_sensor(self, site: Site) -> Candidate:
+        """The edge as what an output shows beside what it should."""
+        return self._effect(site, "sensor", self.unit, lambda m: m.map_output(
+            self.argument, function=f"{self.argument} + {self.formula}"))
+
+    @property
+    def _shapes(self) -> list[str]:
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         z = f"(({self.argument} - ({middle!r}))/{half!r})"
-        shapes = ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
-                                              for k in map(float, self.inner))]
-        text = " + ".join(f"{n}*{p}" for n, p in zip(self.names, shapes, strict=True))
+        return ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
+                                            for k in map(float, self.inner))]
+
+    @property
+    def formula(self) -> str:
+        """Of the argument and the coefficients."""
+        return " + ".join(f"{n}*{p}" for n, p in zip(self.names, self._shapes, strict=True))
+
+    def _effect(self, site: Site, channel: Channel, unit: str,
+                extend: Callable[[Model], Model]) -> Candidate:
         # z is a number, but carries the unit of what it is made from
-        own = [units.product((site.force_unit, 1), (self.unit or "1", -power))
-               for power in (0, 2, *(3 for _ in shapes[2:]))]
-        return Candidate(("patch",), "a KAN edge", text, "dynamics", site,
+        own = [units.product((unit or "1", 1), (self.unit or "1", -power))
+               for power in (0, 2, *(3 for _ in self.names[2:]))]
+        return Candidate(("patch",), "a KAN edge", self.formula, channel, site,
                          tuple(Parameter(n, 0.0, unit)
                                for n, unit in zip(self.names, own, strict=True)),
-                         lambda m: m.with_term(site.v, text), lambda view: (), known=False)
+                         extend, lambda view: (), known=False)
 
     def extended(self, nominal: Model, site: Site, found: Hypothesis) -> Model:
         """The nominal model, at the estimates, with the edge as a B-spline."""

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pikanid.mismatch.beyond.free_channels import sure_channels
-from pikanid.mismatch.beyond.free_curve import share_lacking, with_free_curve
+from pikanid.mismatch.beyond.free_curve import (
+    share_lacking,
+    with_free_curve,
+    with_free_input,
+    with_free_sensor,
+)
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
@@ -29,6 +34,7 @@ from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.neighbours import beside, with_next_form, with_relatives
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.search.search import Search
+from pikanid.model import Model
 
 CURVES = ("input curve", "sensor curve")  # definition: families of laws of one channel
 
@@ -123,8 +129,9 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
                                      f"depend on leaves {kappa:.2g} times as much in its place, "
                                      f"{rule.dominance:.2g} are asked"))
             continue
-        if p.names and argument and members:
-            beside = _left_with_curve(case, h, h.effects, argument, p.effect.site, noise)
+        if p.names and members:
+            beside = min((_left(case, found, noise) for found in _with_its_form_free(
+                case.model, h, p, argument)), default=np.inf)
             if not smaller(own_left / max(beside, rule.floor), rule.form):
                 p = replace(p, names=())
         present.append(replace(p, dominance=min(p.dominance, float(kappa))))
@@ -151,9 +158,24 @@ def _argument(p: Present) -> str:
     return states.get(p.family, p.effect.argument)
 
 
+def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present, argument: str,
+                        ) -> Iterator[Hypothesis | None]:
+    """An explanation with a free curve beside a named effect, of what that one's law depends on."""
+    site = p.effect.site
+    if p.family == "input curve":
+        yield from (with_free_input(nominal, h, u, site) for u in site.inputs)
+    elif p.family == "sensor curve":
+        yield with_free_sensor(nominal, h, site)
+    elif argument:
+        yield with_free_curve(nominal, h, h.effects, argument, site)
+
+
 def _left_with_curve(case: Case, h: Hypothesis, effects: Sequence[Candidate], argument: str,
                      site: Site, noise: Sequence[dict[str, float]]) -> float:
     """What these effects and a free curve of a state leave; infinite where that cannot be run."""
-    found = with_free_curve(case.model, h, effects, argument, site)
+    return _left(case, with_free_curve(case.model, h, effects, argument, site), noise)
+
+
+def _left(case: Case, found: Hypothesis | None, noise: Sequence[dict[str, float]]) -> float:
     after = None if found is None else case.predicted(found)
     return np.inf if found is None or after is None else left_over(found, after, noise)
