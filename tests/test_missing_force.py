@@ -61,7 +61,7 @@ def test_without_held_out_the_end_has_to_be_predicted() -> None:
     assert dx.verdict == "unconfirmed"
     assert dx.hypotheses[0].effects[0].ids == ("coulomb_friction",)
     assert dx.held_out is not None and dx.held_out.rmse_after < 0.3 * dx.held_out.rmse_before
-    assert dx.held_out.t.min() >= 13.9  # of 20 s
+    assert dx.held_out.curves["theta"].t.min() >= 13.9  # of 20 s
     assert "held-out" in dx.next_experiment and dx.shape is not None
     assert dx.force_over_time is not None and dx.where.time == dx.force_over_time.windows
     assert len(dx.plot().subfigs) == 2

@@ -85,16 +85,15 @@ def test_a_prediction_is_judged_in_each_output_s_own_unit() -> None:
 
 def test_a_proof_is_told_output_by_output() -> None:
     proof = Proof({"theta": OutputError(0.01, 0.002, 0.002, 0.002, "rad"),
-                   "swing": OutputError(4.0, 0.31, 0.3, 0.3, "mm")}, 0.4,
-                  *(np.zeros(3),) * 5)
+                   "swing": OutputError(4.0, 0.31, 0.3, 0.3, "mm")}, 0.4, {})
     assert not proof.sensitive(DEFAULTS)
     assert Proof({**proof.outputs, "swing": OutputError(4.0, 1.0, 0.3, 0.3, "mm")}, 0.4,
-                 *(np.zeros(3),) * 5).sensitive(DEFAULTS)
+                 {}).sensitive(DEFAULTS)
     content = proof.to_dict()
     assert content["rmse_after"] == 0.002 and content["unit"] == "rad"
     assert content["outputs"]["swing"] == {
         "rmse_before": 4.0, "rmse_after": 0.31, "noise": 0.3, "unit": "mm"}
-    assert "outputs" not in Proof({"theta": proof.first}, 0.4, *(np.zeros(3),) * 5).to_dict()
+    assert "outputs" not in Proof({"theta": proof.first}, 0.4, {}).to_dict()
 
 
 def test_what_is_missing_in_the_second_coordinate_is_found_there() -> None:

@@ -13,7 +13,7 @@ hidden mode, memory, something that happens once, or of second order: then nothi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -43,7 +43,7 @@ class Edge:
 
     `own` is the share of what all edges explain that no other edge can; `alone` the share that this
     one can without the others, and `curve` what the data say of it then, for laws to be compared
-    with.
+    with.  `law` (G,) is what the law that was found would look like here, where there is one.
     """
 
     argument: str
@@ -54,15 +54,19 @@ class Edge:
     p_value: float
     alone: float
     curve: Curve = field(repr=False)
+    law: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class ForceShape:
-    """All edges, and whether a static law can be all that is missing (None: not to be told)."""
+    """All edges, whether a static law can be all that is missing (None: not to be told), and χ² per
+    degree of freedom that the edges leave: what they cannot follow makes them as unsure.
+    """
 
     edges: tuple[Edge, ...]
     unit: str
     static_law: Literal[True] | None
+    left: float = 1.0
 
     def depends_on(self, settings: Settings) -> tuple[str, ...]:
         """Arguments whose edge the others cannot replace."""
@@ -78,44 +82,89 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
         site: Coordinate.
         candidates: That the rest is tested against.
     """
-    names = [*site.moving, *site.inputs]
-    splines = [_Spline() for _ in names]
-    whitened, fit = base.whitened, base.minimum
-    found = directions(whitened, fit.theta,
-                       [_candidate(site, n, s) for n, s in zip(names, splines, strict=True)])
-    D, owner = found.D, found.owner
-    D = np.vstack([D, np.zeros((len(fit.r) - len(D), D.shape[1]))])
-    size = np.linalg.norm(D, axis=0)
-    size = np.where(size > 0, size, np.inf)
-    rest, target = project(fit.J, D), project(fit.J, -fit.r)
-    coefficients, covariance = _smoothed(rest / size, target, owner, size)
-    everything = _explained(rest / size, target)
-    edges = []
-    for k, (name, spline) in enumerate(zip(names, splines, strict=True)):
+    edges = _Edges(base, site)
+    whitened, fit, found = base.whitened, base.minimum, edges.found
+    scaled, owner = edges.rest / edges.size, found.owner
+    target = project(fit.J, -fit.r)
+    smooth = _Smoother(scaled, target, owner, edges.size)
+    coefficients, covariance = smooth.coefficients(target), smooth.covariance
+    everything = _explained(scaled, target)
+    drawn = []
+    for k, name, spline in edges.shown():
         own = owner == k
-        if not own.any():
-            continue
-        alone, rank = _explained((rest / size)[:, ~own], target)
+        alone, rank = _explained(scaled[:, ~own], target)
         gain, freedom = everything[0] - alone, everything[1] - rank
-        line = spline.sites()
-        removed = np.linalg.norm(rest[:, own] @ line) < (
-            whitened.settings.beyond.line * np.linalg.norm(D[:, own] @ line))
-        values, std = spline.drawn(coefficients[own], covariance[np.ix_(own, own)], bool(removed))
-        seen = _without_constant(rest[:, own])
+        removed = edges.without_line(k)
+        values, std = spline.drawn(coefficients[own], covariance[np.ix_(own, own)], removed)
+        seen = _without_constant(edges.rest[:, own])
         at = spline.typical()
         curve = Curve.of_likelihood(
             at, spline.matrix(at), coefficients[own], covariance[np.ix_(own, own)], seen.T @ seen,
             seen.T @ target, samples=len(target),
             free=at[:, None] if removed else np.empty((len(at), 0)), argument=name,
             unit=site.force_unit)
-        lone = _explained((rest / size)[:, own], target)[0]
-        edges.append(Edge(name, spline.grid, values, std,
+        lone = _explained(scaled[:, own], target)[0]
+        drawn.append(Edge(name, spline.grid, values, std,
                           float(gain / max(everything[0], 1e-300)),
                           float(chi2.sf(gain, freedom)) if freedom > 0 else 1.0,
                           float(lone / max(everything[0], 1e-300)), curve))
-    left = residual_tests(whitened, fit.theta, fit.r, np.hstack([fit.J, D]), candidates, site.rate)
+    left = residual_tests(whitened, fit.theta, fit.r, np.hstack([fit.J, edges.D]), candidates,
+                          site.rate)
     static: Literal[True] | None = True if left.p_value >= whitened.settings.refusal else None
-    return ForceShape(tuple(edges), site.force_unit, static)
+    spare = max(whitened.rows - everything[1] - fit.J.shape[1], 1)
+    return ForceShape(tuple(drawn), site.force_unit, static,
+                      float((target @ target - everything[0]) / spare))
+
+
+def with_law(shape: ForceShape, base: Hypothesis, site: Site, law: Hypothesis) -> ForceShape:
+    """The shape with what a fitted law would look like in it: its change of the outputs, refit
+    included, projected and smoothed as the recordings were; as it was where that cannot be.
+    """
+    whitened, fit = base.whitened, base.minimum
+    change = [other.y - own.y if other.y.shape == own.y.shape else None for own, other in zip(
+        whitened.responses(fit.theta), law.whitened.responses(law.minimum.theta), strict=True)]
+    parts = [whitened.whiten(r, c) for r, c in enumerate(change) if c is not None]
+    seen = np.concatenate([*parts, np.zeros(len(fit.r) - sum(map(len, parts)))])
+    if len(parts) < len(change) or not np.isfinite(seen).all():
+        return shape
+    edges = _Edges(base, site)
+    smooth = _Smoother(edges.rest / edges.size, project(fit.J, -fit.r), edges.found.owner,
+                       edges.size)
+    coefficients = smooth.coefficients(project(fit.J, seen))
+    laws = {name: spline.drawn(coefficients[edges.found.owner == k], None, edges.without_line(k))[0]
+            for k, name, spline in edges.shown()}
+    return replace(shape, edges=tuple(replace(e, law=laws[e.argument]) for e in shape.edges))
+
+
+class _Edges:
+    """What every coefficient of every edge would show, as it is (rows, n) and without what the free
+    parameters can do in its place.
+    """
+
+    def __init__(self, base: Hypothesis, site: Site) -> None:
+        self.names = [*site.moving, *site.inputs]
+        self.splines = [_Spline() for _ in self.names]
+        fit = base.minimum
+        self.found = directions(
+            base.whitened, fit.theta,
+            [_candidate(site, n, s) for n, s in zip(self.names, self.splines, strict=True)])
+        D = self.found.D
+        self.D = np.vstack([D, np.zeros((len(fit.r) - len(D), D.shape[1]))])
+        size = np.linalg.norm(self.D, axis=0)
+        self.size = np.where(size > 0, size, np.inf)
+        self.rest = project(fit.J, self.D)
+        self._line = base.whitened.settings.beyond.line
+
+    def shown(self) -> list[tuple[int, str, _Spline]]:
+        """Number, argument and basis of the edges that show."""
+        return [(k, name, spline) for k, (name, spline) in enumerate(
+            zip(self.names, self.splines, strict=True)) if (self.found.owner == k).any()]
+
+    def without_line(self, k: int) -> bool:
+        """Whether the free parameters can do a straight line along that argument."""
+        own, line = self.found.owner == k, self.splines[k].sites()
+        return bool(np.linalg.norm(self.rest[:, own] @ line) < (
+            self._line * np.linalg.norm(self.D[:, own] @ line)))
 
 
 class _Spline:
@@ -149,7 +198,7 @@ class _Spline:
         """Where the edge is drawn (G,)."""
         return np.linspace(self.visits.min(), self.visits.max(), GRID)
 
-    def drawn(self, coefficients: np.ndarray, covariance: np.ndarray, without_line: bool
+    def drawn(self, coefficients: np.ndarray, covariance: np.ndarray | None, without_line: bool
               ) -> tuple[np.ndarray, np.ndarray]:
         """Values and standard errors (G,), without their mean over the visits (and their line)."""
         seen = self.matrix(self.visits[:: max(len(self.visits) // 2000, 1)])
@@ -158,7 +207,8 @@ class _Spline:
         if without_line:
             X, at = np.column_stack([X, x]), np.column_stack([at, self.grid])
         basis = self.matrix(self.grid) - at @ np.linalg.lstsq(X, seen, rcond=None)[0]
-        spread = np.einsum("gi,ij,gj->g", basis, covariance, basis)
+        spread = np.zeros(GRID) if covariance is None else np.einsum(
+            "gi,ij,gj->g", basis, covariance, basis)
         return basis @ coefficients, np.sqrt(np.maximum(spread, 0.0))
 
 
@@ -175,36 +225,48 @@ def _candidate(site: Site, name: str, spline: _Spline) -> Candidate:
                      variant=name)
 
 
-def _smoothed(rest: np.ndarray, target: np.ndarray, owner: np.ndarray, size: np.ndarray
-              ) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients (n,) and their covariance, in the units of the force.
+class _Smoother:
+    """Coefficients (n,) and their covariance, in the units of the force, of any target (rows,); how
+    smooth they are is chosen by one.
 
     Directions that the gauge leaves nothing of stay at zero.
     """
-    u, s, vt = np.linalg.svd(rest, full_matrices=False)
-    kept = s > GAUGE
-    u, s, vt = u[:, kept], s[kept], vt[kept]
+
+    def __init__(self, rest: np.ndarray, target: np.ndarray, owner: np.ndarray, size: np.ndarray):
+        u, s, vt = np.linalg.svd(rest, full_matrices=False)
+        kept = s > GAUGE
+        u, s, vt = u[:, kept], s[kept], vt[kept]
+        penalty = vt @ _rough(owner, size) @ vt.T
+        pull = u.T @ target
+        count = len(target)
+        best, chosen = np.inf, np.diag(s**2)
+        scale = np.trace(np.diag(s**2)) / max(np.trace(penalty), 1e-300)
+        for rho in scale * RIDGES:
+            normal = np.diag(s**2) + rho * penalty
+            hat = s[:, None] * np.linalg.solve(normal, np.diag(s))
+            left = float(target @ target - pull @ (2 * hat - hat.T @ hat) @ pull)
+            score = count * left / (count - np.trace(hat)) ** 2
+            if score < best:
+                best, chosen = score, normal
+        inverse = np.linalg.inv(chosen) if len(s) else np.zeros((0, 0))
+        back = vt.T / size[:, None]
+        self._u, self._s, self._solve = u, s, back @ inverse
+        self.covariance = back @ inverse @ back.T
+
+    def coefficients(self, target: np.ndarray) -> np.ndarray:
+        """Of a target without what the free parameters can do."""
+        return np.asarray(self._solve @ (self._s * (self._u.T @ target)))
+
+
+def _rough(owner: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Sum of squared second differences of the coefficients of each edge (n, n)."""
     rough = np.zeros((0, len(owner)))
     for k in np.unique(owner):
         own = np.flatnonzero(owner == k)
         second = np.zeros((max(len(own) - 2, 0), len(owner)))
         second[:, own] = np.diff(np.eye(len(own)), 2, axis=0)
         rough = np.vstack([rough, second / size])
-    penalty = vt @ (rough.T @ rough) @ vt.T
-    pull = u.T @ target
-    count = len(target)
-    best, chosen = np.inf, np.diag(s**2)
-    scale = np.trace(np.diag(s**2)) / max(np.trace(penalty), 1e-300)
-    for rho in scale * RIDGES:
-        normal = np.diag(s**2) + rho * penalty
-        hat = s[:, None] * np.linalg.solve(normal, np.diag(s))
-        left = float(target @ target - pull @ (2 * hat - hat.T @ hat) @ pull)
-        score = count * left / (count - np.trace(hat)) ** 2
-        if score < best:
-            best, chosen = score, normal
-    inverse = np.linalg.inv(chosen) if len(s) else np.zeros((0, 0))
-    back = vt.T / size[:, None]
-    return back @ inverse @ (s * pull), back @ inverse @ back.T
+    return np.asarray(rough.T @ rough)
 
 
 def _without_constant(columns: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: where in time, the missing force, the proof on held-out data."""
+"""Figures of a diagnosis: the proof on held-out data, where in time, the missing force."""
 
 from __future__ import annotations
 
@@ -6,99 +6,155 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pikanid.figures import labelled, new_figure
-from pikanid.mismatch.report.findings import DiagnosisData, Proof
+from pikanid.figures import WIDE, labelled, new_figure, tidy
+from pikanid.mismatch.report.findings import Curves, DiagnosisData, OutputError
 
 if TYPE_CHECKING:
-    import matplotlib.figure
+    from collections.abc import Callable
 
-    from pikanid.mismatch.beyond.force_shape import ForceShape
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, FigureBase
+
+    from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
     from pikanid.mismatch.beyond.latent_force import ForceOverTime
     from pikanid.mismatch.beyond.patch import Patch
 
+    Piece = tuple[float, Callable[[FigureBase], None]]
+
 BEFORE, AFTER, MOVED = "#c2410c", "#1d4ed8", "#15803d"
-DATA, LOUD = "#9ca3af", "#fde68a"
+DATA, LOUD = "#9ca3af", "#d97706"
 STRETCHES = 6  # layout: of a held-out recording, of which one is shown
+ROW, WIDTH = 2.4, 9.0  # layout: inches
+STRIP = 0.04  # layout: height of the strip that marks a mismatch, of its axes
 
 
-def plot_diagnosis(dx: DiagnosisData) -> matplotlib.figure.Figure:
-    """Residual of the nominal and of the extended model over time, and the force that would explain
-    it, the seconds of the mismatch shaded; below, with a held-out recording, its prediction before
-    and after and what each leaves; at the bottom the missing force over states and inputs, with its
-    95 % band.
+def plot_diagnosis(dx: DiagnosisData) -> Figure:
+    """All of it in one figure: the held-out recording before and after, where in time something is
+    missing, and the missing force over states and inputs.
     """
-    force = dx.force_over_time
-    first = 1 if force is None else 2
-    rows = first if dx.held_out is None else first + 2
-    shape = dx.shape if dx.shape is not None and (dx.shape.edges or dx.patch) else None
-    figure = new_figure(9.0, 2.6 * (rows + (shape is not None)))
-    upper: matplotlib.figure.FigureBase = figure
-    if shape is not None:
-        upper, lower = figure.subfigures(
-            2, 1, squeeze=False, height_ratios=[rows, 1.2])[:, 0]
-        _shape(lower, shape, dx.patch)
-    axes = np.atleast_1d(upper.subplots(rows, 1))
-    _train(axes[0], dx)
-    if force is not None:
-        _force(axes[1], force, 1 - dx.settings.band)
-        axes[1].sharex(axes[0])
-    why = "band excludes zero" if force is not None and force.resolved else "louder than noise"
-    for axis in axes[:first]:
-        for k, (start, stop) in enumerate(dx.where.time):
-            axis.axvspan(start, stop, color=LOUD, alpha=0.6, lw=0, zorder=0,
-                         label=why if k == 0 else None)
-    if dx.held_out is not None:
-        proof, below = dx.held_out, axes[first:]
-        name = labelled(next(iter(proof.outputs)), proof.unit)
-        unit = f" {proof.unit}".rstrip()
-        below[0].plot(proof.t, proof.measured, ".", color=DATA, ms=3, label="measured",
-                      zorder=3)
-        below[0].plot(proof.t, proof.before, color=BEFORE, lw=1, label="nominal model")
-        below[0].set(ylabel=name, xlim=_furthest(proof), title="Held-out recording: prediction, "
-                     "where the nominal model is furthest off")
-        below[1].plot(proof.t, proof.measured - proof.before, color=BEFORE, lw=0.8,
-                     label=f"nominal: {proof.rmse_before:.3g}{unit}")
-        if dx.hypotheses:
-            below[0].plot(proof.t, proof.after, color=AFTER, lw=1, label="extended model")
-            below[1].plot(proof.t, proof.measured - proof.after, color=AFTER, lw=0.8,
-                         label=f"extended: {proof.rmse_after:.3g}{unit}")
-        if dx.hypotheses and proof.sensitive(dx.settings):
-            below[0].plot(proof.t, proof.moved, color=MOVED, lw=1, label="within its errors")
-            below[1].plot(proof.t, proof.measured - proof.moved, color=MOVED, lw=0.8,
-                          label=f"within its errors: {proof.rmse_moved:.3g}{unit}")
-        below[1].axhspan(-2 * proof.noise, 2 * proof.noise, color=DATA, alpha=0.3, lw=0,
-                        label="±2σ of the noise")
-        below[1].set(ylabel=name, title="Held-out recording: what is left, and its RMSE")
-    for axis in axes:
-        axis.margins(x=0.01)
-        if axis.get_autoscaley_on():
-            axis.margins(y=0.3)  # room for the legend
-        axis.legend(loc="upper right", fontsize=8, ncols=4)
-        axis.grid(alpha=0.2)
-    axes[-1].set_xlabel("t [s]")
+    return _drawn([*_proof(dx), *_where(dx), *_shape(dx)])
+
+
+def plot_proof(dx: DiagnosisData) -> Figure | None:
+    """Every output of the held-out recording: its prediction before and after, enlarged where the
+    nominal model is furthest off, and what each leaves; None without such a recording.
+    """
+    pieces = _proof(dx)
+    return _drawn(pieces) if pieces else None
+
+
+def plot_where(dx: DiagnosisData) -> Figure:
+    """What the models leave of the recording over time, and the force that would explain it."""
+    return _drawn(_where(dx))
+
+
+def plot_shape(dx: DiagnosisData) -> Figure | None:
+    """The missing force over every state and input with its 95 % band, and the law that was found,
+    seen in the same way; None where there is none.
+    """
+    pieces = _shape(dx)
+    return _drawn(pieces) if pieces else None
+
+
+def _drawn(pieces: list[Piece]) -> Figure:
+    heights = [height for height, _ in pieces]
+    figure = new_figure(WIDTH, ROW * sum(heights))
+    parts = figure.subfigures(len(pieces), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for part, (_, draw) in zip(parts, pieces, strict=True):
+        draw(part)
     return figure
 
 
-def _furthest(proof: Proof) -> tuple[float, float]:
+def _proof(dx: DiagnosisData) -> list[Piece]:
+    if dx.held_out is None:
+        return []
+    moved = bool(dx.hypotheses) and dx.held_out.sensitive(dx.settings)
+
+    def draw(figure: FigureBase, name: str, curves: Curves, error: OutputError) -> None:
+        near, left = figure.subplots(2, 1)
+        unit = f" {error.unit}".rstrip()
+        shown = [("nominal model", curves.before, BEFORE, error.before)]
+        if dx.hypotheses:
+            shown.append(("extended model", curves.after, AFTER, error.after))
+        if moved and curves.moved is not None:
+            shown.append(("within its errors", curves.moved, MOVED, error.moved))
+        near.plot(curves.t, curves.measured, ".", color=DATA, ms=3, label="measured", zorder=3)
+        span = _furthest(curves)
+        inside = (curves.t >= span[0]) & (curves.t <= span[1])
+        for label, y, colour, rmse in shown:
+            near.plot(curves.t, y, color=colour, lw=1.2, label=label)
+            left.plot(curves.t, curves.measured - y, color=colour, lw=0.8,
+                      label=f"{label}: {rmse:.3g}{unit}")
+        _reach(near, np.concatenate([curves.measured[inside], *(y[inside] for _, y, *_ in shown)]))
+        near.set_xlim(span)
+        left.axhspan(-2 * error.noise, 2 * error.noise, color=DATA, alpha=0.4, lw=0,
+                     label="±2σ of the noise")
+        left.axvspan(*span, ymax=STRIP, color=DATA, lw=0)
+        _finished(near, f"Held-out {name}, predicted, where the nominal model is furthest off",
+                  labelled(name, error.unit))
+        _finished(left, f"Held-out {name}: what is left, and its RMSE; marked: enlarged above",
+                  labelled("left", error.unit))
+        left.set_xlabel("t [s]")
+
+    return [(2.3, lambda f, n=name, c=curves: draw(f, n, c, dx.held_out.outputs[n]))  # type: ignore[misc]
+            for name, curves in dx.held_out.curves.items()]
+
+
+def _furthest(curves: Curves) -> tuple[float, float]:
     """The stretch [s] in which the nominal model leaves most, of those of equal length."""
-    edges = np.linspace(proof.t.min(), proof.t.max(), STRETCHES + 1)
-    which = np.clip(np.searchsorted(edges, proof.t, side="right") - 1, 0, STRETCHES - 1)
-    worst = int(np.argmax(np.bincount(which, (proof.measured - proof.before) ** 2, STRETCHES)))
+    edges = np.linspace(curves.t.min(), curves.t.max(), STRETCHES + 1)
+    which = np.clip(np.searchsorted(edges, curves.t, side="right") - 1, 0, STRETCHES - 1)
+    worst = int(np.argmax(np.bincount(which, (curves.measured - curves.before) ** 2, STRETCHES)))
     return float(edges[worst]), float(edges[worst + 1])
 
 
-def _train(axis: matplotlib.axes.Axes, dx: DiagnosisData) -> None:
-    fit = dx.before.fits[0]
-    axis.plot(fit.t, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
-    if dx.hypotheses:
-        after = dx.after.fits[0]
-        axis.plot(after.t, after.residual, color=AFTER, lw=0.8, label="extended model")
-    axis.set(ylabel=labelled(fit.output, fit.unit), title="What the model leaves of the recording")
+def _reach(axes: Axes, values: np.ndarray) -> None:
+    """Limits by what can be seen, with some room."""
+    seen = values[np.isfinite(values)]
+    low, high = (float(seen.min()), float(seen.max())) if len(seen) else (-1.0, 1.0)
+    room = 0.08 * (high - low) or 1.0
+    axes.set_ylim(low - room, high + room)
 
 
-def _force(axis: matplotlib.axes.Axes, force: ForceOverTime, level: float) -> None:
+def _finished(axes: Axes, title: str, ylabel: str) -> None:
+    """Title and legend above the axes: within, they would cover something."""
+    axes.set_ylabel(ylabel)
+    axes.set_title(title.replace("$", r"\$"), loc="left", fontsize="medium", pad=20)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize="small", ncols=5,
+                frameon=False, borderaxespad=0.1, handlelength=1.4, columnspacing=1.2)
+    tidy(axes)
+
+
+def _where(dx: DiagnosisData) -> list[Piece]:
+    force = dx.force_over_time
+
+    def draw(figure: FigureBase) -> None:
+        axes = np.atleast_1d(figure.subplots(1 if force is None else 2, 1, sharex=True))
+        why = "band excludes zero" if force is not None and force.resolved else "louder than noise"
+        fit = dx.before.fits[0]
+        axes[0].plot(fit.t, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
+        if dx.hypotheses:
+            after = dx.after.fits[0]
+            axes[0].plot(after.t, after.residual, color=AFTER, lw=0.8, label="extended model")
+        if force is not None:
+            _force(axes[1], force, 1 - dx.settings.band)
+        for axis in axes:
+            for k, (start, stop) in enumerate(dx.where.time):
+                axis.axvspan(start, stop, ymax=STRIP, color=LOUD, lw=0,
+                             label=why if k == 0 else None)
+        _finished(axes[0], f"What is left of {fit.output} in {fit.recording}",
+                  labelled("left", fit.unit))
+        if force is not None:
+            _finished(axes[1], "Force that would explain it, without what the free parameters can "
+                      "do", labelled("force", force.unit))
+        axes[-1].set_xlabel("t [s]")
+
+    return [(1.15 if force is None else 2.3, draw)]
+
+
+def _force(axis: Axes, force: ForceOverTime, level: float) -> None:
     for width, alpha, name in ((force.critical, 0.12, f"{100 * level:g} % band, at once"),
-                               (1.96, 0.25, "pointwise")):
+                               (WIDE, 0.25, "pointwise")):
         axis.fill_between(force.t, force.values - width * force.std,
                           force.values + width * force.std, color=AFTER, alpha=alpha, lw=0,
                           label=name)
@@ -107,30 +163,56 @@ def _force(axis: matplotlib.axes.Axes, force: ForceOverTime, level: float) -> No
     axis.axhline(0.0, color=DATA, lw=0.8)
     # a spike, as where a recording begins beside its model, must not flatten all the rest
     reach = np.quantile(np.abs(force.values) + force.critical * force.std, 0.98)
-    axis.set_ylim(-1.1 * reach, 1.7 * reach)
-    axis.set(ylabel=labelled("force", force.unit),
-             title="Force that would explain it, without what the free parameters can do")
+    axis.set_ylim(-1.2 * reach, 1.2 * reach)
 
 
-def _shape(figure: matplotlib.figure.FigureBase, shape: ForceShape, patch: Patch | None) -> None:
-    figure.suptitle("Missing force, without what the free parameters can do (to first order)",
-                    fontsize="medium")
-    count = len(shape.edges)
-    axes = np.atleast_1d(figure.subplots(1, count + (patch is not None)))
-    for axis, edge in zip(axes[:count], shape.edges, strict=True):
-        axis.fill_between(edge.grid, edge.values - 1.96 * edge.std, edge.values + 1.96 * edge.std,
-                          color=AFTER, alpha=0.2, lw=0)
-        axis.plot(edge.grid, edge.values, color=AFTER, lw=1.2)
-        axis.axhline(0.0, color=DATA, lw=0.8)
-        axis.set_xlabel(f"{edge.argument}\n({100 * edge.alone:.0f} % explained)")
-        axis.grid(alpha=0.2)
-    if patch is not None:
-        axis = axes[-1]
-        axis.fill_between(patch.grid, patch.values - 1.96 * patch.std,
-                          patch.values + 1.96 * patch.std, color=BEFORE, alpha=0.2, lw=0)
-        axis.plot(patch.grid, patch.values, color=BEFORE, lw=1.2)
-        axis.axhline(0.0, color=DATA, lw=0.8)
-        axis.set_title("KAN patch, refitted", fontsize="medium")
-        axis.set_xlabel(f"{patch.argument}\n(nothing beyond)")
-        axis.grid(alpha=0.2)
-    axes[0].set_ylabel(labelled("force", shape.unit))
+def _shape(dx: DiagnosisData) -> list[Piece]:
+    shape, patch = dx.shape, dx.patch
+    if shape is None or not (shape.edges or patch):
+        return []
+    found = shape
+
+    def draw(figure: FigureBase) -> None:
+        axes = np.atleast_1d(figure.subplots(1, len(found.edges) + (patch is not None)))
+        wider = max(found.left, 1.0) ** 0.5
+        for axis, edge in zip(axes[:len(found.edges)], found.edges, strict=True):
+            _edge(axis, edge, wider)
+        if patch is not None:
+            _patch(axes[-1], patch)
+        axes[0].set_ylabel(labelled("force", found.unit))
+        handles = {label: handle for axis in axes for handle, label in zip(
+            *axis.get_legend_handles_labels(), strict=True)}
+        figure.legend(handles.values(), handles.keys(), loc="outside upper left", ncols=4,
+                      fontsize="small", frameon=False, handlelength=1.4,
+                      title="Missing force, without what the free parameters can do (to first "
+                      "order)", title_fontsize="medium", alignment="left")
+
+    return [(1.5, draw)]
+
+
+def _edge(axis: Axes, edge: Edge, wider: float) -> None:
+    half = WIDE * wider * edge.std
+    axis.fill_between(edge.grid, edge.values - half, edge.values + half, color=AFTER, alpha=0.2,
+                      lw=0, label="95 % band")
+    axis.plot(edge.grid, edge.values, color=AFTER, lw=1.4, label="read off the recordings")
+    seen = [edge.values]
+    if edge.law is not None:
+        axis.plot(edge.grid, edge.law, color=BEFORE, lw=1.4, ls=(0, (4, 2)),
+                  label="the law that is given, seen in the same way")
+        seen.append(edge.law)
+    axis.axhline(0.0, color=DATA, lw=0.8)
+    low, high = np.min(seen), np.max(seen)
+    room = 0.5 * float(high - low) or 1.0
+    axis.set_ylim(max(float(np.min(edge.values - half)), low - room) - 0.1 * room,
+                  min(float(np.max(edge.values + half)), high + room) + 0.1 * room)
+    axis.set_xlabel(f"{edge.argument}\n({100 * edge.alone:.0f} % explained alone)")
+    tidy(axis)
+
+
+def _patch(axis: Axes, patch: Patch) -> None:
+    axis.fill_between(patch.grid, patch.values - WIDE * patch.std,
+                      patch.values + WIDE * patch.std, color=MOVED, alpha=0.2, lw=0)
+    axis.plot(patch.grid, patch.values, color=MOVED, lw=1.4, label="KAN patch, refitted")
+    axis.axhline(0.0, color=DATA, lw=0.8)
+    axis.set_xlabel(f"{patch.argument}\n(nothing beyond)")
+    tidy(axis)

@@ -111,16 +111,25 @@ class OutputError:
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
-    """Held-out record: errors of each output by name, p-value; and the first output's curves."""
+class Curves:
+    """One output of the first held-out recording: times (N,), what was measured and predicted
+    there, before and after; for the first output also with the parameters `moved`.
+    """
 
-    outputs: Mapping[str, OutputError]
-    p_value: float
     t: np.ndarray
     measured: np.ndarray
     before: np.ndarray
     after: np.ndarray
-    moved: np.ndarray
+    moved: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """Held-out record: errors of each output by name, p-value, and the curves of each by name."""
+
+    outputs: Mapping[str, OutputError]
+    p_value: float
+    curves: Mapping[str, Curves]
 
     def sensitive(self, settings: Settings) -> bool:
         """Whether the prediction depends on how exactly the parameters are known: after impacts, a
@@ -130,7 +139,7 @@ class Proof:
 
     @property
     def first(self) -> OutputError:
-        """Of the output that is drawn."""
+        """Of the first output."""
         return next(iter(self.outputs.values()))
 
     @property

@@ -33,12 +33,13 @@ def remainder(case: Case, answer: Answer, proof: Proof | None) -> Remainder | No
     if answer.part is None or proof is None:
         return None
     h, counts = answer.part.hypothesis, answer.part.overdispersion
+    first = next(iter(proof.curves.values()))
     before, after, rows = case.base.minimum.chi2, h.minimum.chi2, h.whitened.rows
     return Remainder(
         answer.part.share, 1 - max(after - rows, 0.0) / max(before - rows, 1e-12),
         proof.rmse_before, proof.rmse_after, proof.rmse_moved, proof.noise, proof.unit,
         proof.p_value, counts, rows * max(after / rows, 1.0) / counts,
-        median_frequency(proof.t, proof.measured - proof.after), loud_windows(h),
+        median_frequency(first.t, first.measured - first.after), loud_windows(h),
         tuple((d.family, d.why) for d in answer.part.doubtful))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pikanid.mismatch.beyond.force_shape import ForceShape
+from pikanid.mismatch.beyond.force_shape import ForceShape, with_law
 from pikanid.mismatch.beyond.latent_force import force_over_time
 from pikanid.mismatch.beyond.local_force import local_force
 from pikanid.mismatch.case import Case
@@ -11,14 +11,16 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate, widened
 from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.advice import advice
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import explanations
-from pikanid.mismatch.report.findings import OutputError, Proof
+from pikanid.mismatch.report.findings import Curves, OutputError, Proof
 from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.steps.remaining import present, remainder
+from pikanid.problem.problem import bind
 
 
 def reported(case: Case, detection: Detection, answer: Answer, site: Site,
@@ -50,6 +52,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     local = local_force(
         case.base, case.model, shape, site, answer.given[0] if answer.given else None) if (
             shape is not None and answer.verdict not in ("named", "set")) else None
+    if shape is not None and answer.given:
+        shape = with_law(shape, case.base, site, answer.given[0])
     return Diagnosis(
         answer.verdict, detection.p_value, case.settings,
         locate(case.base, best, answer, site, shape, force, case.candidates, local),
@@ -80,5 +84,17 @@ def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
                                    after.rmse_moved[o.name],
                                    case.later.levels[0][o.name].sigma * share, o.unit)
                for o in case.model.outputs}
-    return Proof(outputs, after.detection.p_value, after.t, after.measured, before.predicted,
-                 after.predicted, after.moved)
+    return Proof(outputs, after.detection.p_value, _curves(case, before, after))
+
+
+def _curves(case: Case, before: HeldOut, after: HeldOut) -> dict[str, Curves]:
+    """Of every output of the first held-out recording; a residual is predicted minus measured."""
+    assert case.later is not None
+    found: dict[str, Curves] = {}
+    measured = {case.model.outputs[s.output].name: s.y
+                for s in bind(case.model, case.later.recordings[0]).samples}
+    for (r, name, t, old), (*_, new) in zip(before.residuals, after.residuals, strict=True):
+        if r == 0:
+            y = measured[name]
+            found[name] = Curves(t, y, y + old, y + new, None if found else after.moved)
+    return found
