@@ -64,4 +64,8 @@ def test_without_held_out_the_end_has_to_be_predicted() -> None:
     assert dx.held_out.curves["theta"].t.min() >= 13.9  # of 20 s
     assert "held-out" in dx.next_experiment and dx.shape is not None
     assert dx.force_over_time is not None and dx.where.time == dx.force_over_time.windows
-    assert len(dx.plot().subfigs) == 2
+    assert len(dx.plot().subfigs) == 3
+    edge = next(e for e in dx.shape.edges if e.argument == "theta_dot")
+    assert edge.law is not None  # what is given looks as what was read off the recording
+    assert np.all(np.abs(edge.law - edge.values) < 4 * edge.std)
+    assert np.std(edge.law) > 4 * np.mean(edge.std)

@@ -97,7 +97,8 @@ def validate(
     if report is not None:
         from pikanid.reporting.validation_page import page
 
-        made[report] = page(found, ", ".join(r.name for r in records)).encode()
+        made[report] = page(found, ", ".join(r.name for r in records),
+                            dict(zip(compared, bare, strict=True))).encode()
     written(made, json_, found.to_dict())
     if not quiet and json_ != STDOUT:
         from pikanid.reporting.validation_tables import show_validation

@@ -6,7 +6,9 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from pikanid.estimate.estimate import rounded
-from pikanid.reporting.document import document, drawn
+from pikanid.mismatch.report.drawing import plot_proof, plot_shape, plot_where
+from pikanid.reporting.document import document, drawn, tabled
+from pikanid.reporting.sheet import Sheet
 
 if TYPE_CHECKING:
     from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -14,22 +16,47 @@ if TYPE_CHECKING:
 
 
 def page(dx: Diagnosis, title: str) -> str:
-    """The page: verdict, where, what, proof, what next; figures inside.
+    """The page: the verdict, the picture that proves it, what, where, what lost, what next.
 
     Args:
         dx: To show.
         title: Such as the name of the recording.
     """
-    parts = [
+    notes = "".join(f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes))
+    return document(title, [
         f"<h1>What is missing? {escape(title)}</h1>",
         f'<p class="verdict {dx.verdict}">{escape(dx.sentence())}</p>',
-        _where(dx) if dx.mismatch else "",
-        _surely(dx), _what(dx), _figure(dx), _proof(dx), _patch(dx), _next(dx),
-        "<h2>Noise and notes</h2><ul>" + "".join(
-            f"<li>{escape(note)}</li>" for note in (*dx.noise, *dx.notes)) + "</ul>",
+        _proof(dx), _surely(dx), _what(dx), _parameters(dx), _shape(dx),
+        _where(dx) if dx.mismatch else "<h2>What the model leaves of the recording</h2>",
+        drawn(plot_where(dx), "what is left over time, and the force that would explain it"),
+        _lost(dx), _patch(dx), _next(dx),
+        f"<h2>Noise and notes</h2><ul>{notes}</ul>",
         f'<p class="small">p = {dx.p_value:.2g} at a false-alarm rate of {dx.alpha:g}; '
-        f"{dx.seconds:.1f} s. {escape(str(dx.settings))}</p>"]
-    return document(title, parts, dx.before.model, [f.recording for f in dx.before.fits])
+        f"{dx.seconds:.1f} s. {escape(str(dx.settings))}</p>"],
+        {f"Nominal model: {dx.before.model.name}": dx.before.model},
+        [f.recording for f in dx.before.fits])
+
+
+def _proof(dx: Diagnosis) -> str:
+    """The held-out recording, before and after."""
+    proof, figure = dx.held_out, plot_proof(dx)
+    if proof is None or figure is None:
+        why = dx.doubt or "there is no held-out recording"
+        return f"<p>Nothing is proved: {escape(why)}.</p>"
+    moved = bool(dx.hypotheses) and proof.sensitive(dx.settings)
+    headers = ("held-out output", "RMSE before", "RMSE after",
+               *(["with parameters moved within their errors"] if moved else []), "noise", "unit")
+    rows = tuple((name, f"{e.before:.3g}", f"{e.after:.3g}",
+                  *([f"{e.moved:.3g}"] if moved else []), f"{e.noise:.3g}", e.unit or "-")
+                 for name, e in proof.outputs.items())
+    judged = ("what is left is noise" if proof.p_value >= dx.settings.adequate
+              else "something else is left than noise")
+    return ("<h2>The held-out recording, before and after</h2>"
+            f"{drawn(figure, 'held-out outputs, predicted before and after')}"
+            f"{tabled(Sheet(headers, rows))}<p>Of the extended model {judged} "
+            f"(p = {proof.p_value:.2g}).</p>" if dx.hypotheses else
+            "<h2>The held-out recording</h2>"
+            f"{drawn(figure, 'held-out outputs, predicted')}{tabled(Sheet(headers, rows))}")
 
 
 def _where(dx: Diagnosis) -> str:
@@ -64,79 +91,64 @@ def _surely(dx: Diagnosis) -> str:
     """What is there whatever is left, and what is left."""
     if dx.remainder is None:
         return ""
-    rows = []
-    for p in dx.present:
-        values = "<br>".join(
-            f"{escape(n)} = {rounded(v.value, p.std_with_remainder[n])} {escape(v.unit)}"
-            for n, v in p.parameters.items())
-        here = escape(p.name) if p.ids else (
-            f"{escape(p.name)}<br><span class=small>its form is not sure: compared with "
-            f"{escape(', '.join(p.compared))}</span>" if p.compared else escape(p.name))
-        rows.append(f"<tr><td><b>{escape(p.family)}</b></td><td>{here}</td><td>{values}</td>"
-                    f"<td>{'no other explains it' if p.dominance is None else f'{p.dominance:.2g}'}"
-                    "</td></tr>")
+    sheet = Sheet(("family", "here as", "values, with errors that count the remainder",
+                   "times as much left without it"), tuple((
+                       p.family,
+                       p.name + ("" if p.ids or not p.compared else
+                                 f" (not sure; compared with {', '.join(p.compared)})"),
+                       "; ".join(
+                           f"{n} = {rounded(v.value, p.std_with_remainder[n])} {v.unit}".rstrip()
+                           for n, v in p.parameters.items()),
+                       "no other explains it" if p.dominance is None else f"{p.dominance:.2g}")
+                       for p in dx.present))
     left = "".join(f"<li>{escape(line)}.</li>" for line in dx.remainder.lines())
-    return ("<h2>Surely there</h2><div class=wide><table><tr><th>family</th><th>here as</th>"
-            "<th>values, with standard errors that count the remainder</th>"
-            "<th>times as much left without it</th>"
-            f"</tr>{''.join(rows)}</table></div><p>{escape(dx.remainder.sentence())}.</p>"
-            f"<ul>{left}</ul>")
+    return (f"<h2>Surely there</h2>{tabled(sheet)}"
+            f"<p>{escape(dx.remainder.sentence())}.</p><ul>{left}</ul>")
 
 
 def _what(dx: Diagnosis) -> str:
-    if not dx.hypotheses and not dx.rejected:
-        return ""
-    text = "<h2>What</h2>" + "".join(_explanation(h, dx.odds(h)) for h in dx.hypotheses)
-    if dx.hypotheses:
-        text += _parameters(dx)
-    if dx.rejected:
-        rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(why)}</td></tr>"
-                       for title, why in dx.not_given)
-        text += f"<p>Tried and not given:</p><div class=wide><table>{rows}</table></div>"
-    return text
+    return "<h2>What</h2>" + "".join(
+        _explanation(h, dx.odds(h)) for h in dx.hypotheses) if dx.hypotheses else ""
 
 
 def _explanation(h: Explanation, odds: str) -> str:
-    rows = "".join(
-        f"<tr><td>{escape(n)}</td><td>{rounded(v.value, v.std)}</td>"
-        f"<td>{escape(v.unit)}</td></tr>"
-        for e in h.effects for n, v in e.parameters.items())
     formulas = "".join(f"<li>{escape(e.name)} ({escape(' or '.join(e.ids))}): "
                        f"<code>{escape(e.expression)}</code></li>" for e in h.effects)
-    return (f"<p><b>{escape(h.title)}</b>{escape(odds)}</p>"
-            f"<ul>{formulas}</ul>"
-            f"<div class=wide><table>{rows}</table></div>")
+    values = Sheet(("parameter", "estimate ± std. error", "unit"), tuple(
+        (n, rounded(v.value, v.std), v.unit or "-")
+        for e in h.effects for n, v in e.parameters.items()))
+    return (f"<p><b>{escape(h.title)}</b>{escape(odds)}</p><ul>{formulas}</ul>"
+            f"{tabled(values) if values.rows else ''}")
 
 
 def _parameters(dx: Diagnosis) -> str:
+    """Of the model, before and after."""
+    if not dx.hypotheses:
+        return ""
     before, after = ({f.label: rounded(float(v), found.covariance[k, k] ** 0.5)
                       for k, (f, v) in enumerate(zip(found.free, found.theta, strict=True))}
                      for found in (dx.before, dx.after))
-    rows = "".join(
-        f"<tr><td>{escape(f.label)}</td><td>{before[f.label]}</td>"
-        f"<td>{after[f.label]}</td><td>{escape(f.unit)}</td></tr>"
-        for f in dx.after.free if f.label in before)
-    return ("<div class=wide><table><tr><th>parameter</th><th>before</th><th>after</th><th></th>"
-            f"</tr>{rows}</table></div>")
+    return "<h2>The model's parameters</h2>" + tabled(Sheet(
+        ("parameter", "before", "after", "unit"),
+        tuple((f.label, before[f.label], after[f.label], f.unit or "-")
+              for f in dx.after.free if f.label in before)))
 
 
-def _figure(dx: Diagnosis) -> str:
-    return f"<h2>Proof</h2>{drawn(dx.plot(), 'residuals before and after')}"
+def _shape(dx: Diagnosis) -> str:
+    figure = plot_shape(dx)
+    return "" if figure is None else drawn(figure, "the missing force over states and inputs")
 
 
-def _proof(dx: Diagnosis) -> str:
-    proof = dx.held_out
-    if proof is None:
-        why = dx.doubt or "there is no held-out recording"
-        return f"<p>Nothing is proved: {escape(why)}.</p>"
-    told = []
-    for name, e in proof.outputs.items():
-        moved = (f"{e.moved:.3g} with the parameters moved within their errors, "
-                 if proof.sensitive(dx.settings) and dx.hypotheses else "")
-        whose = f" of {escape(name)}" if len(proof.outputs) > 1 else ""
-        told.append(f"Held-out RMSE{whose}: {e.before:.3g} before, {e.after:.3g} after, "
-                    f"{moved}noise {e.noise:.3g} {escape(e.unit)}".rstrip())
-    return f"<p>{'; '.join(told)}; p = {proof.p_value:.2g}.</p>"
+def _lost(dx: Diagnosis) -> str:
+    """What was tried and is not given: why, and the numbers."""
+    if not dx.rejected:
+        return ""
+    rows = []
+    for (title, why), h in zip(dx.not_given, dx.rejected, strict=True):
+        behind = dx.behind(h)
+        rows.append((title, why, "" if behind is None else f"{behind:+.0f}"))
+    head = ("tried", "why it is not given", "χ² and penalty, from what is given")
+    return "<h2>Tried and not given</h2>" + tabled(Sheet(head, tuple(rows)))
 
 
 def _patch(dx: Diagnosis) -> str:

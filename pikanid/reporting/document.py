@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from pikanid.figures import image
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
     from pikanid.reporting.sheet import Sheet
 
 
-def document(title: str, parts: Sequence[str], model: Model | None = None,
+def document(title: str, parts: Sequence[str], models: Mapping[str, Model] = MappingProxyType({}),
              files: Sequence[str] = ()) -> str:
     """A page of HTML of its parts, which are HTML already, with version and date.
 
     Args:
         title: Plain text.
         parts: In their order.
-        model: The nominal model, whose equations are listed.
-        files: Names of the recordings, listed beside it.
+        models: By what they are called on the page, whose equations are listed.
+        files: Names of the recordings, listed below them.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -35,7 +36,7 @@ def document(title: str, parts: Sequence[str], model: Model | None = None,
                        undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     return room.get_template("page.html").render(
         title=title, parts=[Markup(part) for part in parts if part],
-        model=model, equations=[] if model is None else equations(model),
+        models={name: equations(model) for name, model in models.items()},
         files=list(dict.fromkeys(files)), version=__version__,
         date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"))
 

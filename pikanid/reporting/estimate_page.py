@@ -42,7 +42,7 @@ def page(estimates: Sequence[Estimate], failed: Mapping[str, str], title: str) -
         "<h2>Parameters</h2>" + tabled(parameters(estimates)),
         "<h2>What every fit leaves</h2>" + tabled(left(estimates)),
         "<h2>Notes</h2><ul>" + "".join(f"<li>{escape(n)}</li>" for n in notes) + "</ul>"
-        if notes else ""], head.model, [f.recording for f in head.fits])
+        if notes else ""], {head.model.name: head.model}, [f.recording for f in head.fits])
 
 
 def parameters(estimates: Sequence[Estimate]) -> Sheet:

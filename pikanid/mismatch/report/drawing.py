@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, FigureBase
 
-    from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
+    from pikanid.mismatch.beyond.force_shape import Edge
     from pikanid.mismatch.beyond.latent_force import ForceOverTime
     from pikanid.mismatch.beyond.patch import Patch
 
@@ -129,7 +129,7 @@ def _where(dx: DiagnosisData) -> list[Piece]:
     force = dx.force_over_time
 
     def draw(figure: FigureBase) -> None:
-        axes = np.atleast_1d(figure.subplots(1 if force is None else 2, 1, sharex=True))
+        axes = figure.subplots(1 if force is None else 2, 1, sharex=True, squeeze=False)[:, 0]
         why = "band excludes zero" if force is not None and force.resolved else "louder than noise"
         fit = dx.before.fits[0]
         axes[0].plot(fit.t, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
@@ -173,10 +173,11 @@ def _shape(dx: DiagnosisData) -> list[Piece]:
     found = shape
 
     def draw(figure: FigureBase) -> None:
-        axes = np.atleast_1d(figure.subplots(1, len(found.edges) + (patch is not None)))
-        wider = max(found.left, 1.0) ** 0.5
+        axes = figure.subplots(1, len(found.edges) + (patch is not None), squeeze=False)[0]
+        model, wider = dx.before.model, max(found.left, 1.0) ** 0.5
+        units = {**{s.name: s.unit for s in model.states}, **{i.name: i.unit for i in model.inputs}}
         for axis, edge in zip(axes[:len(found.edges)], found.edges, strict=True):
-            _edge(axis, edge, wider)
+            _edge(axis, edge, units.get(edge.argument, ""), wider)
         if patch is not None:
             _patch(axes[-1], patch)
         axes[0].set_ylabel(labelled("force", found.unit))
@@ -190,7 +191,7 @@ def _shape(dx: DiagnosisData) -> list[Piece]:
     return [(1.5, draw)]
 
 
-def _edge(axis: Axes, edge: Edge, wider: float) -> None:
+def _edge(axis: Axes, edge: Edge, unit: str, wider: float) -> None:
     half = WIDE * wider * edge.std
     axis.fill_between(edge.grid, edge.values - half, edge.values + half, color=AFTER, alpha=0.2,
                       lw=0, label="95 % band")
@@ -205,7 +206,7 @@ def _edge(axis: Axes, edge: Edge, wider: float) -> None:
     room = 0.5 * float(high - low) or 1.0
     axis.set_ylim(max(float(np.min(edge.values - half)), low - room) - 0.1 * room,
                   min(float(np.max(edge.values + half)), high + room) + 0.1 * room)
-    axis.set_xlabel(f"{edge.argument}\n({100 * edge.alone:.0f} % explained alone)")
+    axis.set_xlabel(f"{labelled(edge.argument, unit)}\n({100 * edge.alone:.0f} % explained alone)")
     tidy(axis)
 
 

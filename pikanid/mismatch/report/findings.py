@@ -219,6 +219,10 @@ class DiagnosisData:
         """The extended model at its estimates; the nominal one where nothing is named."""
         return self.after.fitted_model
 
+    def behind(self, h: Explanation) -> float | None:
+        """χ² with the penalty for its parameters, from that of what is given first."""
+        return h.score - self.hypotheses[0].score if self.hypotheses else None
+
     @property
     def not_given(self) -> list[tuple[str, str]]:
         """Title of each hypothesis that is not given, and why it is not."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pikanid.mismatch.beyond.force_shape import ForceShape, with_law
 from pikanid.mismatch.beyond.latent_force import force_over_time
 from pikanid.mismatch.beyond.local_force import local_force
@@ -20,7 +22,9 @@ from pikanid.mismatch.report.findings import Curves, OutputError, Proof
 from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.steps.remaining import present, remainder
+from pikanid.model import Model
 from pikanid.problem.problem import bind
+from pikanid.recording import Recording
 
 
 def reported(case: Case, detection: Detection, answer: Answer, site: Site,
@@ -91,10 +95,13 @@ def _curves(case: Case, before: HeldOut, after: HeldOut) -> dict[str, Curves]:
     """Of every output of the first held-out recording; a residual is predicted minus measured."""
     assert case.later is not None
     found: dict[str, Curves] = {}
-    measured = {case.model.outputs[s.output].name: s.y
-                for s in bind(case.model, case.later.recordings[0]).samples}
     for (r, name, t, old), (*_, new) in zip(before.residuals, after.residuals, strict=True):
         if r == 0:
-            y = measured[name]
+            y = _measured(case.model, case.later.recordings[0], name)
             found[name] = Curves(t, y, y + old, y + new, None if found else after.moved)
     return found
+
+
+def _measured(model: Model, recording: Recording, output: str) -> np.ndarray:
+    """The samples (N,) of an output, as they are compared."""
+    return next(s.y for s in bind(model, recording).samples if model.outputs[s.output].name == output)
