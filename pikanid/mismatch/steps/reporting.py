@@ -104,4 +104,5 @@ def _curves(case: Case, before: HeldOut, after: HeldOut) -> dict[str, Curves]:
 
 def _measured(model: Model, recording: Recording, output: str) -> np.ndarray:
     """The samples (N,) of an output, as they are compared."""
-    return next(s.y for s in bind(model, recording).samples if model.outputs[s.output].name == output)
+    return next(s.y for s in bind(model, recording).samples
+                if model.outputs[s.output].name == output)
