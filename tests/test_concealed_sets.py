@@ -235,7 +235,11 @@ def test_unfinished_set_of_other_settings_is_not_mixed(tmp_path: Path,
 
 @pytest.mark.parametrize(("options", "part"), [
     (["--cases", "0"], "--cases"), (["--excitation", "drum"], "drum"), (["--mix", "all=1"], "mix"),
-    (["--sigma", "-1deg"], "--sigma"), (["--sigma", "1 m"], "'m'")])
+    (["--sigma", "-1deg"], "--sigma"), (["--sigma", "1 m"], "'m'"),
+    (["--inputs", "a.csv"], "--inputs is of a model of your own"),
+    (["--noise", "0.01"], "--noise is of a model of your own"),
+    (["--model", "dc_motor", "--excitation", "mixed"], "--excitation is of the sloshing rig"),
+    (["--model", "dc_motor", "--sigma", "1deg"], "--sigma is of the sloshing rig")])
 def test_command_line_refuses(options: list[str], part: str, tmp_path: Path,
                               capsys: pytest.CaptureFixture[str]) -> None:
     words = ["conceal", "--out", str(tmp_path / "d"), "--truth", str(tmp_path / "t.json")]

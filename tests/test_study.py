@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from io import StringIO
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from pikanid import errors
 from pikanid.model import systems
 from pikanid.recording import datasets
 from pikanid.reporting import study_report, study_sheets
+from pikanid.reporting.sheet import Sheet
 from pikanid.validation.study import pendulum, run, slosh
 
 DENSE_LOW = slosh.SCENARIOS[1]
@@ -82,8 +84,17 @@ def test_report_shows_both_recordings(small: run.Study, tmp_path: Path) -> None:
     assert len(small.slosh_fits) == 12
     written = study_report.write(small, tmp_path)
     assert {path.name for path in written} == {
-        "study.md", "study-slosh-trajectories.png", "study-slosh-errors.png",
+        "study.md", "study.html", "study-slosh-trajectories.png", "study-slosh-errors.png",
         "study-pendulum.png", "study-pendulum-diagnosis.png"}
+
+
+def test_the_page_says_what_the_report_says(small: run.Study, tmp_path: Path) -> None:
+    written = {path.name: path for path in study_report.write(small, tmp_path)}
+    html = written["study.html"].read_text(encoding="utf-8")
+    sheets = [part for part in study_report.parts(small) if isinstance(part, Sheet)]
+    assert html.count("<table>") == len(sheets) and html.count("<img ") == 4
+    assert all(f"<td>{escape(cell)}</td>" in html for s in sheets for row in s.rows for cell in row)
+    assert escape(small.diagnosis.sentence()) in html
 
 
 def test_the_study_ends_with_a_diagnosis(small: run.Study) -> None:

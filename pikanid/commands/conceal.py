@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,7 @@ from pikanid.commands.options import Catalogues, Quiet, Values, adjusted, quanti
 if TYPE_CHECKING:
     from pikanid.validation.own_model.rig import Rig
 
+EXCITATION, SIGMA, NOISE = "rich", "0.1deg", 0.005  # definition: unless it is said
 EXAMPLES = """Examples:
 
   pikanid conceal --out recordings --truth truth.json
@@ -42,12 +44,13 @@ def conceal(
     truth: Annotated[str, typer.Option(
         metavar="FILE", show_default=False, help="file for the truth, outside that folder")],
     cases: Annotated[int, typer.Option(metavar="N", help="number of cases")] = 200,
-    excitation: Annotated[str, typer.Option(
-        "--excitation", "-e", metavar="NAME",
+    excitation: Annotated[str | None, typer.Option(
+        "--excitation", "-e", metavar="NAME", show_default=EXCITATION,
         help="rich (20 s), two_pulse (the paper's 5 s), mixed, or one of moves, chirp, multisine, "
-             "free_decay")] = "rich",
-    sigma: Annotated[str, typer.Option(
-        metavar="ANGLE", help="standard deviation of the noise, as 0.1deg or 0.002")] = "0.1deg",
+             "free_decay")] = None,
+    sigma: Annotated[str | None, typer.Option(
+        metavar="ANGLE", show_default=SIGMA,
+        help="standard deviation of the noise, as 0.1deg or 0.002")] = None,
     mix: Annotated[str | None, typer.Option(
         metavar="CLASS=SHARE,...", show_default=False,
         help="shares of nothing, single, pair, near, outside, unforeseen (more laws of no "
@@ -60,8 +63,9 @@ def conceal(
         help="of the model, for the recording to explain")] = None,
     held_out_inputs: Annotated[str | None, typer.Option(
         metavar="FILE", show_default=False, help="the same for the one to prove it on")] = None,
-    noise: Annotated[float, typer.Option(
-        metavar="SHARE", help="of an output's range, with --model")] = 0.005,
+    noise: Annotated[float | None, typer.Option(
+        metavar="SHARE", show_default=str(NOISE),
+        help="of an output's range, with --model")] = None,
     set_: Values = [],  # noqa: B006
     catalogue: Catalogues = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(
@@ -77,15 +81,20 @@ def conceal(
     from pikanid.validation.concealed.generate import check, generate
     from pikanid.validation.concealed.seal import Settings
 
+    _check_rig(model is not None, {"--excitation": excitation, "--sigma": sigma}, {
+        "--inputs": inputs, "--held-out-inputs": held_out_inputs, "--noise": noise,
+        "--set": set_ or None, "--catalogue": catalogue or None})
     if model is not None:
         from pikanid.validation.own_model import generate as own
         from pikanid.validation.own_model.case import CLASSES
 
-        rig = _rig(model, inputs, held_out_inputs, noise, set_, catalogue)
+        rig = _rig(model, inputs, held_out_inputs, NOISE if noise is None else noise, set_,
+                   catalogue)
         shares = None if mix is None else parse_mix(mix, CLASSES)
         make = partial(own.generate, out, truth, own.OwnSet(rig, cases, shares))
     else:
-        settings = Settings(cases, excitation, quantity(sigma, "rad", "--sigma"),
+        settings = Settings(cases, excitation or EXCITATION,
+                            quantity(SIGMA if sigma is None else sigma, "rad", "--sigma"),
                             dict(DEFAULT_MIX) if mix is None else parse_mix(mix))
         check(settings)
         make = partial(generate, out, truth, settings)
@@ -98,6 +107,13 @@ def conceal(
             f"{made.folder}: {made.made + made.kept} cases{kept}; {kind} truth: {made.truth}",
             markup=False, soft_wrap=True)
     return 0
+
+
+def _check_rig(own: bool, sloshing: Mapping[str, object], rig: Mapping[str, object]) -> None:
+    """Refuse what the other kind of set is made of: it would be passed over in silence."""
+    for option, value in (sloshing if own else rig).items():
+        if value is not None:
+            raise errors.BadSetting(errors.conceal_other_rig(option, own))
 
 
 def _rig(model: str, inputs: str | None, held_out: str | None, noise: float,

@@ -76,6 +76,13 @@ def conceal_two_inputs() -> str:
             "one for each recording of a pair.")
 
 
+def conceal_other_rig(option: str, own: bool) -> str:
+    if own:
+        return (f"{option} is of the sloshing rig only: with --model, motion comes from "
+                "--inputs and --held-out-inputs, and noise from --noise. Leave it out.")
+    return f"{option} is of a model of your own: name that with --model, or leave it out."
+
+
 def conceal_needs_inputs() -> str:
     return ("An input of the model is not in the experiment and has no default: record it, or give "
             "one.")

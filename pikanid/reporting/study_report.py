@@ -1,4 +1,4 @@
-"""The report of the study: `study.md` and its figures."""
+"""The report of the study: `study.md`, the same as a page, and its figures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 
 from pikanid.figures import image
 from pikanid.reporting import study_sheets as sheets
+from pikanid.reporting.sheet import Sheet
 from pikanid.reporting.study_figures import figures
+from pikanid.reporting.study_page import Heading, Part, Picture, Printed, page
 from pikanid.storage.outputs import together
 from pikanid.validation.study import pendulum, slosh
 from pikanid.validation.study.run import SEED, Study
@@ -61,7 +63,7 @@ def _head(out: Console, text: str) -> None:
 
 
 def write(study: Study, folder: Path) -> list[Path]:
-    """Write `study.md` and `figures/study-*.png`; returns what was written.
+    """Write `study.md`, `study.html` and `figures/study-*.png`; returns what was written.
 
     Raises:
         BadRecording: If the folder cannot be written to.
@@ -69,6 +71,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     drawn = figures(study)
     pictures = {name: f"figures/study-{name}.png" for name in drawn}
     files = {folder / "study.md": text(study, pictures).encode(),
+             folder / "study.html": page(parts(study), drawn).encode(),
              **{folder / pictures[name]: image(figure) for name, figure in drawn.items()}}
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     together(files)
@@ -76,27 +79,45 @@ def write(study: Study, folder: Path) -> list[Path]:
 
 
 def text(study: Study, pictures: Mapping[str, str]) -> str:
-    """The report; `pictures` maps the names of the figures to their files."""
-    dense, sparse = (sheets.slosh(study, s, paper=True).to_markdown() for s in ("dense", "sparse"))
-    parts = ["# Study of the strategies", _introduction(), "## Slosh pendulum", _slosh_text(),
-             "### Dense: N = 501", dense, "### Sparse: N = 51", sparse,
-             _picture("slosh-trajectories", pictures)]
+    """The report in Markdown; `pictures` maps the names of the figures to their files."""
+    written = []
+    for part in parts(study):
+        if isinstance(part, Sheet):
+            written.append(part.to_markdown())
+        elif isinstance(part, Picture):
+            if part.name in pictures:
+                written.append(f"![{part.caption}]({pictures[part.name]})\n\n{part.caption}")
+        elif isinstance(part, Printed):
+            written.append(f"```text\n{part.text}\n```")
+        elif isinstance(part, Heading):
+            written.append(f"{'#' * part.level} {part.text}")
+        else:
+            written.append(part)
+    return "\n\n".join(written) + "\n"
+
+
+def parts(study: Study) -> list[Part]:
+    """All that the report says, in its order."""
+    found: list[Part] = [
+        Heading(1, "Study of the strategies"), _introduction(), Heading(2, "Slosh pendulum"),
+        _slosh_text(), Heading(3, "Dense: N = 501"), sheets.slosh(study, "dense", paper=True),
+        Heading(3, "Sparse: N = 51"), sheets.slosh(study, "sparse", paper=True),
+        _picture("slosh-trajectories")]
     if study.spreads:
-        parts += ["### Repeated seeds", _spread_text(study), sheets.spread(study).to_markdown(),
-                  _picture("slosh-errors", pictures)]
-    parts += ["## Real recording: free swing of a pendulum arm", _pendulum_text(study),
-              sheets.pendulum(study).to_markdown(), _picture("pendulum", pictures),
-              "### What the viscous pendulum leaves out", DIAGNOSIS_TEXT,
-              f"```text\n{study.diagnosis}\n```", _picture("pendulum-diagnosis", pictures)]
+        found += [Heading(3, "Repeated seeds"), _spread_text(study), sheets.spread(study),
+                  _picture("slosh-errors")]
+    found += [Heading(2, "Real recording: free swing of a pendulum arm"), _pendulum_text(study),
+              sheets.pendulum(study), _picture("pendulum"),
+              Heading(3, "What the viscous pendulum leaves out"), DIAGNOSIS_TEXT,
+              Printed(str(study.diagnosis)), _picture("pendulum-diagnosis")]
     unusable = [f"- {reason}" for reason in sheets.reasons(study)]
     if unusable:
-        parts += ["## Not usable", "\n".join(unusable)]
-    parts += ["## Settings", _settings(study)]
-    return "\n\n".join(part for part in parts if part) + "\n"
+        found += [Heading(2, "Not usable"), "\n".join(unusable)]
+    return [*found, Heading(2, "Settings"), _settings(study)]
 
 
-def _picture(name: str, pictures: Mapping[str, str]) -> str:
-    return f"![{CAPTIONS[name]}]({pictures[name]})\n\n{CAPTIONS[name]}" if name in pictures else ""
+def _picture(name: str) -> Picture:
+    return Picture(name, CAPTIONS[name])
 
 
 def _introduction() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 BEFORE, AFTER, MOVED = "#c2410c", "#1d4ed8", "#15803d"
 DATA, LOUD = "#9ca3af", "#d97706"
 STRETCHES = 6  # layout: of a held-out recording, of which one is shown
-ROW, WIDTH = 2.4, 9.0  # layout: inches
+ROW = 2.4  # layout: inches
+WIDTH = 9.0  # layout: inches
 STRIP = 0.04  # layout: height of the strip that marks a mismatch, of its axes
 
 
@@ -69,35 +71,38 @@ def _proof(dx: DiagnosisData) -> list[Piece]:
     if dx.held_out is None:
         return []
     moved = bool(dx.hypotheses) and dx.held_out.sensitive(dx.settings)
-
-    def draw(figure: FigureBase, name: str, curves: Curves, error: OutputError) -> None:
-        near, left = figure.subplots(2, 1)
-        unit = f" {error.unit}".rstrip()
-        shown = [("nominal model", curves.before, BEFORE, error.before)]
-        if dx.hypotheses:
-            shown.append(("extended model", curves.after, AFTER, error.after))
-        if moved and curves.moved is not None:
-            shown.append(("within its errors", curves.moved, MOVED, error.moved))
-        near.plot(curves.t, curves.measured, ".", color=DATA, ms=3, label="measured", zorder=3)
-        span = _furthest(curves)
-        inside = (curves.t >= span[0]) & (curves.t <= span[1])
-        for label, y, colour, rmse in shown:
-            near.plot(curves.t, y, color=colour, lw=1.2, label=label)
-            left.plot(curves.t, curves.measured - y, color=colour, lw=0.8,
-                      label=f"{label}: {rmse:.3g}{unit}")
-        _reach(near, np.concatenate([curves.measured[inside], *(y[inside] for _, y, *_ in shown)]))
-        near.set_xlim(span)
-        left.axhspan(-2 * error.noise, 2 * error.noise, color=DATA, alpha=0.4, lw=0,
-                     label="±2σ of the noise")
-        left.axvspan(*span, ymax=STRIP, color=DATA, lw=0)
-        _finished(near, f"Held-out {name}, predicted, where the nominal model is furthest off",
-                  labelled(name, error.unit))
-        _finished(left, f"Held-out {name}: what is left, and its RMSE; marked: enlarged above",
-                  labelled("left", error.unit))
-        left.set_xlabel("t [s]")
-
-    return [(2.3, lambda f, n=name, c=curves: draw(f, n, c, dx.held_out.outputs[n]))  # type: ignore[misc]
+    return [(2.3, partial(_output, name, curves, dx.held_out.outputs[name],
+                          bool(dx.hypotheses), moved))
             for name, curves in dx.held_out.curves.items()]
+
+
+def _output(name: str, curves: Curves, error: OutputError, extended: bool, moved: bool,
+            figure: FigureBase) -> None:
+    """One output of the held-out recording: enlarged, and below what is left of all of it."""
+    near, left = figure.subplots(2, 1)
+    unit = f" {error.unit}".rstrip()
+    shown = [("nominal model", curves.before, BEFORE, error.before)]
+    if extended:
+        shown.append(("extended model", curves.after, AFTER, error.after))
+    if moved and curves.moved is not None:
+        shown.append(("within its errors", curves.moved, MOVED, error.moved))
+    near.plot(curves.t, curves.measured, ".", color=DATA, ms=3, label="measured", zorder=3)
+    span = _furthest(curves)
+    inside = (curves.t >= span[0]) & (curves.t <= span[1])
+    for label, y, colour, rmse in shown:
+        near.plot(curves.t, y, color=colour, lw=1.2, label=label)
+        left.plot(curves.t, curves.measured - y, color=colour, lw=0.8,
+                  label=f"{label}: {rmse:.3g}{unit}")
+    _reach(near, np.concatenate([curves.measured[inside], *(y[inside] for _, y, *_ in shown)]))
+    near.set_xlim(span)
+    left.axhspan(-2 * error.noise, 2 * error.noise, color=DATA, alpha=0.4, lw=0,
+                 label="±2σ of the noise")
+    left.axvspan(*span, ymax=STRIP, color=DATA, lw=0)
+    _finished(near, f"Held-out {name}, predicted, where the nominal model is furthest off",
+              labelled(name, error.unit))
+    _finished(left, f"Held-out {name}: what is left, and its RMSE; marked: enlarged above",
+              labelled("left", error.unit))
+    left.set_xlabel("t [s]")
 
 
 def _furthest(curves: Curves) -> tuple[float, float]:
