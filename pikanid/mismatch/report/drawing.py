@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 BEFORE, AFTER, MOVED = "#c2410c", "#1d4ed8", "#15803d"
 DATA, LOUD = "#9ca3af", "#d97706"
 STRETCHES = 6  # layout: of a held-out recording, of which one is shown
-ROW = 2.4  # layout: inches
-WIDTH = 9.0  # layout: inches
+ROW = 2.4  # layout: height of one row of axes, in inches
+WIDTH = 9.0  # layout: of a figure, in inches
 STRIP = 0.04  # layout: height of the strip that marks a mismatch, of its axes
 
 
