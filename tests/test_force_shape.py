@@ -8,7 +8,7 @@ import pytest
 from pikanid.mismatch.beyond.force_shape import (
     GRID,
     _explained,
-    _smoothed,
+    _Smoother,
     _Spline,
     _without_constant,
 )
@@ -65,7 +65,8 @@ def test_smoothing_is_that_of_generalised_cross_validation(noise: float) -> None
         left = target - hat @ target
         found.append((float(left @ left) / (80 - np.trace(hat)) ** 2, inverse))
     inverse = min(found, key=lambda f: f[0])[1]
-    got, covariance = _smoothed(rest, target, owner, size)
+    smoother = _Smoother(rest, target, owner, size)
+    got, covariance = smoother.coefficients(target), smoother.covariance
     np.testing.assert_allclose(got, inverse @ rest.T @ target / size, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(covariance, inverse / np.outer(size, size), rtol=1e-6, atol=1e-9)
 
