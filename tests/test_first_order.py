@@ -17,6 +17,7 @@ from pikanid.model.parts import Output
 
 STILL = pk.Recording.from_arrays(np.arange(100) * 0.01, {"u": np.sin(np.arange(100))},
                                  units={"u": "V"})
+Seen = Callable[[np.ndarray], np.ndarray]
 
 
 def motor() -> pk.Model:
@@ -67,7 +68,8 @@ def test_nothing_that_needs_a_position_is_looked_for() -> None:
     assert {"quadratic_drag_x1", "quadratic_drag_x2"} <= set(keys)
 
 
-def driven(seed: int, rate: Callable[[float, float], float]) -> pk.Recording:
+def driven(seed: int, rate: Callable[[float, float], float], seen: Seen = np.asarray
+           ) -> pk.Recording:
     """A motor in steps of voltage: SciPy's DOP853 from one to the next."""
     rng = np.random.default_rng(seed)
     n, h = 1000, 0.01
@@ -76,8 +78,9 @@ def driven(seed: int, rate: Callable[[float, float], float]) -> pk.Recording:
     for k in range(n - 1):
         w[k + 1] = solve_ivp(lambda t, x, push=u[k]: [rate(x[0], push)], (0, h), [w[k]], "DOP853",
                              rtol=1e-8, atol=1e-10, max_step=h / 2).y[0, -1]
-    return pk.Recording.from_arrays(np.arange(n) * h, {"u": u, "w": w + rng.normal(0, 0.1, n)},
-                                    units={"u": "V", "w": "rad/s"})
+    return pk.Recording.from_arrays(
+        np.arange(n) * h, {"u": u, "w": seen(w) + rng.normal(0, 0.1, n)},
+        units={"u": "V", "w": "rad/s"})
 
 
 @pytest.mark.slow
@@ -85,6 +88,7 @@ def driven(seed: int, rate: Callable[[float, float], float]) -> pk.Recording:
     (lambda w, u: 10 * u - 2 * w, None),
     (lambda w, u: 10 * u - 2 * w - 8 * np.tanh(w / 0.01), "coulomb_friction"),
     (lambda w, u: 10 * u - 2 * w - 0.15 * abs(w) * w, "quadratic_drag"),
+    (lambda w, u: 10 * max(u, -3.5) - 2 * w, "input_saturation"),
     (lambda w, u: 10 * np.sign(u) * max(abs(u) - 0.8, 0.0) - 2 * w, "input_dead_zone")])
 def test_a_motor_whose_speed_is_measured(rate: Callable[[float, float], float], ids: str | None
                                          ) -> None:
@@ -93,6 +97,21 @@ def test_a_motor_whose_speed_is_measured(rate: Callable[[float, float], float], 
     if ids is not None:
         assert answer.verdict == "named" and [
             e.ids[0] for h in answer.hypotheses for e in h.effects] == [ids]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seen", "law"), [
+    (lambda w: np.minimum(w, 14.0), "min(w, limit)"),
+    (lambda w: np.maximum(w, -14.0), "max(w, -limit)"),
+    (lambda w: np.clip(w, -14.0, 14.0), "clip(w, -limit, limit)")])
+def test_a_sensor_whose_range_ends_on_one_side(seen: Seen, law: str) -> None:
+    train, other = (driven(seed, lambda w, u: 10 * u - 2 * w, seen) for seed in (1, 2))
+    answer = pk.diagnose(motor(), train, other)
+    (found,) = [e for h in answer.hypotheses for e in h.effects]
+    assert answer.verdict == "named" and found.ids == ("sensor_saturation",)
+    assert found.expression == law
+    (limit,) = found.parameters.values()
+    assert abs(limit.value - 14.0) < 4 * limit.std < 0.5
 
 
 @pytest.mark.slow

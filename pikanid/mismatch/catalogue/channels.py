@@ -8,10 +8,13 @@ import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.problem.held import PIECES, HeldInput, acting
 
 INF = float("inf")
+# of a limit: on both sides alike, or on one; what it is called
+SIDES = {"": "saturation of the", "above": "an upper limit of the", "below": "a lower limit of the"}
 
 
 def _sensor(site: Site, identifier: str, name: str, size: Parameter, expression: str,
@@ -60,19 +63,53 @@ def sensor_nonlinearity(site: Site) -> list[Candidate]:
 
 
 def sensor_saturation(site: Site) -> list[Candidate]:
-    """The sensor clips on both sides."""
+    """The sensor clips, on both sides alike or on one."""
     limit = Parameter(site.name("limit"), 1e6, site.output.unit, (1e-9, INF))
-    o = site.output.name
+    o, unit = site.output.name, site.output.unit
+    found = []
+    for side, words in SIDES.items():
 
-    def directions(view: View) -> list[TangentDirection]:
-        y, top = view.y[o], float(np.abs(view.y[o]).max(initial=0.0))
-        return [TangentDirection({limit.name: s * top}, seen=np.clip(y, -s * top, s * top) - y,
-                                 one_sided=True, scales=False)
-                for s in (0.99, 0.96, 0.9, 0.8, 0.65, 0.5)] if top else []
+        def directions(view: View, side: str = side) -> list[TangentDirection]:
+            return [TangentDirection({limit.name: level}, seen=cut - view.y[o], one_sided=True,
+                                     scales=False)
+                    for level, cut in _cut(view.y[o], side, (0.01, 0.04, 0.1, 0.2, 0.35, 0.5))]
 
-    return [Candidate(("sensor_saturation",), "saturation of the sensor",
-                      f"clip({o}, -{limit.name}, {limit.name})", "sensor", site, (limit,),
-                      lambda m: m.map_output(o, clip=[f"-{limit.name}", limit.name]), directions)]
+        text = _clipped(o, limit.name, side)
+        found.append(Candidate(
+            ("sensor_saturation",), f"{words} sensor", text, "sensor", site,
+            (_sided(limit, side, unit),), _seen_through(o, text), directions, variant=side,
+            twin="limit of the sensor"))
+    return found
+
+
+def _seen_through(o: str, text: str) -> Callable[[Model], Model]:
+    return lambda m: m.map_output(o, function=text)
+
+
+def _sided(limit: Parameter, side: str, unit: str) -> Parameter:
+    """The level of a limit: of a limit on one side it may have any sign."""
+    return Parameter(limit.name, limit.value, unit, (-INF, INF)) if side else limit
+
+
+def _clipped(x: str, limit: str, side: str) -> str:
+    """The formula of a channel that is cut off at ±limit, or on one side."""
+    return {"above": f"min({x}, {limit})", "below": f"max({x}, -{limit})"}.get(
+        side, f"clip({x}, -{limit}, {limit})")
+
+
+def _cut(x: np.ndarray, side: str, shares: Sequence[float]) -> list[tuple[float, np.ndarray]]:
+    """Levels of a limit, and a channel (L,) cut off there: by shares of its amplitude, or on one
+    side of its range; none where it rests, or where both sides are one.
+    """
+    low, high = float(x.min(initial=0.0)), float(x.max(initial=0.0))
+    if not side:
+        top = max(-low, high)
+        return [((1 - s) * top, np.clip(x, -(1 - s) * top, (1 - s) * top)) for s in shares] if (
+            top) else []
+    sign = 1.0 if side == "above" else -1.0
+    top, span = float((sign * x).max(initial=-INF)), float(np.ptp(x)) if len(x) else 0.0
+    return [(top - s * span, sign * np.minimum(sign * x, top - s * span)) for s in shares] if (
+        span) else []
 
 
 def delay(site: Site) -> list[Candidate]:
@@ -151,18 +188,25 @@ def input_gain(site: Site) -> list[Candidate]:
 
 
 def input_limits(site: Site) -> list[Candidate]:
-    """Saturation and dead zone."""
+    """Saturation, on both sides alike or on one, and dead zone."""
     found = []
     for u in site.inputs:
         unit = site.model.input(u).unit
         limit = Parameter(site.name("u_max"), 1e6, unit, (1e-9, INF))
         width = Parameter(site.name("u_dead"), 0.0, unit, (0.0, INF))
+        for side, words in SIDES.items():
 
-        def clipped(view: View, u: str = u, p: Parameter = limit) -> list[TangentDirection]:
-            d, top = view.u[u], float(np.abs(view.u[u]).max())
-            return [TangentDirection({p.name: s * top}, push={u: np.clip(d, -s * top, s * top) - d},
-                                     one_sided=True, scales=False)
-                    for s in (0.985, 0.95, 0.88, 0.78, 0.65, 0.5)]
+            def clipped(view: View, u: str = u, p: Parameter = limit, side: str = side
+                        ) -> list[TangentDirection]:
+                return [TangentDirection({p.name: level}, push={u: cut - view.u[u]},
+                                         one_sided=True, scales=False)
+                        for level, cut in _cut(view.u[u], side,
+                                               (0.015, 0.05, 0.12, 0.22, 0.35, 0.5))]
+
+            text = _clipped(u, limit.name, side)
+            found.append(_input(site, u, "input_saturation", f"{words} input",
+                                (_sided(limit, side, unit),), text, clipped, f"limit of {u}",
+                                variant=side, function=text))
 
         def dead(view: View, u: str = u, p: Parameter = width) -> list[TangentDirection]:
             d, top = view.u[u], float(np.abs(view.u[u]).max())
@@ -170,11 +214,9 @@ def input_limits(site: Site) -> list[Candidate]:
                                      one_sided=True, scales=False)
                     for s in (0.003, 0.01, 0.03, 0.08, 0.2, 0.4)]
 
-        found += [
-            _input(site, u, "input_saturation", "saturation of the input", (limit,),
-                   f"clip({u}, -{limit.name}, {limit.name})", clipped, saturation=limit.name),
+        found.append(
             _input(site, u, "input_dead_zone", "a dead zone of the input", (width,),
-                   f"dead_zone({u}, {width.name})", dead, dead_zone=width.name)]
+                   f"dead_zone({u}, {width.name})", dead, dead_zone=width.name))
     return found
 
 

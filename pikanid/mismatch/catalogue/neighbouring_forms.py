@@ -28,6 +28,7 @@ EASED = (0.75, 0.88, 1.0)  # numerical: of a wall's distance, where fits of one 
 MEMORIES = (0.3, 1.0, 3.0)  # numerical: of the time to swing, where fits of a memory begin
 SETTLED = (0.1, 0.3, 1.0)  # numerical: of the recording, where fits of what settles begin
 ROUNDED = (1.0, 1.5)  # numerical: of a sensor's limit, where fits of a rounded one begin
+KNEES = (0.03, 0.2)  # numerical: of the half range, how wide these begin where one side is limited
 BENT = (2, 3)  # definition: powers of a curve beside its straight part
 Starts = list[dict[str, float]]
 
@@ -190,12 +191,23 @@ def _bent_otherwise(cubic: Candidate, n: int) -> Candidate:
 
 
 def _rounded(clipped: Candidate) -> Candidate:
-    """L tanh(y/L), in place of a limit that y keeps to and is not bent by below."""
+    """L tanh(y/L), in place of a limit that y keeps to and is not bent by below; of one on one side
+    (y + L - ((y - L)² + w²)^½)/2.
+    """
     site, o, old = clipped.site, clipped.site.output.name, clipped.parameters[0]
-    limit = Parameter(site.name("limit_soft"), 1e6, _unit(clipped, o), old.bounds)
-    return _curve(clipped, o, "sensor_rounded", f"{limit.name}*tanh({o}/{limit.name})", (limit,),
-                  lambda values, states: [{limit.name: share * values[old.name]}
-                                          for share in ROUNDED])
+    unit, start = _unit(clipped, o), f"{old.name}_soft"
+    limit = Parameter(start, 1e6, unit, old.bounds)
+    if not clipped.variant:
+        return _curve(clipped, o, "sensor_rounded", f"{limit.name}*tanh({o}/{limit.name})",
+                      (limit,), lambda values, states: [
+                          {limit.name: share * values[old.name]} for share in ROUNDED])
+    most = site.half_range or 1.0
+    knee = Parameter(site.name("knee"), 0.1 * most, unit, (0.0, INF))
+    sign = "" if clipped.variant == "above" else "-"
+    text = (f"{sign}({sign}{o} + {limit.name} - sqrt(({sign}{o} - {limit.name})**2 "
+            f"+ {knee.name}**2))/2")
+    return _curve(clipped, o, "sensor_rounded", text, (limit, knee), lambda values, states: [
+        {limit.name: values[old.name], knee.name: share * most} for share in KNEES])
 
 
 def _unit(entry: Candidate, channel: str) -> str:

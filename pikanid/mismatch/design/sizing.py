@@ -102,6 +102,10 @@ def sized(candidate: Candidate, screen: Screen, own: np.ndarray, wanted: float, 
     own = own[lengths[own] > 0]
     scaling = signs[own[0]].scales
     name = _size_of(candidate, [signs[k].start for k in own], scaling)
+    if not scaling:  # levels are compared as logarithms
+        own = np.array([k for k in own if signs[k].start.get(name, 1.0) > 0], dtype=int)
+    if not len(own):
+        return None
     starts = np.array([abs(signs[k].start.get(name, 1.0)) for k in own])
     slope = 1.0
     if scaling:
