@@ -26,6 +26,24 @@ def test_term_agrees_with_the_event_exact_reference(name: str) -> None:
     assert found.slope_error < term.accuracy
 
 
+@pytest.mark.parametrize("text", [
+    "sign(theta_dot)*abs(theta_dot)**1.5", "theta_dot*abs(theta_dot)**0.5",
+    "theta_dot*sqrt(abs(theta_dot))", "sign(theta_dot)*abs(theta_dot)**n"])
+def test_a_power_of_an_amount_is_zero_where_that_is(text: str) -> None:
+    """However it is written: within a step an amount may come out a little below zero."""
+    new = [Parameter("q", 0.5), Parameter("n", 1.5)]
+    found = []
+    for law in (text, "signed_power(theta_dot, n)"):
+        model = systems.sloshing().with_term("theta_dot", f"-q*{law}", new)
+        simulator = Simulator(model, bind(model, with_outputs(model, drive("pulses"))))
+        p = np.array(list(model.values.values()))
+        active = np.array([model.parameter_names.index(name) for name in ("l_theta", "q")])
+        found.append(simulator.run(p, active, Steps("explicit", 1e-3)))
+    np.testing.assert_allclose(found[0].y, found[1].y, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(found[0].sensitivity, found[1].sensitivity, rtol=1e-9, atol=1e-10)
+    assert np.abs(found[0].y).max() > 0.1
+
+
 # --- several surfaces, outputs, and what steps may miss ------------------------------------------
 
 

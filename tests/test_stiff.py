@@ -59,6 +59,19 @@ def test_stiff_model_agrees_with_radau_and_switches_exactly() -> None:
         assert error < (5e-3 if k == 0 else 1e-4) * np.abs(expected).max()
 
 
+def test_what_is_fast_but_not_stiff_stays_explicit_however_short_the_steps() -> None:
+    model = Model.from_dict({
+        "name": "fast", "states": {"x": {"initial": 1.0}, "v": {"initial": 0.0}},
+        "parameters": {"w": {"guess": 8.0, "bounds": [1.0, 100.0]}},
+        "equations": {"x": "v", "v": "-w**2*x"}, "outputs": {"y": {"expression": "x"}}})
+    t = np.arange(40.0)  # more than a period from sample to sample
+    made = interpreted.simulator(model, Recording.from_arrays(t, {"y": t}))
+    steps = made.choose_steps(np.array([8.0]), 1e-8)
+    assert steps.method == "explicit" and 1 / 4096 < steps.longest < 1 / 64
+    found = made.run(np.array([8.0]), None, steps)
+    assert np.abs(found.y - np.cos(8 * t)).max() < 2e-8
+
+
 def test_order_four() -> None:
     """Prothero and Robinson's problem at moderate stiffness: each halving takes about 1/16."""
     made = interpreted.simulator(FAST, PULSE)

@@ -75,6 +75,9 @@ class Lowering:
         """The formula with every non-smooth node rewritten, from the inside out."""
         if expr.is_Atom:
             return expr
+        if isinstance(expr, sp.Pow) and isinstance(expr.base, sp.Abs) and not (
+                expr.exp.is_integer or expr.exp.is_negative):
+            return self.lower(abs_power(expr.base.args[0], expr.exp))
         args = [self.lower(a) for a in expr.args]
         if isinstance(expr, AppliedUndef):
             names = [s.name for s in self.splines]

@@ -22,6 +22,7 @@ from pikanid.simulation.input_paths import split, with_parts
 MethodChoice = Literal["auto", "explicit", "implicit"]
 _NOTHING = np.empty(0, np.int64)  # definition: an empty array
 FORETOLD = 64  # numerical: times finer: beyond that an error is far from what the order says
+CONVERGING = 0.6  # numerical: of the error, that half the step must leave at most: order 0.7
 FINEST = 4096  # limit: sub-steps of the median interval beyond which the explicit route gives up
 
 
@@ -210,6 +211,7 @@ class Simulator:
             longest = usual
             rough = trial(Steps(candidate, longest), True)
             failure = failure if rough.finished else rough
+            before = np.inf
             while longest > max(spacing / FINEST, finest):
                 fine = trial(Steps(candidate, longest / 2), False)
                 if rough.finished and fine.finished:
@@ -220,9 +222,12 @@ class Simulator:
                     if error <= allowed:
                         return best
                 else:
-                    failure = fine
+                    error, failure = np.inf, fine
+                # what a kink makes slow still converges; what is stiff does not at all
+                stuck, before = not error < CONVERGING * before, error
                 rough, longest = fine, longest / 2
-                if candidate == "explicit" and method == "auto" and longest < spacing / 64:
+                if stuck and candidate == "explicit" and method == "auto" and (
+                        longest < spacing / 64):
                     break
         if best is None:
             raise errors.SimulationFailed(
