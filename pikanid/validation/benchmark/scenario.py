@@ -17,6 +17,7 @@ from pikanid.model.parts import Input
 from pikanid.recording import Channel, Recording
 from pikanid.simulation import simulate
 from pikanid.uncertainty import cramer_rao
+from pikanid.uncertainty.information import covariance
 from pikanid.validation.benchmark.noise import Array, Noise
 
 PREFIX = "process_"  # definition: of the inputs that carry process noise
@@ -83,16 +84,18 @@ class Scenario:
         if self.process or other or set(self.true) != free or any(
                 n.sigma == 0.0 for n in self.noise.values()):
             return None
-        found = cramer_rao(self.truth, self.recording(0).with_sigma(
-            **dict.fromkeys(self.fitted.output_names, 1.0)))
+        recording = self.recording(0)
+        found = cramer_rao(self.truth, recording)
         pieces, first = [], 0
         for name in self.fitted.output_names:
-            n = len(self.recording(0)[name])
-            pieces.append(self.noise[name].whitened(found.jacobian[first:first + n], self.stride))
+            n, noise = len(recording[name]), self.noise[name]
+            own = noise.sigma * found.jacobian[first:first + n]
+            pieces.append(noise.whitened(own, self.stride))
             first += n
         jacobian = np.concatenate(pieces)
-        std = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
-        return dict(zip(found.names, map(float, std), strict=True))
+        std = np.sqrt(np.diag(covariance(jacobian, np.ones(len(found.names), bool))))
+        names = (name.removesuffix("[0]") for name in found.names)  # of the only recording
+        return dict(zip(names, map(float, std), strict=True))
 
     def content(self) -> dict[str, Any]:
         """All that decides what its trials find, as plain data."""

@@ -1,0 +1,35 @@
+"""The trials of the study, as the report needs them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from pikanid.storage.outputs import atomically
+from pikanid.validation.benchmark import export
+from pikanid.validation.benchmark.cells import Group, groups
+from pikanid.validation.benchmark.files import GROUPS
+
+KEPT = "benchmark.parquet"
+Key = tuple[str, str, str]  # scenario, strategy, protocol
+NAMES = {"l_theta": "l", "d_theta": "d"}
+UNITS = {"l_theta": "m", "d_theta": "N s/m"}
+SCENARIOS = GROUPS["paper"]
+FIVE = ("nls", "pda", "ipda", "pinn", "pikan")
+
+
+def gathered(folder: Path, stores: Sequence[str]) -> tuple[dict[str, str], pd.DataFrame]:
+    """Trials of the stores, which are exported to the folder; without any, those exported before.
+    """
+    kept = folder / KEPT
+    if stores:
+        about, frame = export.table(Path(stores[0]))
+        atomically(kept, export.parquet(about, frame))
+    return export.from_parquet(kept)
+
+
+def keyed(frame: pd.DataFrame) -> dict[Key, Group]:
+    """Groups by scenario, strategy and protocol."""
+    return {(g.scenario, g.strategy, g.protocol): g for g in groups(frame)}
