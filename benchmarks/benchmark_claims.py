@@ -46,8 +46,9 @@ def of_accuracy(found: Found) -> list[Claim]:
     return [_near_optimal(found), _within(found), _overestimate(found, "pda"),
             _overestimate(found, "ipda"), _without_grid(found), _length(found, "pinn"),
             _length(found, "pikan"), _damping(found, "pinn", DENSE),
-            _damping(found, "pikan", DENSE), _damping(found, "pinn", SPARSE), _damping(found, "pikan", SPARSE), _largest(found),
-            _robust(found), _non_monotonic(found), _tracks(found), _superior(found)]
+            _damping(found, "pikan", DENSE), _damping(found, "pinn", SPARSE),
+            _damping(found, "pikan", SPARSE), _largest(found), _robust(found),
+            _non_monotonic(found), _tracks(found), _superior(found)]
 
 
 def bias(cell: Cell) -> str:

@@ -62,8 +62,8 @@ def starts(maps: Mapping[str, Basin]) -> Claim:
         parts.append(
             f"{files.chosen([basin.scenario])[0].label}: one start finds the truth from "
             f"{percent(share(int(basin.right.sum()), n))} % of the map; of "
-            f"{int((~basin.right).sum())} wrong ends χ² takes {basin.unseen} for explanations; with further starts where χ² "
-            f"complains: {percent(share(int(auto.sum()), m))} %")
+            f"{int((~basin.right).sum())} wrong ends χ² takes {basin.unseen} for explanations; "
+            f"with further starts where χ² complains: {percent(share(int(auto.sum()), m))} %")
     return Claim("I, II-A", "Shooting is sensitive to the start.",
                  "NLS from 0.012 to 0.25 m and 0.01 to 3 N s/m", "; ".join(parts),
                  "depends on the start; χ² and further starts mend what the data can tell")

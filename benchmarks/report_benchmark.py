@@ -177,7 +177,8 @@ def _spectrum(found: Mapping[str, np.ndarray]) -> Sheet:
 def _settings(about: Mapping[str, str], seconds: float) -> str:
     made = ", ".join(f"{k} {v}" for k, v in json.loads(about["versions"]).items())
     return (f"Trials: {made}. Report: {provenance()}; experiments over seeds 0, 1, ...: "
-            + ", ".join(f"{k} {v}" for k, v in SEEDS.items()) + f"; {seconds:.0f} s, less what was kept.")
+            + ", ".join(f"{k} {v}" for k, v in SEEDS.items())
+            + f"; {seconds:.0f} s, less what was kept.")
 
 
 if __name__ == "__main__":
