@@ -168,7 +168,7 @@ def partitioning(seeds: int) -> list[Share]:
             used = dict(fits[0].settings)
             found.append(Share(
                 int(used["intervals"]), lam,
-                sum(c.size for c in fits[0].approximator.coefficients),
+                sum(np.size(c) for own in fits[0].approximator.coefficients for c in own),
                 float(used["effective_parameters"]),
                 float(np.median([e.std("d_theta") for e in fits])) / bound,
                 float(np.sqrt(np.mean(off**2))) / bound))

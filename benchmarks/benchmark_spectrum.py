@@ -21,8 +21,8 @@ def left_over(seeds: int) -> dict[str, np.ndarray]:
     t = np.linspace(0.0, HORIZON, SAMPLES)
     net = MLP(0.0, HORIZON, 0, PAPER_HIDDEN)
     table = net.at(t, 0)
-    basis = BSpline(knots_from_breakpoints(np.linspace(0.0, HORIZON, INTERVALS + 1), 3), 3).basis(t)
-    matrix = basis.toarray() if hasattr(basis, "toarray") else np.asarray(basis)
+    knots = knots_from_breakpoints(np.linspace(0.0, HORIZON, INTERVALS + 1), 3)
+    matrix = BSpline(3, knots).basis(t).toarray()
     network, spline = np.empty((len(FREQUENCIES), seeds)), np.empty(len(FREQUENCIES))
     for i, frequency in enumerate(FREQUENCIES):
         y = np.sin(2 * np.pi * frequency * t)

@@ -21,9 +21,6 @@ TIMES = {
     "sparse_clean": {"nls": 0.86, "pda": 1e-3, "ipda": 0.06, "pinn": 20, "pikan": 1651},
     "sparse_low": {"nls": 1.36, "pda": 1e-3, "ipda": 0.06, "pinn": 20, "pikan": 1672},
     "sparse_high": {"nls": 0.80, "pda": 1e-3, "ipda": 0.07, "pinn": 23, "pikan": 1272}}
-PLACE = {"dense_clean": ("dense", 0.0), "dense_low": ("dense", 0.1), "dense_high": ("dense", 1.0),
-         "sparse_clean": ("sparse", 0.0), "sparse_low": ("sparse", 0.1),
-         "sparse_high": ("sparse", 1.0)}
 NUMBERS = ("paper", "seed 0", "median", "spread", "bias [%]", "RMSE [%]", "RMSE/CRB",
            "covers [%]")
 LAST = ("broke down [%]", "misfits [%]", "CPU [ms]", "paper's [ms]")
@@ -31,7 +28,7 @@ LAST = ("broke down [%]", "misfits [%]", "CPU [ms]", "paper's [ms]")
 
 def published(scenario: str, strategy: str, parameter: str) -> float:
     """What the paper prints; NaN where it prints nothing."""
-    row = PAPER[PLACE[scenario]].get(strategy)
+    row = PAPER[scenario].get(strategy)
     return np.nan if row is None else row[list(NAMES).index(parameter)]
 
 

@@ -128,7 +128,7 @@ def _claims(found: claims.Found, done: Mapping[Any, Any]) -> list[claims.Claim]:
 
 
 def _in_tables(scenario: str, strategy: str) -> bool:
-    return scenario in tables.PLACE and strategy in figures.FIVE
+    return scenario in tables.TIMES and strategy in figures.FIVE
 
 
 def _tables(found: claims.Found) -> list[str]:
