@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,8 +26,12 @@ def gathered(folder: Path, stores: Sequence[str]) -> tuple[dict[str, str], pd.Da
     """
     kept = folder / KEPT
     if stores:
-        about, frame = export.table(Path(stores[0]))
-        atomically(kept, export.parquet(about, frame))
+        abouts, frames = zip(*(export.table(Path(store)) for store in stores), strict=True)
+        whole = pd.concat(frames).drop_duplicates(
+            ["scenario", "strategy", "protocol", "seed", "parameter"], ignore_index=True)
+        scenarios = {k: v for a in reversed(abouts) for k, v in json.loads(a["scenarios"]).items()}
+        atomically(kept, export.parquet(
+            abouts[0] | {"scenarios": json.dumps(scenarios)}, whole))
     return export.from_parquet(kept)
 
 

@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+TICKS = (0.012, 0.025, 0.045, 0.1, 0.25)
 MARKS = {"paper": "o", "default": "^"}
-LEAST = 1e-5  # layout: relative errors below are drawn there
+# what lies beyond is drawn at the edge
+SHOWN = {"l_theta": (0.025, 0.12), "d_theta": (0.01, 3.0)}
 
 
 def colour(strategy: str) -> str:
@@ -44,11 +46,12 @@ def estimates(found: Mapping[Key, Group]) -> Figure:
                     g = found.get((scenario, strategy, protocol))
                     if g is None:
                         continue
-                    y = g.cells[parameter].estimates
+                    # what left the axes stands at their edge
+                    y = np.clip(g.cells[parameter].estimates, *SHOWN[parameter])
                     x = i + 0.16 * (k - 2) + side + rng.uniform(-0.015, 0.015, y.size)
                     axes.plot(x, y, MARKS[protocol], color=colour(strategy), markersize=3,
                               alpha=0.35, markeredgewidth=0,
-                              markerfacecolor=colour(strategy))
+                              markerfacecolor=colour(strategy), rasterized=True)
                 axes.plot(i + 0.16 * (k - 2), published(scenario, strategy, parameter), "x",
                           color="black", markersize=6)
         axes.axhline(g.cells[parameter].true if g else np.nan, color=MEASURED, linewidth=0.8)
@@ -58,8 +61,9 @@ def estimates(found: Mapping[Key, Group]) -> Figure:
         for i in range(1, len(SCENARIOS)):
             axes.axvline(i - 0.5, color=BAND, linewidth=0.6)
         axes.set_xlim(-0.5, len(SCENARIOS) - 0.5)
-    every[0].set_ylim(0.02, 3.0)
-    every[1].set_ylim(0.01, 12.0)
+        axes.set_ylim(0.95 * SHOWN[parameter][0], 1.05 * SHOWN[parameter][1])
+    every[0].set_yticks([0.03, 0.045, 0.06, 0.1], ["0.03", "0.045", "0.06", "0.1"])
+    every[0].minorticks_off()
     labels = [found[key].label for s in SCENARIOS for key in [next(k for k in found if k[0] == s)]]
     every[1].set_xticks(range(len(SCENARIOS)), labels)
     _key(every[0], {s: {"color": colour(s), "marker": "s", "linestyle": ""} for s in FIVE} | {
@@ -100,18 +104,16 @@ def trajectories(found: Mapping[Key, Group], scenario_name: str) -> Figure:
 def water() -> Figure:
     """As Fig. 4: the first mode, fitted to one run of filmed water and shown on it and another."""
     model = pk.Model.from_dict(MODELS["slosh"])
-    runs = ["LE_2D_0m_5s_900deg", "LE_2D_0m_5.5s_900deg"]
-    runs = [n for n in runs if n in datasets.SLOSH_MOTIONS] or list(datasets.SLOSH_MOTIONS[:2])
+    runs = ("LE_2D_0m_5s_900deg", "LE_2D_0m_5.3s_900deg")
     figure = new_figure(11.0, 3.4 * len(runs))
     train = datasets.slosh_lar_forced(runs[0])
     fitted = pk.NLS().fit(model, train).fitted_model
-    for k, (axes, name) in enumerate(zip(np.atleast_1d(figure.subplots(len(runs), 1)), runs,
-                                         strict=True)):
+    for axes, name in zip(figure.subplots(len(runs), 1), runs, strict=True):
         run = datasets.slosh_lar_forced(name)
         h, y = run["h"], simulate(fitted, run, t=run["h"].time)["h"]
         axes.plot(h.time, h.values, ".", color=MEASURED, markersize=4, label="filmed")
         axes.plot(y.time, y.values, color=COLOURS[0], linewidth=1.6, label="first mode, NLS")
-        axes.set_title(f"{name}, {'fitted' if k == 0 else 'held out'}", loc="left",
+        axes.set_title(f"{name}, {'fitted' if name == runs[0] else 'held out'}", loc="left",
                        fontsize="small")
         axes.set_ylabel("height [mm]")
         _legend(axes)
@@ -139,8 +141,8 @@ def pareto(found: Mapping[Key, Group]) -> Figure:
                     fmt=MARKS[protocol], color=colour(strategy), markersize=7,
                     markerfacecolor="white" if protocol == "paper" else colour(strategy))
         axes.axhline(cell.bound / cell.true, color="black", linewidth=0.8)
-        axes.text(0.02, cell.bound / cell.true * 1.08, "Cramér-Rao", fontsize="small",
-                  transform=axes.get_yaxis_transform())
+        axes.text(0.97, cell.bound / cell.true * 1.08, "Cramér-Rao", fontsize="small",
+                  ha="right", transform=axes.get_yaxis_transform())
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_title(g.label if g else scenario, loc="left", fontsize="small")
@@ -199,6 +201,8 @@ def basins(maps: Mapping[str, tuple[Basin, Any]], true: Mapping[str, float]) -> 
             axes.plot(0.06, 0.05, "P", color="white", markersize=8, markeredgecolor="black")
             axes.set_xscale("log")
             axes.set_yscale("log")
+            axes.set_xticks(TICKS, [f"{t:g}" for t in TICKS])
+            axes.minorticks_off()
             axes.set_title(f"{files.chosen([basin.scenario])[0].label}: {text}", loc="left",
                            fontsize="small")
         row[0].set_ylabel("start d₀ [N s/m]")

@@ -1,9 +1,9 @@
 """The paper's tables over repeated seeds, and a verdict on each of its claims.
 
-Usage: python benchmarks/report_benchmark.py FOLDER [STORE]
+Usage: python benchmarks/report_benchmark.py FOLDER [STORE ...]
 
-STORE is a folder of `pikanid benchmark`; its trials are exported to FOLDER/benchmark.parquet.
-Without it the trials exported before are read.  Writes FOLDER/benchmark.md and
+STORE is a folder of `pikanid benchmark`; trials of all are exported to FOLDER/benchmark.parquet.
+Without any the trials exported before are read.  Writes FOLDER/benchmark.md and
 FOLDER/figures/benchmark-*.svg and .png.  Experiments that take long are kept in
 build/benchmark-experiments until their code changes.
 """
