@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,20 @@ def test_a_file_of_ones_own(tmp_path: Path) -> None:
     assert one.true[free] == pytest.approx(1.1 * model.values[free])
     assert one.bound is not None and set(one.bound) == set(model.free_names)
     assert len(one.recording(0)[model.output_names[0]]) == 30
+
+
+def test_the_readmes_scenario_can_be_read(tmp_path: Path) -> None:
+    readme = (Path(__file__).resolve().parents[1] / "README.md").read_text("utf-8")
+    (content,) = (b for b in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+                  if b.startswith("[scenarios"))
+    (model,) = (b for b in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+                if b.startswith("name"))
+    (tmp_path / "my.toml").write_text(model, "utf-8")
+    pk.excitation.two_pulse().write(tmp_path / "motion.csv")
+    (tmp_path / "mine.toml").write_text(content, "utf-8")
+    (one,) = files.chosen([str(tmp_path / "mine.toml")])
+    assert one.true == {"l": 0.05} and one.fitted.values["l"] == 0.06
+    assert len(one.recording(0)["theta"]) == 126
 
 
 def text(**changes: str) -> str:
