@@ -43,7 +43,7 @@ def breakdown(found: Found, textbooks: list[Textbook]) -> list[Claim]:
         broken = np.any([Cell(t.estimates[:, k], np.zeros(len(t.estimates)), v, scenario.bound[p]
                               ).broken for k, (p, v) in enumerate(scenario.true.items())], axis=0)
         d = t.estimates[:, 1]
-        told.append(f"{t.solver}, {scenario.label}: "
+        told.append(f"{t.solver}, {scenario.label}, {len(d)} seeds: "
                     f"{percent(share(int(broken.sum()), broken.size))} % break down, median d "
                     f"{digits(float(np.median(d)))}, largest {digits(float(d.max()))}")
     claims.append(Claim("IV-C", "(The same, looked at from the other side.)",
