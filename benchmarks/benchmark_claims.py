@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from benchmark_data import Key
+from benchmark_data import Key, first
 from benchmark_tables import published
 
 from pikanid.reporting.benchmark_sheets import digits, percent, with_interval
@@ -235,11 +235,13 @@ def _superior(found: Found) -> Claim:
             g = found.get(("dense_low", name, protocol))
             if g is None:
                 continue
-            r = g.cells["d_theta"].ratio
-            best &= g.cpu >= nls.cpu and r.high >= nls.cells["d_theta"].ratio.low
-            parts.append(f"{name}, {protocol}: {digits(r.value)}, {digits(1e3 * g.cpu)} ms")
+            same = first(nls, g.seeds).cells["d_theta"].rmse.value
+            ratio = g.cells["d_theta"].rmse.value / same
+            best &= g.cpu >= nls.cpu and ratio > 0.99
+            parts.append(f"{name}, {protocol}: {digits(ratio)}, {digits(1e3 * g.cpu)} ms")
     return Claim("VI", "For well-posed problems with enough data NLS is superior in accuracy and "
-                 "efficiency.", "N = 501, 0.1°: RMSE/CRB of d, processor time", "; ".join(parts),
+                 "efficiency.", "N = 501, 0.1°: RMSE of d over that of NLS on the same "
+                 "seeds, processor time", "; ".join(parts),
                  YES if best else "confirmed in accuracy, not in time")
 
 

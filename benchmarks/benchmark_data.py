@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -33,6 +34,12 @@ def gathered(folder: Path, stores: Sequence[str]) -> tuple[dict[str, str], pd.Da
         atomically(kept, export.parquet(
             abouts[0] | {"scenarios": json.dumps(scenarios)}, whole))
     return export.from_parquet(kept)
+
+
+def first(g: Group, seeds: int) -> Group:
+    """The group with its first seeds only, to be compared with one that has no more."""
+    return replace(g, cells={p: replace(c, estimates=c.estimates[:seeds], std=c.std[:seeds])
+                             for p, c in g.cells.items()}, seeds=min(seeds, g.seeds))
 
 
 def keyed(frame: pd.DataFrame) -> dict[Key, Group]:

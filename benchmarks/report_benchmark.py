@@ -46,7 +46,8 @@ READ = (("sparse_high", "RK45, default tolerances", 20),
         ("sparse_high", "LSODA, default tolerances", 20), ("sparse_high", "LSODA, rtol 1e-6", 20),
         ("dense_high", "RK45, default tolerances", 4))
 CAPTIONS = {
-    "estimates": "Every estimate of the study; crosses: what the paper prints.",
+    "estimates": "Every estimate of the study, at the edge where it lies beyond; crosses: what the "
+                 "paper prints.",
     "trajectories": "As Fig. 5: the model at the estimates of one seed, N = 51, σ = 1°.",
     "water": "As Fig. 4, on water that was filmed: height of its highest point, and the fitted "
              "mode.",
