@@ -18,7 +18,7 @@ from pikanid.strategies.kan_grids import KanGrid
 from pikanid.strategies.relaxation import Setup, relax
 from pikanid.validation.study import slosh
 
-COLUMNS = tuple(s for s in slosh.SCENARIOS if s.noise < 1)  # clean and 0.1°, dense and sparse
+COLUMNS = tuple(s for s in slosh.SCENARIOS if slosh.noise(s) < 0.5)  # clean and 0.1°
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ import typer
 
 from pikanid import errors
 from pikanid.commands import interrupts, unforeseen
+from pikanid.commands.benchmark import EXAMPLES as BENCHMARK
+from pikanid.commands.benchmark import benchmark
 from pikanid.commands.channels import EXAMPLES as CHANNELS
 from pikanid.commands.channels import channels
 from pikanid.commands.conceal import EXAMPLES as CONCEAL
@@ -77,6 +79,7 @@ app.command(epilog=DESIGN)(design)
 app.command(epilog=SIMULATE)(simulate)
 app.command(epilog=MODELS)(models)
 app.command(epilog=STUDY)(study)
+app.command(epilog=BENCHMARK)(benchmark)
 app.command(epilog=EQUIVALENCE)(equivalence)
 app.command(epilog=EXTRACT)(extract)
 app.command(epilog=CONCEAL)(conceal)

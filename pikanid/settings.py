@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from math import inf
 from sys import float_info
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
@@ -138,8 +139,13 @@ def items(settings: Any) -> Iterator[tuple[str, Any]]:
 
 def changed(settings: Any) -> dict[str, Any]:
     """The fields that differ from the defaults of their dataclass, by name as in `items`."""
-    usual = dict(items(type(settings)()))
+    usual = _usual(type(settings))
     return {name: value for name, value in items(settings) if value != usual[name]}
+
+
+@cache
+def _usual(kind: Any) -> dict[str, Any]:
+    return dict(items(kind()))
 
 
 def told(settings: Any) -> str:

@@ -140,11 +140,19 @@ def test_torch_functional_is_the_functional(form: str) -> None:
     rows, r = loss.data_rows(), loss.residual(z, lam)
     at = torch.tensor(z, requires_grad=True)
     data, physics = loss(at)
+    assert loss._adjoints is not None
     sums = [float(part.detach()) * functional.n_data for part in (data, physics)]
     assert np.isclose(sums[0], np.sum(r[rows] ** 2), rtol=1e-10)
     assert np.isclose(lam * sums[1], np.sum(r[~rows] ** 2), rtol=1e-10)
     # gradient and Jacobian, both against finite differences of the NumPy residual
     (slope,) = torch.autograd.grad(data + lam * physics, at)
+    # the adjoints that are written out, against the graph of every formula
+    traced = loss.traced(at)
+    assert [float(part.detach()) for part in traced] == pytest.approx(
+        [float(data.detach()), float(physics.detach())], 1e-13)
+    for wanted, part in zip(traced, (data, physics), strict=True):
+        pulls = [torch.autograd.grad(p, at, retain_graph=True)[0] for p in (part, wanted)]
+        np.testing.assert_allclose(*pulls, rtol=1e-10, atol=1e-11 * float(pulls[1].abs().max()))
     again, jacobian = loss.linearised(z, lam)
     point = loss.unpack(z)
     np.testing.assert_allclose(functional.residual(point.coefficients, point.theta, lam), r,

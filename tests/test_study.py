@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from html import escape
 from io import StringIO
 from pathlib import Path
@@ -60,18 +61,19 @@ def test_single_fits_reach_the_reference() -> None:
 
 def test_spread_is_measured_against_the_bound() -> None:
     spread = slosh.repeated(DENSE_LOW, "nls", range(40))
-    assert spread.bound["l_theta"] == pytest.approx(9.89e-6, rel=1e-2)
+    assert spread.cells["l_theta"].bound == pytest.approx(9.89e-6, rel=1e-2)
     # χ² with 40 degrees of freedom: 99.9 % of the ratios lie in this interval.
     for name in slosh.TRUE:
-        assert 0.61 < spread.rmse[name] / spread.bound[name] < 1.43
+        assert 0.61 < spread.cells[name].ratio.value < 1.43
 
 
 def test_a_strategy_that_cannot_be_used_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclass(frozen=True)
     class Refuses:
         def fit(self, model: object, recording: object) -> None:
             raise errors.BadSetting("This cannot work.")
 
-    monkeypatch.setattr(slosh, "strategy_class", lambda name: Refuses)
+    monkeypatch.setattr(slosh.trial, "strategy_class", lambda name: Refuses)
     result = slosh.fit(DENSE_LOW, "nls", seed=0)
     assert result.estimate is None
     assert result.reason == "This cannot work."

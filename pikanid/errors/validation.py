@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from pikanid.errors.wording import listed, short
+from pikanid.errors.wording import did_you_mean, listed, short
 
 
 def conceal_diverged() -> str:
@@ -99,3 +99,72 @@ def conceal_one_time_base(name: str) -> str:
 
 def conceal_at_rest(output: str) -> str:
     return f"Output '{short(output)}' does not move in this experiment: choose one that drives it."
+
+
+def unknown_scenario(name: str, known: Iterable[str], close: Sequence[str]) -> str:
+    return (f"'{short(name)}' is no scenario (known: {listed(known)}; a file of your own ends in "
+            f".toml).{did_you_mean(close)}")
+
+
+def unknown_strategy(name: str, known: Iterable[str]) -> str:
+    return f"'{short(name)}' is no strategy of the benchmark (known: {listed(known)})."
+
+
+def scenario_twice(name: str) -> str:
+    return f"Two different scenarios are called '{short(name)}': give one of them another name."
+
+
+def scenario_compares_nothing(name: str) -> str:
+    return (f"Scenario '{short(name)}': no free parameter of the fitted model is one of the model "
+            "that makes the data, so that no error could be told: free one, or call it the same.")
+
+
+def store_in_use(folder: str) -> str:
+    return (f"Another benchmark is writing to '{short(folder, 200)}': wait for it, or choose "
+            "another --out.")
+
+
+def store_taken(path: str, count: int) -> str:
+    return (f"'{short(path, 200)}' holds {count} trials of an earlier run: continue it with "
+            "--resume, or choose another --out.")
+
+
+def store_unreadable(path: str, detail: str) -> str:
+    return (f"The store '{short(path, 200)}' cannot be used: {short(detail)}. Restore it, or "
+            "choose another --out.")
+
+
+def store_of_other_format(path: str) -> str:
+    return (f"'{short(path, 200)}' was written by another version of this program: continue it "
+            "with that one, or choose another --out.")
+
+
+def store_of_other_versions(path: str, differ: Sequence[str]) -> str:
+    return (f"'{short(path, 200)}' was made with {listed(differ)}: continue it with "
+            "the same versions, or choose another --out.")
+
+
+def store_of_other_scenario(path: str, name: str) -> str:
+    return (f"'{short(path, 200)}' holds another scenario called '{short(name)}': give this one "
+            "another name, or choose another --out.")
+
+
+def workers_lost() -> str:
+    return ("A worker process was ended from outside (memory may have run out): the trials that "
+            "were finished are kept; go on with --resume, perhaps with fewer --workers.")
+
+
+def no_scheduler(address: str, detail: str) -> str:
+    return (f"No Dask scheduler answers at '{short(address, 200)}' ({short(detail)}): start one "
+            "with `dask scheduler`, and give its address, such as tcp://127.0.0.1:8786.")
+
+
+def no_workers(address: str) -> str:
+    return (f"The Dask scheduler at '{short(address, 200)}' has no workers: start some with "
+            f"`dask worker {short(address, 200)}`.")
+
+
+def cluster_failed(address: str, detail: str) -> str:
+    return (f"A worker of '{short(address, 200)}' cannot run trials ({short(detail, 200)}): the "
+            "same versions of Python and pikanid must be installed there; then go on with "
+            "--resume.")

@@ -147,8 +147,21 @@ class Functional:
         with np.errstate(all="ignore"):
             return self._physics(self.parts[r].physics, coefficients, p, lam)
 
+    def rows_of(self, r: int, values: Sequence[Array], theta: Array, lam: float) -> list[Rows]:
+        """Data and physics families of recording r from the states, and then tops, (n + E, M) that
+        are given for each of them.
+        """
+        part, p = self.parts[r], self.problem.parameters(theta, r)
+        with np.errstate(all="ignore"):
+            *seen, physics = values
+            families = [_data_at(s, v, p) for s, v in zip(part.data, seen, strict=True)]
+            return [*families, self._physics_at(part.physics, physics, p, lam)]
+
     def _physics(self, sites: Sites, c: Array, p: Array, lam: float) -> Rows:
-        values, n = sites.values(c), len(self.chains.root)
+        return self._physics_at(sites, sites.values(c), p, lam)
+
+    def _physics_at(self, sites: Sites, values: Array, p: Array, lam: float) -> Rows:
+        n = len(self.chains.root)
         factor, tops = self._physics_factor(lam), values[n:]
         if self.penalty == "roughness":
             return Rows(sites.weight, factor, np.zeros(tops.T.shape), tops, None, None, True)
@@ -252,8 +265,12 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
 
 
 def _data(sites: Sites, c: Array, p: Array) -> Rows:
+    return _data_at(sites, sites.values(c), p)
+
+
+def _data_at(sites: Sites, values: Array, p: Array) -> Rows:
     assert sites.lines is not None and sites.target is not None
-    y, hx, hp = sites.lines(sites.t, sites.values(c).T, sites.u, p)
+    y, hx, hp = sites.lines(sites.t, values.T, sites.u, p)
     return Rows(sites.weight, ONE, y, sites.target, hx, hp)
 
 

@@ -16,8 +16,10 @@ from torch import Tensor
 
 from pikanid.approximators import Array
 from pikanid.approximators.mlp import MLP
+from pikanid.approximators.mlp_adjoint import adjoints
 from pikanid.objective.functional import Functional, Sites
 from pikanid.optimise.gauss_newton import Point
+from pikanid.optimise.gradient_adjoint import AtOnce, Parts
 from pikanid.simulation.torch_field import TorchField
 
 
@@ -62,12 +64,24 @@ class TorchFunctional:
             self.nets.append(tuple(_network(a).at(times) for a in part.approximators))
             self.data.append([self._family(times, sites) for sites in part.data])
             self.physics.append(self._family(times, part.physics))
+        written = [adjoints(own) for own in self.nets]
+        self._adjoints = None if None in written else [own for own in written if own is not None]
+        self._places = [[None if f.at is None else f.at.cpu().numpy()
+                         for f in (*data, physics)]
+                        for data, physics in zip(self.data, self.physics, strict=True)]
         self._first = [self._tensor(e.inputs(np.array([e.t0]))[0]) for e in problem.experiments]
         self._fixed = [[float(v) for v in problem.parameters(problem.guess, r)]
                        for r in range(len(problem.experiments))]
 
     def __call__(self, z: Tensor) -> tuple[Tensor, Tensor]:
         """Data and physics part at z (n,)."""
+        if self._adjoints is not None:
+            data, physics = AtOnce.apply(self, z)
+            return data, physics
+        return self.traced(z)
+
+    def traced(self, z: Tensor) -> tuple[Tensor, Tensor]:
+        """The same by a graph of every formula, on any device and for any order."""
         data, physics = z.new_zeros(()), z.new_zeros(())
         for families in self._residuals(z):
             *seen, equation = families
@@ -75,6 +89,16 @@ class TorchFunctional:
                 data = data + residual.square().sum()
             physics = physics + equation.square().sum()
         return data / self.functional.n_data, physics / self.functional.n_data
+
+    def parts(self, z: Array) -> Parts:
+        """Both parts at z (n,) and what their gradients are made from."""
+        assert self._adjoints is not None
+        return Parts(self.functional, self._adjoints, self._places, self.unpack(z))
+
+    def packed(self, by_coefficients: Sequence[Array], by_theta: Array) -> Array:
+        """A gradient by z (n,) of those by coefficients and by θ."""
+        own = [g[free] for g, free in zip(by_coefficients, self.free, strict=True)]
+        return np.concatenate([*own, by_theta * self.unit])
 
     def _residuals(self, z: Tensor) -> Iterator[list[Tensor]]:
         """For every recording its weighted residuals: data families, then physics without λ."""

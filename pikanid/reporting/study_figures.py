@@ -47,7 +47,7 @@ def trajectories(study: Study) -> Figure:
     truth = simulate(slosh.model(), drive)["theta"]
     for axes, sampling in zip(figure.subplots(2, 1, sharex=True), ("dense", "sparse"), strict=True):
         shown = [r for r in study.slosh_fits
-                 if (r.scenario.sampling, r.scenario.noise) == (sampling, SHOWN)]
+                 if r.scenario.name == f"{sampling}_high"]
         samples = slosh.recording(shown[0].scenario, seed=0)["theta"]
         axes.plot(samples.time, samples.values * 180 / pi, ".", color=BAND, markersize=4,
                   label=f"{len(samples)} samples")
@@ -77,7 +77,7 @@ def spread(study: Study) -> Figure:
         for k, name in enumerate(names):
             own = [s for s in study.spreads if s.strategy == name]
             at = [labels.index(s.scenario.label) + (k - (len(names) - 1) / 2) * width for s in own]
-            ratio = [s.rmse[parameter] / s.bound[parameter] for s in own]
+            ratio = [s.cells[parameter].ratio.value for s in own]
             axes.plot(at, ratio, "o", color=style(study, name)["color"], label=name)
         axes.axhline(1.0, color="black", linewidth=0.8)
         axes.set_yscale("log")

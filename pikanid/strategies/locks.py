@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from pikanid.optimise.gauss_newton import MAX_ITERATIONS, BandedSystem, Linearisation, gauss_newton
+from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, gauss_newton
 
 STIFF, STIFFEST = 1e10, 1e16  # numerical: λ that makes a trajectory solve its equations
+# One to three do from the λ before; where rounding at such a λ promises decreases for ever, a
+# hundred find no more than ten.
+ITERATIONS = 10  # limit: at one λ
 
 
 def follows_physics(system: BandedSystem, at: Linearisation, lam: float) -> bool:
@@ -16,7 +19,7 @@ def follows_physics(system: BandedSystem, at: Linearisation, lam: float) -> bool
     stiff = max(lam, STIFF)
     while stiff <= STIFFEST:
         held = gauss_newton(system, at, stiff, at.point.theta, at.point.theta,
-                            iterations=MAX_ITERATIONS)
+                            iterations=ITERATIONS)
         left = held.at.physics_cost * lam / stiff
         if left <= held.at.data_cost / system.functional.n_data:
             return True

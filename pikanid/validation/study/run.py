@@ -15,6 +15,7 @@ from pikanid import errors
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.storage.workers import begin
 from pikanid.strategies import STRATEGIES, strategy_class
+from pikanid.validation.benchmark.scenario import Scenario
 from pikanid.validation.study import pendulum, slosh
 
 SEED = 0  # definition: of the study's first recordings
@@ -37,7 +38,7 @@ class Study:
 
 def count_steps(strategies: Sequence[str] = tuple(STRATEGIES)) -> int:
     """How many steps `run` announces at most."""
-    noisy = sum(1 for s in slosh.SCENARIOS if s.noise)
+    noisy = sum(1 for s in slosh.SCENARIOS if not s.clean)
     return 2 + len(strategies) * (len(slosh.SCENARIOS) + noisy + 1)
 
 
@@ -68,7 +69,7 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
             singles.append(slosh.fit(scenario, name, SEED))
         spreads = []
         for result in singles:
-            if not result.scenario.noise or seeds < 1:
+            if result.scenario.clean or seeds < 1:
                 continue
             step(f"slosh, {result.scenario.label}, {result.strategy}, {seeds} seeds")
             if result.estimate is not None and result.estimate.seconds < REPEATABLE:
@@ -94,8 +95,8 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
 
 
 @contextmanager
-def _meanwhile(jobs: Sequence[tuple[slosh.Scenario, str]]
-               ) -> Iterator[dict[tuple[slosh.Scenario, str], AsyncResult[slosh.Result]]]:
+def _meanwhile(jobs: Sequence[tuple[Scenario, str]]
+               ) -> Iterator[dict[tuple[Scenario, str], AsyncResult[slosh.Result]]]:
     """Fits that one other process makes in the meantime; an interruption ends it."""
     if not jobs:
         yield {}

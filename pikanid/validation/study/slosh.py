@@ -1,4 +1,4 @@
-"""The simulation study: the slosh pendulum under Table II's two pulses, dense and sparse.
+"""The simulation study: the paper's scenarios of the benchmark, one seed and repeated ones.
 
 Table III of the paper uses all N = 501 samples, Table IV every tenth (N = 51); each without noise
 and with σ = 0.1° and 1°.  One seed shows what a user would see; repeated seeds show what to expect,
@@ -15,40 +15,16 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.estimate import Estimate
-from pikanid.model import Model, systems
-from pikanid.recording import Recording, excitation
-from pikanid.simulation import simulate
-from pikanid.strategies import strategy_class
-from pikanid.uncertainty import cramer_rao
+from pikanid.model import Model
+from pikanid.recording import Recording
+from pikanid.validation.benchmark import files, trial
+from pikanid.validation.benchmark.scenario import Scenario
+from pikanid.validation.benchmark.summary import Cell
 
-TRUE = {"l_theta": 0.045, "d_theta": 0.15}  # definition: of the paper
-START = {"l_theta": 0.06, "d_theta": 0.05}  # definition: of the paper
-SPARSE = 10  # definition: every so manieth sample
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """Sampling (every `stride`-th sample) and noise [deg] of one column of Tables III and IV."""
-
-    sampling: str
-    stride: int
-    noise: float
-
-    @property
-    def sigma(self) -> float:
-        """Standard deviation of the noise [rad]."""
-        return self.noise * pi / 180
-
-    @property
-    def label(self) -> str:
-        """Such as "sparse, 1°"."""
-        return f"{self.sampling}, {f'{self.noise:g}°' if self.noise else 'clean'}"
-
-
-SCENARIOS = tuple(
-    Scenario(sampling, stride, noise)
-    for sampling, stride in (("dense", 1), ("sparse", SPARSE))
-    for noise in (0.0, 0.1, 1.0))  # definition: of the paper
+PROTOCOL = "default"  # definition: of the study
+SCENARIOS = tuple(files.chosen(["paper"]))  # definition: of the paper
+TRUE = SCENARIOS[0].true  # definition: of the paper
+START = {p: SCENARIOS[0].fitted.values[p] for p in TRUE}  # definition: of the paper
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,19 +43,30 @@ class Result:
 
 @dataclass(frozen=True)
 class Spread:
-    """Errors over repeated seeds, by parameter; `bound` is the Cramér-Rao standard deviation."""
+    """Estimates over repeated seeds, by parameter."""
 
     scenario: Scenario
     strategy: str
-    seeds: int
-    rmse: Mapping[str, float]
-    bias: Mapping[str, float]
-    bound: Mapping[str, float]
+    cells: Mapping[str, Cell]
 
 
 def model() -> Model:
     """Eq. (6) at the true values of the study."""
-    return systems.sloshing().with_values(TRUE)
+    return SCENARIOS[0].truth
+
+
+def sampling(scenario: Scenario) -> str:
+    """"dense" (Table III) or "sparse" (Table IV)."""
+    return "dense" if scenario.stride == 1 else "sparse"
+
+
+def noise(scenario: Scenario) -> float:
+    """Standard deviation [deg], 0 without noise.
+
+    >>> [round(noise(s), 12) for s in SCENARIOS[:3]]
+    [0.0, 0.1, 1.0]
+    """
+    return scenario.noise["theta"].sigma * 180 / pi
 
 
 def recording(scenario: Scenario, seed: int) -> Recording:
@@ -88,14 +75,13 @@ def recording(scenario: Scenario, seed: int) -> Recording:
     >>> len(recording(SCENARIOS[4], seed=0)["theta"])
     51
     """
-    full = simulate(model(), excitation.two_pulse(), sigma=scenario.sigma, seed=seed)
-    return full.decimate(scenario.stride, channels=["theta"])
+    return scenario.recording(seed)
 
 
 def fit(scenario: Scenario, name: str, seed: int) -> Result:
     """One strategy, started at Table II's p0, on one noisy recording."""
     try:
-        found = strategy_class(name)().fit(model().with_values(START), recording(scenario, seed))
+        found = trial.fit(scenario, name, PROTOCOL, seed)
     except errors.PikanidError as problem:
         return Result(scenario, name, None, str(problem))
     return Result(scenario, name, found)
@@ -103,11 +89,11 @@ def fit(scenario: Scenario, name: str, seed: int) -> Result:
 
 def repeated(scenario: Scenario, name: str, seeds: Sequence[int]) -> Spread:
     """The same fit over many noisy recordings."""
-    results = [fit(scenario, name, seed) for seed in seeds]
-    errors_of = {p: np.array([r.error(p) for r in results]) for p in TRUE}
-    bound = cramer_rao(model(), recording(scenario, seeds[0]))
-    return Spread(
-        scenario, name, len(results),
-        {p: float(np.sqrt(np.mean(e**2))) for p, e in errors_of.items()},
-        {p: float(np.mean(e)) for p, e in errors_of.items()},
-        {p: bound.std(p) for p in TRUE})
+    outcomes = [trial.run(scenario, trial.Trial(scenario.name, name, PROTOCOL, seed))
+                for seed in seeds]
+    nothing, bound = (np.nan, np.nan), scenario.bound or {}
+    cells = {}
+    for p, true in scenario.true.items():
+        pairs = np.array([o.values.get(p, nothing) for o in outcomes])
+        cells[p] = Cell(pairs[:, 0], pairs[:, 1], true, bound.get(p, np.nan))
+    return Spread(scenario, name, cells)
