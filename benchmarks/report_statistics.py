@@ -26,7 +26,7 @@ from provenance import provenance
 from scipy.stats import chi2
 
 from pikanid import errors
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.strategies import IPDA, NLS, PIKAN
 from pikanid.uncertainty import cramer_rao
 from pikanid.validation.study import slosh
