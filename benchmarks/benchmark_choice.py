@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from benchmark_data import FIVE, Key, first
 
+from pikanid.pieces.sheet import Sheet
 from pikanid.reporting.benchmark_sheets import digits, percent
-from pikanid.reporting.sheet import Sheet
 from pikanid.validation.benchmark.cells import Group
 from pikanid.validation.benchmark.files import GROUPS
 

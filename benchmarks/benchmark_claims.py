@@ -9,8 +9,8 @@ import numpy as np
 from benchmark_data import Key, first
 from benchmark_tables import published
 
+from pikanid.pieces.sheet import Sheet
 from pikanid.reporting.benchmark_sheets import digits, percent, with_interval
-from pikanid.reporting.sheet import Sheet
 from pikanid.simulation import simulate
 from pikanid.validation.benchmark import files
 from pikanid.validation.benchmark.cells import Group

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from benchmark_data import FIVE, NAMES, SCENARIOS, Key
 
+from pikanid.pieces.sheet import Sheet
 from pikanid.reporting.benchmark_sheets import digits, percent, with_interval
-from pikanid.reporting.sheet import Sheet
 from pikanid.reporting.study_sheets import PAPER
 from pikanid.validation.benchmark.cells import Group
 from pikanid.validation.benchmark.trial import PROTOCOLS

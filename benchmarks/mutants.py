@@ -252,7 +252,7 @@ def report(folder: str) -> None:
     prepare()
     from provenance import provenance
 
-    from pikanid.reporting.sheet import Sheet
+    from pikanid.pieces.sheet import Sheet
 
     reasons = tomllib.loads(REASONS.read_text(encoding="utf-8"))
     counts: dict[str, Counter[str]] = {}

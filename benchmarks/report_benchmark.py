@@ -31,9 +31,9 @@ from joblib import Memory
 from provenance import provenance
 
 from pikanid.figures import image
+from pikanid.pieces.sheet import Sheet
 from pikanid.reporting import benchmark_sheets as sheets
 from pikanid.reporting.benchmark_report import EXPLAINED
-from pikanid.reporting.sheet import Sheet
 from pikanid.storage.outputs import together
 from pikanid.validation.benchmark import files
 

@@ -29,7 +29,7 @@ from bias_table2 import COLUMNS, HEADERS, PUBLISHED, choices, estimate
 from provenance import provenance
 
 from pikanid.figures import save_figure
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.strategies.kan_paper import COLLOCATION, STAGES
 from pikanid.strategies.pikan import PIKAN

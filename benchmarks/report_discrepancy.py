@@ -20,7 +20,7 @@ from provenance import provenance
 
 from pikanid.discrepancy.api import GRID
 from pikanid.figures import new_figure, save_figure, tidy
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.storage.outputs import atomically
 
 SIZES = (20.0, 100.0)

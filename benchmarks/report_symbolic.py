@@ -34,7 +34,7 @@ from symbolic_networks import INPUTS, NETWORKS, NOISE, data, run_network, run_py
 from symbolic_store import collected as collected_or_stored
 
 from pikanid.figures import new_figure, save_figure, tidy
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.symbolic import extract
 

@@ -24,7 +24,7 @@ from scipy.stats import binomtest
 import pikanid as pk
 from pikanid.comparison.predictions import BASELINE
 from pikanid.figures import save_figure
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.storage.outputs import atomically
 
 FIRST = 50  # samples of a Silverbox test that may serve to find the initial state

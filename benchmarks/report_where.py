@@ -27,7 +27,7 @@ from provenance import provenance
 from scipy.integrate import solve_ivp
 
 import pikanid as pk
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.validation.concealed.acting import closed, spans
 from pikanid.validation.concealed.where import Region, f1, inside, intersection_over_union

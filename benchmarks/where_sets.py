@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.validation.concealed.acting import experiment_of, truth_of
 from pikanid.validation.concealed.where import Place, place, tally
 

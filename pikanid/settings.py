@@ -139,7 +139,8 @@ def items(settings: Any) -> Iterator[tuple[str, Any]]:
 
 def changed(settings: Any) -> dict[str, Any]:
     """The fields that differ from the defaults of their dataclass, by name as in `items`."""
-    usual = _usual(type(settings))
+    kind: Any = type(settings)
+    usual = _usual(kind)
     return {name: value for name, value in items(settings) if value != usual[name]}
 
 

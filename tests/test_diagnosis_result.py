@@ -44,7 +44,7 @@ def test_where_is_said_in_words_and_as_data() -> None:
     assert "the dynamics and the sensor" in _where(several) and "acts at" not in _where(several)
     beside = replace(said, where=replace(said.where, parameters={"k": Value(30.0, 0.1, "1/s^2")}))
     assert "\n  with a free force there: k = 30.00 ± 0.10 1/s^2\n" in str(beside)
-    assert "With a free force there: k = 30.00 ± 0.10 1/s^2." in _where(beside)
+    assert "With a free force there: k = 30.00 ± 0.10 1/s²." in _where(beside)
     none = replace(said, where=replace(said.where, channels=()))
     assert [d.where.channel for d in (said, several, none)] == ["dynamics", "several", "undecided"]
     assert "channel undecided" in str(none) and "undecided between" in _where(none)

@@ -14,7 +14,7 @@ from scipy.stats import t as student
 import pikanid as pk
 from pikanid import errors
 from pikanid.estimate import Estimate
-from pikanid.estimate.estimate import rounded
+from pikanid.estimate.rounding import rounded
 from pikanid.model import systems
 from pikanid.recording import excitation
 

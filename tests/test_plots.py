@@ -40,7 +40,7 @@ def test_no_band_without_sigma() -> None:
 
 def test_recordings_are_named_where_there_are_several() -> None:
     figure = plot_fits([FIT, replace(FIT, recording="other")])
-    assert [figure.axes[k].get_title(loc="left") for k in (0, 2)] == ["run", "other"]
+    assert [figure.axes[k].get_title(loc="left") for k in (1, 3)] == ["run", "other"]
 
 
 def test_unsorted_samples_are_drawn_in_the_order_of_time() -> None:

@@ -25,7 +25,7 @@ def case(later: bool = True, lost: object = None) -> Any:
     level = SimpleNamespace(sigma=0.5)
     return SimpleNamespace(
         base=BASE, predicted=lambda h: None if h is lost else known[id(h)],
-        later=SimpleNamespace(levels=({"y": level},)) if later else None,
+        later=SimpleNamespace(levels=({"y": level},), recordings=()) if later else None,
         model=SimpleNamespace(outputs=(SimpleNamespace(name="y", unit="m"),)))
 
 

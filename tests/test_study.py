@@ -14,9 +14,9 @@ from rich.console import Console
 import pikanid as pk
 from pikanid import errors
 from pikanid.model import systems
+from pikanid.pieces.sheet import Sheet
 from pikanid.recording import datasets
 from pikanid.reporting import study_report, study_sheets
-from pikanid.reporting.sheet import Sheet
 from pikanid.validation.study import pendulum, run, slosh
 
 DENSE_LOW = slosh.SCENARIOS[1]

@@ -98,7 +98,7 @@ def validate(
         from pikanid.reporting.validation_page import page
 
         made[report] = page(found, ", ".join(r.name for r in records),
-                            dict(zip(compared, bare, strict=True))).encode()
+                            compared).encode()
     written(made, json_, found.to_dict())
     if not quiet and json_ != STDOUT:
         from pikanid.reporting.validation_tables import show_validation

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pikanid.figures import BAND, MEASURED, WIDE, labelled, new_figure, stroke, tidy
+from pikanid.figures import (
+    BAND,
+    MEASURED,
+    NARROW,
+    WIDE,
+    fewer,
+    labelled,
+    new_figure,
+    stroke,
+    tidy,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,18 +27,22 @@ if TYPE_CHECKING:
 MANY = 2000  # layout: samples beyond which markers merge: then a thin line
 
 
-def plot_validation(predictions: Mapping[str, Sequence[Prediction]]) -> Figure:
+def plot_validation(predictions: Mapping[str, Sequence[Prediction]], narrow: bool = False
+                    ) -> Figure:
     """Measured against predicted (left) and the errors (right); the first model is the best.
 
     Around the prediction of the best model lies its 95 % band: what the parameters' covariance and
     the noise allow a measured sample.  The grey band of the errors is ±2σ of the noise.
+    With `narrow`, for a phone, the errors lie below.
     """
     rows = list(zip(*predictions.values(), strict=True))
-    figure = new_figure(11.0, 0.8 + 2.8 * len(rows))
-    grid = figure.subplots(len(rows), 2, squeeze=False, sharex="row")
+    figure = new_figure(NARROW if narrow else 11.0, 0.8 + (4.4 if narrow else 2.8) * len(rows))
+    shape = (2 * len(rows), 1) if narrow else (len(rows), 2)
+    grid = figure.subplots(*shape, squeeze=False).reshape(len(rows), 2)
     several = len({row[0].recording for row in rows}) > 1
     for (left, right), row in zip(grid, rows, strict=True):
         first = row[0]
+        right.sharex(left)
         style = ({"marker": ".", "markersize": 4, "linestyle": "none"}
                  if len(first.t) <= MANY else {"linewidth": 1.6})
         left.plot(first.t, first.measured, color=MEASURED, label="measured", zorder=1, **style)
@@ -54,8 +68,9 @@ def plot_validation(predictions: Mapping[str, Sequence[Prediction]]) -> Figure:
         if several:
             right.set_title(first.recording, fontsize="small", loc="right")
     handles = [h for axes in grid[0] for h in axes.get_legend_handles_labels()[0]]
-    figure.legend(handles=handles, loc="outside upper left", ncols=6, frameon=False,
-                  fontsize="small", handlelength=1.6, columnspacing=1.2)
+    figure.legend(handles=handles, loc="outside upper left",
+                  ncols=fewer(figure, 6), frameon=False, fontsize="small",
+                  handlelength=1.6, columnspacing=1.2)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
     return figure

@@ -112,14 +112,14 @@ class ResidualAnalysis:
                 "sentence": self.sentence(), "rho": self.white.rho,
                 "tests": [asdict(t) for t in self.tests], "feedback": list(self.feedback)}
 
-    def plot(self) -> matplotlib.figure.Figure:
-        """All of it in one figure."""
+    def plot(self, narrow: bool = False) -> matplotlib.figure.Figure:
+        """All of it in one figure; `narrow`: for a phone."""
         from pikanid.comparison.residual_drawing import plot_residual
 
         return plot_residual(
             f"{self.model}: residual of {self.output}, {self.recording}", self.white,
             self.autocorrelation, self.crosscorrelation, self.spectrum, self.dependences,
-            self.alpha)
+            self.alpha, self.unit, narrow)
 
 
 def _p(value: float) -> str:

@@ -12,7 +12,17 @@ from pikanid.comparison.correlations import Correlation
 from pikanid.comparison.dependence import Dependence
 from pikanid.comparison.spectrum import Spectrum
 from pikanid.comparison.whitened import White
-from pikanid.figures import BAND, COLOURS, MEASURED, labelled, new_figure, tidy
+from pikanid.figures import (
+    BAND,
+    COLOURS,
+    MEASURED,
+    NARROW,
+    broken,
+    labelled,
+    new_figure,
+    tidy,
+    unit_text,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,8 +33,8 @@ MANY = 3000  # layout: points that are drawn at most
 
 
 def plot_residual(title: str, white: White, auto: Correlation, cross: Mapping[str, Correlation],
-                  spectrum: Spectrum | None, dependences: Sequence[Dependence], alpha: float
-                  ) -> Figure:
+                  spectrum: Spectrum | None, dependences: Sequence[Dependence], alpha: float,
+                  unit: str = "", narrow: bool = False) -> Figure:
     """Autocorrelation, cross-correlation with every input, spectrum, coherence, normal quantiles,
     and the residual against every state and input; grey is where 1 - α of the values of a right
     model lie.
@@ -34,6 +44,8 @@ def plot_residual(title: str, white: White, auto: Correlation, cross: Mapping[st
         white: The whitened residual.
         auto, cross, spectrum, dependences: See `pikanid.comparison.residual_analysis`.
         alpha: Probability outside of each band.
+        unit: Of the output.
+        narrow: For a phone: the panels in one column.
     """
     panels: list[Callable[[Axes], None]] = [
         partial(_correlation, found=auto, label="autocorrelation", alpha=alpha)]
@@ -41,15 +53,16 @@ def plot_residual(title: str, white: White, auto: Correlation, cross: Mapping[st
                for name, c in cross.items()]
     panels.append(partial(_quantiles, white=white, alpha=alpha))
     if spectrum is not None:
-        panels.append(partial(_power, found=spectrum))
+        panels.append(partial(_power, found=spectrum, unit=unit))
         if spectrum.coherence:
             panels.append(partial(_coherence, found=spectrum))
     panels += [partial(_dependence, found=d, white=white, alpha=alpha) for d in dependences]
-    rows = -(-len(panels) // ACROSS)
-    figure = new_figure(12.0, 0.6 + 2.7 * rows)
+    across = 1 if narrow else ACROSS
+    rows = -(-len(panels) // across)
+    figure = new_figure(NARROW if narrow else 12.0, 0.6 + (2.0 if narrow else 2.7) * rows)
     grey = f"grey: {100 * (1 - alpha):g} % of a right model's"
-    figure.suptitle(f"{title} ({grey})".replace("$", r"\$"), fontsize="medium")
-    axes = figure.subplots(rows, ACROSS, squeeze=False).ravel()
+    figure.suptitle(broken(f"{title} ({grey})", figure), fontsize="medium")
+    axes = figure.subplots(rows, across, squeeze=False).ravel()
     for draw, own in zip(panels, axes, strict=False):
         draw(own)
         tidy(own)
@@ -95,13 +108,13 @@ def _quantiles(axes: Axes, white: White, alpha: float) -> None:
     axes.set_ylabel("residual [s.d.]")
 
 
-def _power(axes: Axes, found: Spectrum) -> None:
+def _power(axes: Axes, found: Spectrum, unit: str) -> None:
     axes.fill_between(found.frequency, found.low * found.noise, found.high * found.noise,
                       color=BAND, alpha=0.6, linewidth=0)
     axes.plot(found.frequency, found.power, color=COLOURS[0], linewidth=1.2)
     axes.set_yscale("log")
     axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel("power density")
+    axes.set_ylabel(labelled("power density", f"{unit_text(unit)}²/Hz" if unit else "1/Hz"))
 
 
 def _coherence(axes: Axes, found: Spectrum) -> None:

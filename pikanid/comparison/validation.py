@@ -12,12 +12,14 @@ from pikanid.comparison.bootstrap import Pair
 from pikanid.comparison.predictions import BASELINE, Prediction, Protocol
 from pikanid.comparison.residual_analysis import ResidualAnalysis
 from pikanid.comparison.scores import Score
+from pikanid.figures import unit_text
 
 if TYPE_CHECKING:
     import matplotlib.figure
     import pandas as pd
 
 NOISE = "noise"
+NUMBERS = ("N", "RMSE", "fit %", "R²", "χ²/dof", "parameters", "AIC", "BIC")
 ALPHA = 0.01  # definition: of a difference that is called significant, unless it is said
 
 
@@ -125,15 +127,17 @@ class Validation:
                 str(s.parameters), f"{s.aic:.6g}", f"{s.bic:.6g}")
             cells.append((
                 s.model, s.recording, s.output, {True: "yes", False: "no", None: "?"}[s.held_out]
-                if s.model != NOISE else "", str(s.n), f"{s.rmse:.4g}", s.unit or "-",
+                if s.model != NOISE else "", str(s.n), f"{s.rmse:.4g}", unit_text(s.unit) or "-",
                 f"{s.fit:.2f}", f"{s.r2:.5g}", f"{s.chi2 / s.dof:.4g}", *counts))
         return headers, tuple(cells)
 
-    def plot(self) -> matplotlib.figure.Figure:
-        """Measured against predicted and the errors, a row of axes an output and recording."""
+    def plot(self, narrow: bool = False) -> matplotlib.figure.Figure:
+        """Measured against predicted and the errors, a row of axes an output and recording;
+        `narrow`: for a phone.
+        """
         from pikanid.comparison.drawing import plot_validation
 
-        return plot_validation({name: self.predictions[name] for name in self.ranking})
+        return plot_validation({name: self.predictions[name] for name in self.ranking}, narrow)
 
     def __str__(self) -> str:
         headers, cells = self.rows()
@@ -147,15 +151,12 @@ class Validation:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        from html import escape
+        from pikanid.pieces.html import tabled, text
+        from pikanid.pieces.sheet import Sheet
 
-        headers, cells = self.rows()
-        head = "".join(f"<th>{escape(h)}</th>" for h in headers)
-        body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>"
-                       for row in cells)
-        notes = "".join(f"<p>{escape(n)}</p>" for n in self.notes)
-        return (f"<p>{escape(self.sentence())} {escape(str(self.protocol))}</p>"
-                f"<table><tr>{head}</tr>{body}</table>{notes}")
+        notes = "".join(f"<p>{text(n)}</p>" for n in self.notes)
+        return (f"<p>{text(self.sentence())} {text(str(self.protocol))}</p>"
+                f"{tabled(Sheet(*self.rows(), NUMBERS))}{notes}")
 
 
 def _and(names: list[str]) -> str:

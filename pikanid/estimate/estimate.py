@@ -14,6 +14,7 @@ from pikanid.comparison import ResidualAnalysis, Validation, resid, validate
 from pikanid.comparison.predict import predict
 from pikanid.estimate import file as estimate_file
 from pikanid.estimate.data import EstimateData, Fit
+from pikanid.estimate.rounding import rounded
 from pikanid.model import Model
 from pikanid.recording import Recording
 
@@ -217,11 +218,13 @@ class Estimate(EstimateData):
         columns = ["parameter", "value", "std", "lower", "upper", "unit"]
         return pd.DataFrame(rows, columns=columns).set_index("parameter")
 
-    def plot(self) -> matplotlib.figure.Figure:
-        """Measured against fitted, and the residual; one row of axes an output and recording."""
+    def plot(self, narrow: bool = False) -> matplotlib.figure.Figure:
+        """Measured against fitted, and the residual, a row an output and recording; `narrow`: for
+        a phone.
+        """
         from pikanid.estimate.plots import plot_fits
 
-        return plot_fits(self.fits, title=f"{self.model.name}: {self.strategy}")
+        return plot_fits(self.fits, f"{self.model.name}: {self.strategy}", narrow)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write everything but the approximator's object to one file (JSON, gzip if *.gz)."""
@@ -263,31 +266,16 @@ class Estimate(EstimateData):
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        from html import escape
+        from pikanid.figures import unit_text
+        from pikanid.pieces.html import tabled, text
+        from pikanid.pieces.sheet import Sheet
 
-        rows = "".join(
-            f"<tr><td>{escape(f.label)}</td><td>{v:.6g}</td><td>{s:.2g}</td>"
-            f"<td>{escape(f.unit)}</td></tr>"
-            for f, v, s in zip(self.free, self.theta, np.sqrt(np.diag(self.covariance)),
-                               strict=True))
-        notes = "".join(f"<p>warning: {escape(w)}</p>" for w in self.warnings)
-        return (f"<b>{escape(self.strategy)}</b> estimate of {escape(self.model.name)}"
-                "<table><tr><th>parameter</th><th>value</th><th>std. error</th><th>unit</th></tr>"
-                f"{rows}</table><p>{escape(self.sentence())}</p>{notes}")
-
-
-def rounded(value: float, std: float) -> str:
-    """Value and standard error with two significant digits of the error.
-
-    >>> rounded(0.0450123, 0.0000099)
-    '0.0450123 ± 0.0000099'
-    """
-    if not np.isfinite(std) or std <= 0:
-        return f"{value:.6g}"
-    digits = int(np.clip(1 - np.floor(np.log10(std)), 0, 12))
-    if abs(value) >= 1e6 or 0 < abs(value) < 1e-5 or digits > 10:
-        return f"{value:.6e} ± {std:.1e}"
-    return f"{value:.{digits}f} ± {std:.{digits}f}"
+        sheet = Sheet(("parameter", "estimate ± std. error", "unit"), tuple(
+            (f.label, rounded(self.value(f.name, f.recording), self.std(f.name, f.recording)),
+             unit_text(f.unit) or "-") for f in self.free))
+        notes = "".join(f"<p>warning: {text(w)}</p>" for w in self.warnings)
+        return (f"<b>{text(self.strategy)}</b> estimate of {text(self.model.name)}"
+                f"{tabled(sheet)}<p>{text(self.sentence())}</p>{notes}")
 
 
 def _plain(value: Any) -> Any:

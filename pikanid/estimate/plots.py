@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from pikanid.figures import BAND, COLOURS, MEASURED, WIDE, labelled, new_figure, stroke, tidy
+from pikanid.figures import (
+    BAND,
+    COLOURS,
+    MEASURED,
+    NARROW,
+    WIDE,
+    fewer,
+    labelled,
+    new_figure,
+    stroke,
+    tidy,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +67,7 @@ class FitLike(Protocol):
         """Standard deviation of `fitted` (N,) by the parameters' covariance, or None."""
 
 
-def plot_fits(fits: Sequence[FitLike], title: str = "") -> Figure:
+def plot_fits(fits: Sequence[FitLike], title: str = "", narrow: bool = False) -> Figure:
     """Measured against fitted (left) and the residual (right), a row for every output.
 
     The grey band of the residual is ±2σ where the noise σ is known.  In the coloured band around
@@ -70,29 +81,34 @@ def plot_fits(fits: Sequence[FitLike], title: str = "") -> Figure:
     >>> [axes.get_ylabel() for axes in plot_fits([fit]).axes]
     ['theta [rad]', 'residual [rad]']
     """
-    return plot_strategies({"fitted": fits}, title)
+    return plot_strategies({"fitted": fits}, title, narrow)
 
 
-def plot_strategies(fits: Mapping[str, Sequence[FitLike]], title: str = "") -> Figure:
+def plot_strategies(fits: Mapping[str, Sequence[FitLike]], title: str = "", narrow: bool = False
+                    ) -> Figure:
     """As `plot_fits`, with one colour for every strategy; all of them fitted the same samples.
 
     Args:
         fits: Name in the legend -> fits, in the same order for every name.
         title: Of the whole figure.
+        narrow: For a phone: the residual below.
     """
     rows = list(zip(*fits.values(), strict=True))
-    figure = new_figure(11.0, 0.7 + 2.7 * max(len(rows), 1))
+    figure = new_figure(NARROW if narrow else 11.0,
+                        0.7 + (4.4 if narrow else 2.7) * max(len(rows), 1))
     if title:
         figure.suptitle(title, fontsize="medium")
     if not rows:
         return figure
-    grid = figure.subplots(len(rows), 2, squeeze=False, sharex="row")
+    shape = (2 * len(rows), 1) if narrow else (len(rows), 2)
+    grid = figure.subplots(*shape, squeeze=False).reshape(len(rows), 2)
     several = len({fit.recording for fit, *_ in rows}) > 1
     for row, (left, right) in zip(rows, grid, strict=True):
+        right.sharex(left)
         _curves(left, dict(zip(fits, row, strict=True)))
         _residuals(right, dict(zip(fits, row, strict=True)))
         if several:
-            left.set_title(row[0].recording, fontsize="small", loc="left")
+            right.set_title(row[0].recording.replace("$", r"\$"), fontsize="small", loc="left")
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
     return figure
@@ -112,8 +128,9 @@ def _curves(axes: Axes, fits: Mapping[str, FitLike]) -> None:
         axes.plot(fit.t[order], fit.fitted[order], label=name, **stroke(k, 0.7))
     axes.set_ylabel(labelled(first.output, first.unit))
     # Above the axes: inside, a legend would cover an oscillation somewhere.
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(fits) + 2, frameon=False,
-                fontsize="small", borderaxespad=0.1, handlelength=1.4)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small",
+                ncols=fewer(axes.figure, len(fits) + 2, 3), frameon=False, borderaxespad=0.1,
+                handlelength=1.4)
     tidy(axes)
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pikanid.reporting.console import console, sentence
+from pikanid.pieces.sheet import sentence
+from pikanid.reporting.console import console
 from pikanid.validation.benchmark.trial import Outcome
 
 if TYPE_CHECKING:

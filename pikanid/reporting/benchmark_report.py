@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pikanid.reporting import benchmark_sheets as sheets
+from pikanid.reporting.tables import shown
 from pikanid.storage.outputs import together
 from pikanid.validation.benchmark import export
 from pikanid.validation.benchmark.cells import Group, groups
@@ -44,7 +45,7 @@ def show(screen: Console, folder: Path) -> None:
     for parameter in parameters(found):
         screen.print()
         screen.print(parameter, style="bold", markup=False)
-        screen.print(sheets.summary(found, parameter).to_rich())
+        screen.print(shown(sheets.summary(found, parameter)))
     for why in sheets.reasons(found):
         screen.print(f"No estimate: {why}", markup=False, soft_wrap=True)
 

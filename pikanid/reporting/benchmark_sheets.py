@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.validation.benchmark.cells import Group
 from pikanid.validation.benchmark.summary import Cell, Interval
 

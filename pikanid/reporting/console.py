@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
+from pikanid.pieces.sheet import sentence
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -35,15 +37,6 @@ def console(stream: TextIO | None = None) -> Console:
     return Console(file=file, color_system="auto" if lively else None,
                    force_terminal=None if lively else False, no_color=not lively,
                    width=None if file.isatty() else PIPE_WIDTH, highlight=False, emoji=False)
-
-
-def sentence(text: str) -> str:
-    """Text on one line, without control characters that a file could smuggle into a terminal.
-
-    >>> sentence("bad\\x1b[31m name\\nhere")
-    'bad [31m name here'
-    """
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def complain(text: str) -> None:

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from html import escape
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from pikanid.figures import image
 from pikanid.storage.version import __version__
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from pikanid.model import Model
-    from pikanid.reporting.sheet import Sheet
 
 
 def document(title: str, parts: Sequence[str], models: Mapping[str, Model] = MappingProxyType({}),
@@ -37,8 +31,17 @@ def document(title: str, parts: Sequence[str], models: Mapping[str, Model] = Map
     return room.get_template("page.html").render(
         title=title, parts=[Markup(part) for part in parts if part],
         models={name: equations(model) for name, model in models.items()},
-        files=list(dict.fromkeys(files)), version=__version__,
+        files=list(dict.fromkeys(files)), version=__version__, beside=_beside(),
         date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"))
+
+
+def _beside() -> str:
+    """Versions of what computes."""
+    from importlib.metadata import version
+    from platform import python_version
+
+    return ", ".join([f"Python {python_version()}", *(
+        f"{label} {version(label.lower())}" for label in ("NumPy", "SciPy", "SymPy", "numba"))])
 
 
 def equations(model: Model) -> list[str]:
@@ -52,18 +55,3 @@ def equations(model: Model) -> list[str]:
 
     return [*(f"d({name})/dt = {to_text(e)}" for name, e in model.equations.items()),
             *(f"measured {o.name} = {to_text(o.expression)}" for o in model.outputs)]
-
-
-def drawn(figure: Figure, shows: str) -> str:
-    """A figure as a piece of the page, in vectors; a phone scrolls it sideways."""
-    data = base64.b64encode(image(figure, ".svg")).decode()
-    return (f'<div class="figure"><img alt="{escape(shows)}" '
-            f'src="data:image/svg+xml;base64,{data}"></div>')
-
-
-def tabled(sheet: Sheet) -> str:
-    """A table as a piece of the page; wider than the page, it is scrolled alone."""
-    head = "".join(f"<th>{escape(h)}</th>" for h in sheet.headers)
-    body = "".join("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>"
-                   for row in sheet.rows)
-    return f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'

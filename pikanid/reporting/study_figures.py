@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pikanid.figures import BAND, MEASURED, new_figure, stroke, tidy
+from pikanid.figures import BAND, MEASURED, NARROW, fewer, new_figure, stroke, tidy
+from pikanid.mismatch.report.drawing import plot_diagnosis
 from pikanid.recording import excitation
 from pikanid.simulation import simulate
 from pikanid.validation.study import slosh
@@ -23,14 +24,14 @@ SHOWN = 1.0  # layout: noise [deg] of the trajectories drawn
 ENLARGED = 3.0  # layout: seconds of the swing drawn at full width
 
 
-def figures(study: Study) -> Mapping[str, Figure]:
-    """Name of the file without its ending -> figure."""
-    made = {"slosh-trajectories": trajectories(study)}
+def figures(study: Study, narrow: bool = False) -> Mapping[str, Figure]:
+    """Name of the file without its ending -> figure; `narrow`: for a phone."""
+    made = {"slosh-trajectories": trajectories(study, narrow)}
     if study.spreads:
-        made["slosh-errors"] = spread(study)
+        made["slosh-errors"] = spread(study, narrow)
     if any(r.predicted is not None for r in study.pendulum_fits):
-        made["pendulum"] = swing(study, study.swing)
-    made["pendulum-diagnosis"] = study.diagnosis.plot()
+        made["pendulum"] = swing(study, study.swing, narrow)
+    made["pendulum-diagnosis"] = plot_diagnosis(study.diagnosis, narrow)
     return made
 
 
@@ -39,9 +40,9 @@ def style(study: Study, strategy: str, scale: float = 1.0) -> dict[str, Any]:
     return stroke(list(dict.fromkeys(r.strategy for r in study.slosh_fits)).index(strategy), scale)
 
 
-def trajectories(study: Study) -> Figure:
+def trajectories(study: Study, narrow: bool = False) -> Figure:
     """As Fig. 5 of the paper: the truth, noisy samples, and the model at every estimate."""
-    figure = new_figure(11.0, 6.4)
+    figure = new_figure(NARROW if narrow else 11.0, 6.4)
     figure.suptitle(f"Model at the estimates, σ = {SHOWN:g}°, seed 0", fontsize="medium")
     drive = excitation.two_pulse()
     truth = simulate(slosh.model(), drive)["theta"]
@@ -65,15 +66,17 @@ def trajectories(study: Study) -> Figure:
     return figure
 
 
-def spread(study: Study) -> Figure:
+def spread(study: Study, narrow: bool = False) -> Figure:
     """Root mean square error over repeated seeds against the Cramér-Rao bound."""
-    figure = new_figure(11.0, 4.0)
+    figure = new_figure(NARROW if narrow else 11.0, 6.4 if narrow else 4.0)
     figure.suptitle(f"Root mean square error over {study.seeds} seeds", fontsize="medium")
     labels = list(dict.fromkeys(s.scenario.label for s in study.spreads))
     names = list(dict.fromkeys(s.strategy for s in study.spreads))
     width = 0.8 / len(names)
     titles = {"l_theta": "length l", "d_theta": "damping d"}
-    for axes, parameter in zip(figure.subplots(1, 2, sharey=True), slosh.TRUE, strict=True):
+    for axes, parameter in zip(
+            figure.subplots(*((2, 1) if narrow else (1, 2)), sharey=True), slosh.TRUE,
+            strict=True):
         for k, name in enumerate(names):
             own = [s for s in study.spreads if s.strategy == name]
             at = [labels.index(s.scenario.label) + (k - (len(names) - 1) / 2) * width for s in own]
@@ -81,7 +84,7 @@ def spread(study: Study) -> Figure:
             axes.plot(at, ratio, "o", color=style(study, name)["color"], label=name)
         axes.axhline(1.0, color="black", linewidth=0.8)
         axes.set_yscale("log")
-        axes.set_xticks(range(len(labels)), labels)
+        axes.set_xticks(range(len(labels)), labels, rotation=40 if narrow else 0)
         axes.set_title(titles[parameter], loc="left", fontsize="small")
         tidy(axes)
         axes.set_xlim(-0.5, len(labels) - 0.5)
@@ -91,9 +94,9 @@ def spread(study: Study) -> Figure:
     return figure
 
 
-def swing(study: Study, recording: Swing) -> Figure:
+def swing(study: Study, recording: Swing, narrow: bool = False) -> Figure:
     """The real recording: residuals over both parts, and the end of the held-out part enlarged."""
-    figure = new_figure(11.0, 6.4)
+    figure = new_figure(NARROW if narrow else 11.0, 6.4)
     figure.suptitle("Viscous pendulum on the real recording", fontsize="medium")
     upper, lower = figure.subplots(2, 1)
     held = recording.held_out["theta"]
@@ -127,5 +130,5 @@ def swing(study: Study, recording: Swing) -> Figure:
 
 
 def _legend(axes: Axes) -> None:
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, frameon=False,
-                fontsize="small", borderaxespad=0.1)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small",
+                ncols=fewer(axes.figure, 8, 3), frameon=False, borderaxespad=0.1)

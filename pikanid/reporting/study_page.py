@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from pikanid.reporting.document import document, drawn, tabled
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.html import drawn, tabled, text
+from pikanid.pieces.sheet import Sheet
+from pikanid.reporting.document import document
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,25 +42,27 @@ class Printed:
 Part = Heading | Picture | Printed | Sheet | str  # text: a paragraph, or lines of a list
 
 
-def page(parts: Sequence[Part], figures: Mapping[str, Figure]) -> str:
-    """The page of a report's parts, with the figures that there are.
+def page(parts: Sequence[Part], figures: Mapping[str, Figure],
+         narrow: Mapping[str, Figure] = MappingProxyType({})) -> str:
+    """The page of a report's parts, with the figures that there are; those for a phone `narrow`.
 
     >>> "<h1>A</h1>\\n<p>See <code>b</code>.</p>" in page([Heading(1, "A"), "See `b`."], {})
     True
     """
     title = next((p.text for p in parts if isinstance(p, Heading)), "Report")
-    return document(title, [_html(part, figures) for part in parts])
+    return document(title, [_html(part, figures, narrow) for part in parts])
 
 
-def _html(part: Part, figures: Mapping[str, Figure]) -> str:
+def _html(part: Part, figures: Mapping[str, Figure], narrow: Mapping[str, Figure]) -> str:
     if isinstance(part, Sheet):
         return tabled(part)
     if isinstance(part, Heading):
-        return f"<h{part.level}>{escape(part.text)}</h{part.level}>"
+        return f"<h{part.level}>{text(part.text)}</h{part.level}>"
     if isinstance(part, Printed):
-        return f"<pre>{escape(part.text)}</pre>"
+        return f"<pre>{text(part.text)}</pre>"
     if isinstance(part, Picture):
-        return (drawn(figures[part.name], part.caption) + f"<p class=small>{escape(part.caption)}"
+        return (drawn(figures[part.name], part.caption, narrow.get(part.name))
+                + f"<p class=small>{text(part.caption)}"
                 "</p>") if part.name in figures else ""
     if part.startswith("- "):
         lines = part.removeprefix("- ").split("\n- ")
@@ -67,6 +70,6 @@ def _html(part: Part, figures: Mapping[str, Figure]) -> str:
     return f"<p>{_line(part)}</p>"
 
 
-def _line(text: str) -> str:
+def _line(plain: str) -> str:
     """Text in which backquotes mark code."""
-    return re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text))
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", text(plain))

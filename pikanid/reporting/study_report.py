@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pikanid.figures import image
+from pikanid.pieces.sheet import Sheet
 from pikanid.reporting import study_sheets as sheets
-from pikanid.reporting.sheet import Sheet
 from pikanid.reporting.study_figures import figures
 from pikanid.reporting.study_page import Heading, Part, Picture, Printed, page
+from pikanid.reporting.tables import shown
 from pikanid.storage.outputs import together
 from pikanid.validation.study import pendulum, slosh
 from pikanid.validation.study.run import SEED, Study
@@ -39,14 +40,14 @@ VERSIONS = ("pikanid", "numpy", "scipy", "sympy", "numba", "torch", "pykan")
 def show(out: Console, study: Study) -> None:
     """All tables on a screen."""
     _head(out, "Slosh pendulum, two pulses, N = 501, seed 0 (as Table III)")
-    out.print(sheets.slosh(study, "dense").to_rich())
+    out.print(shown(sheets.slosh(study, "dense")))
     _head(out, "The same with every tenth sample, N = 51 (as Table IV)")
-    out.print(sheets.slosh(study, "sparse").to_rich())
+    out.print(shown(sheets.slosh(study, "sparse")))
     if study.spreads:
         _head(out, f"Errors over {study.seeds} seeds, in units of the Cramér-Rao bound")
-        out.print(sheets.spread(study).to_rich())
+        out.print(shown(sheets.spread(study)))
     _head(out, "Real recording: free swing of a pendulum arm, viscous pendulum; RMSE [rad]")
-    out.print(sheets.pendulum(study).to_rich())
+    out.print(shown(sheets.pendulum(study)))
     reasons = sheets.reasons(study)
     if reasons:
         out.print()
@@ -71,7 +72,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     drawn = figures(study)
     pictures = {name: f"figures/study-{name}.png" for name in drawn}
     files = {folder / "study.md": text(study, pictures).encode(),
-             folder / "study.html": page(parts(study), drawn).encode(),
+             folder / "study.html": page(parts(study), drawn, figures(study, narrow=True)).encode(),
              **{folder / pictures[name]: image(figure) for name, figure in drawn.items()}}
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     together(files)

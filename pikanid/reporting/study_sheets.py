@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.reporting.tables import verdict
 from pikanid.validation.study.pendulum import Result as Swinging
 from pikanid.validation.study.run import Study

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
-from pikanid.reporting.console import sentence
+from pikanid.pieces.sheet import Sheet, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,6 +32,14 @@ def table(*headers: str, numbers: Iterable[str] = ()) -> Table:
     return made
 
 
+def shown(sheet: Sheet) -> Table:
+    """A table for a screen."""
+    made = table(*sheet.headers, numbers=sheet.numbers)
+    for cells in sheet.rows:
+        row(made, *cells)
+    return made
+
+
 def row(made: Table, *cells: str, style: str | None = None) -> None:
     """Add a row of plain text: brackets in a unit are no markup."""
     from rich.text import Text
@@ -46,7 +54,7 @@ def verdict(estimate: Estimate) -> str:
 
 def parameters(estimates: Sequence[Estimate]) -> Table:
     """Every parameter with its standard error; with its 95 % interval too if there is one fit."""
-    from pikanid.estimate.estimate import rounded
+    from pikanid.estimate.rounding import rounded
 
     several = len(estimates) > 1
     made = (table("strategy", "parameter", "estimate ± std. error", "unit", "verdict", "time")

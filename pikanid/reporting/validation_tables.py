@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pikanid.reporting.sheet import Sheet
+from pikanid.comparison.validation import NUMBERS
+from pikanid.pieces.sheet import Sheet
+from pikanid.reporting.tables import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from pikanid.comparison import Validation
-
-NUMBERS = ("N", "RMSE", "fit %", "R²", "χ²/dof", "parameters", "AIC", "BIC")
 
 
 def scores(found: Validation) -> Sheet:
@@ -33,10 +33,10 @@ def show_validation(out: Console, found: Validation) -> None:
     out.print(found.sentence(), style="bold", markup=False, soft_wrap=True)
     out.print(str(found.protocol), markup=False, soft_wrap=True)
     out.print()
-    out.print(scores(found).to_rich())
+    out.print(shown(scores(found)))
     if found.pairs:
         out.print()
-        out.print(pairs(found).to_rich())
+        out.print(shown(pairs(found)))
     left = found.left()
     if left:
         out.print()

@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 import sympy as sp
 
-from pikanid.estimate.estimate import rounded
+from pikanid.estimate.rounding import rounded
 from pikanid.formula import units
 from pikanid.formula.expressions import symbol
 from pikanid.symbolic.curve import Curve

@@ -13,7 +13,7 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.estimate import Estimate
-from pikanid.estimate.estimate import rounded
+from pikanid.estimate.rounding import rounded
 from pikanid.formula.expressions import symbol
 from pikanid.model import Parameter
 from pikanid.settings import changed, told

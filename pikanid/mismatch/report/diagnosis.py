@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,9 @@ from pikanid.estimate import Estimate
 from pikanid.mismatch.report.drawing import plot_diagnosis
 from pikanid.mismatch.report.findings import DiagnosisData
 from pikanid.mismatch.report.part import Value
+from pikanid.mismatch.report.sheets import held_out, parameters
 from pikanid.mismatch.report.text_report import lines_of
+from pikanid.pieces.html import tabled, text
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -95,7 +96,9 @@ class Diagnosis(DiagnosisData):
 
     def _repr_html_(self) -> str:
         first, *rest = lines_of(self)
-        return f"<b>{escape(first)}</b><pre>{escape(chr(10).join(rest))}</pre>"
+        tables = [held_out(self), *([parameters(self)] if self.hypotheses else [])]
+        return (f"<b>{text(first)}</b>{''.join(tabled(t) for t in tables if t.rows)}"
+                f"<pre>{text(chr(10).join(rest))}</pre>")
 
 
 def _entry(v: Value) -> dict[str, Any]:

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pikanid.figures import WIDE, labelled, new_figure, tidy
+from pikanid.figures import (
+    NARROW,
+    WIDE,
+    broken,
+    fewer,
+    labelled,
+    new_figure,
+    tidy,
+)
 from pikanid.mismatch.report.findings import Curves, DiagnosisData, OutputError
 
 if TYPE_CHECKING:
@@ -27,40 +35,42 @@ DATA, LOUD = "#9ca3af", "#d97706"
 STRETCHES = 6  # layout: of a held-out recording, of which one is shown
 ROW = 2.4  # layout: height of one row of axes, in inches
 WIDTH = 9.0  # layout: of a figure, in inches
+LONG = 20  # layout: characters of an entry that stands alone in a phone's legend
+LINE = 14  # layout: height of a line of a legend, in points
 STRIP = 0.04  # layout: height of the strip that marks a mismatch, of its axes
 
 
-def plot_diagnosis(dx: DiagnosisData) -> Figure:
+def plot_diagnosis(dx: DiagnosisData, narrow: bool = False) -> Figure:
     """All of it in one figure: the held-out recording before and after, where in time something is
-    missing, and the missing force over states and inputs.
+    missing, and the missing force over states and inputs; `narrow`: for a phone.
     """
-    return _drawn([*_proof(dx), *_where(dx), *_shape(dx)])
+    return _drawn([*_proof(dx), *_where(dx), *_shape(dx, narrow)], narrow)
 
 
-def plot_proof(dx: DiagnosisData) -> Figure | None:
+def plot_proof(dx: DiagnosisData, narrow: bool = False) -> Figure | None:
     """Every output of the held-out recording: its prediction before and after, enlarged where the
     nominal model is furthest off, and what each leaves; None without such a recording.
     """
     pieces = _proof(dx)
-    return _drawn(pieces) if pieces else None
+    return _drawn(pieces, narrow) if pieces else None
 
 
-def plot_where(dx: DiagnosisData) -> Figure:
+def plot_where(dx: DiagnosisData, narrow: bool = False) -> Figure:
     """What the models leave of the recording over time, and the force that would explain it."""
-    return _drawn(_where(dx))
+    return _drawn(_where(dx), narrow)
 
 
-def plot_shape(dx: DiagnosisData) -> Figure | None:
+def plot_shape(dx: DiagnosisData, narrow: bool = False) -> Figure | None:
     """The missing force over every state and input with its 95 % band, and the law that was found,
     seen in the same way; None where there is none.
     """
-    pieces = _shape(dx)
-    return _drawn(pieces) if pieces else None
+    pieces = _shape(dx, narrow)
+    return _drawn(pieces, narrow) if pieces else None
 
 
-def _drawn(pieces: list[Piece]) -> Figure:
+def _drawn(pieces: list[Piece], narrow: bool = False) -> Figure:
     heights = [height for height, _ in pieces]
-    figure = new_figure(WIDTH, ROW * sum(heights))
+    figure = new_figure(NARROW if narrow else WIDTH, ROW * sum(heights))
     parts = figure.subfigures(len(pieces), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part, (_, draw) in zip(parts, pieces, strict=True):
         draw(part)
@@ -124,8 +134,11 @@ def _reach(axes: Axes, values: np.ndarray) -> None:
 def _finished(axes: Axes, title: str, ylabel: str) -> None:
     """Title and legend above the axes: within, they would cover something."""
     axes.set_ylabel(ylabel)
-    axes.set_title(title.replace("$", r"\$"), loc="left", fontsize="medium", pad=20)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize="small", ncols=5,
+    labels = axes.get_legend_handles_labels()[1]
+    columns = fewer(axes.figure, 5, 1 if max(map(len, labels), default=0) > LONG else 2)
+    lines = -(-len(labels) // columns)
+    axes.set_title(broken(title, axes.figure), loc="left", fontsize="medium", pad=6 + LINE * lines)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize="small", ncols=columns,
                 frameon=False, borderaxespad=0.1, handlelength=1.4, columnspacing=1.2)
     tidy(axes)
 
@@ -171,29 +184,31 @@ def _force(axis: Axes, force: ForceOverTime, level: float) -> None:
     axis.set_ylim(-1.2 * reach, 1.2 * reach)
 
 
-def _shape(dx: DiagnosisData) -> list[Piece]:
+def _shape(dx: DiagnosisData, narrow: bool = False) -> list[Piece]:
     shape, patch = dx.shape, dx.patch
     if shape is None or not (shape.edges or patch):
         return []
-    found = shape
+    found, count = shape, len(shape.edges) + (patch is not None)
 
     def draw(figure: FigureBase) -> None:
-        axes = figure.subplots(1, len(found.edges) + (patch is not None), squeeze=False)[0]
+        axes = figure.subplots(*((count, 1) if narrow else (1, count)), squeeze=False).ravel()
         model, wider = dx.before.model, max(found.left, 1.0) ** 0.5
         units = {**{s.name: s.unit for s in model.states}, **{i.name: i.unit for i in model.inputs}}
         for axis, edge in zip(axes[:len(found.edges)], found.edges, strict=True):
             _edge(axis, edge, units.get(edge.argument, ""), wider)
         if patch is not None:
             _patch(axes[-1], patch)
-        axes[0].set_ylabel(labelled("force", found.unit))
+        for axis in axes if narrow else axes[:1]:
+            axis.set_ylabel(labelled("force", found.unit))
         handles = {label: handle for axis in axes for handle, label in zip(
             *axis.get_legend_handles_labels(), strict=True)}
-        figure.legend(handles.values(), handles.keys(), loc="outside upper left", ncols=4,
-                      fontsize="small", frameon=False, handlelength=1.4,
-                      title="Missing force, without what the free parameters can do (to first "
-                      "order)", title_fontsize="medium", alignment="left")
+        figure.legend(handles.values(), handles.keys(), loc="outside upper left",
+                      ncols=fewer(figure, 4, 1), fontsize="small", frameon=False,
+                      handlelength=1.4, title=broken("Missing force, without what the free "
+                      "parameters can do (to first order)", figure),
+                      title_fontsize="medium", alignment="left")
 
-    return [(1.5, draw)]
+    return [(0.3 + 1.15 * count if narrow else 1.5, draw)]
 
 
 def _edge(axis: Axes, edge: Edge, unit: str, wider: float) -> None:

@@ -125,11 +125,14 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """Held-out record: errors of each output by name, p-value, and the curves of each by name."""
+    """Held-out record: errors of each output by name, p-value, the curves of each by name, and the
+    names of the recordings.
+    """
 
     outputs: Mapping[str, OutputError]
     p_value: float
     curves: Mapping[str, Curves]
+    recordings: tuple[str, ...] = ()
 
     def sensitive(self, settings: Settings) -> bool:
         """Whether the prediction depends on how exactly the parameters are known: after impacts, a

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pikanid.estimate.estimate import rounded
+from pikanid.estimate.rounding import rounded
 from pikanid.mismatch.report.findings import DiagnosisData
 
 

@@ -88,7 +88,8 @@ def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
                                    after.rmse_moved[o.name],
                                    case.later.levels[0][o.name].sigma * share, o.unit)
                for o in case.model.outputs}
-    return Proof(outputs, after.detection.p_value, _curves(case, before, after))
+    return Proof(outputs, after.detection.p_value, _curves(case, before, after),
+                 tuple(r.name for r in case.later.recordings))
 
 
 def _curves(case: Case, before: HeldOut, after: HeldOut) -> dict[str, Curves]:

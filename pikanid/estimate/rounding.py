@@ -1,0 +1,19 @@
+"""Numbers as they are printed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def rounded(value: float, std: float) -> str:
+    """Value and standard error with two significant digits of the error.
+
+    >>> rounded(0.0450123, 0.0000099)
+    '0.0450123 ± 0.0000099'
+    """
+    if not np.isfinite(std) or std <= 0:
+        return f"{value:.6g}"
+    digits = int(np.clip(1 - np.floor(np.log10(std)), 0, 12))
+    if abs(value) >= 1e6 or 0 < abs(value) < 1e-5 or digits > 10:
+        return f"{value:.6e} ± {std:.1e}"
+    return f"{value:.{digits}f} ± {std:.{digits}f}"

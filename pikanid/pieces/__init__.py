@@ -1,0 +1,1 @@
+"""What pages and notebooks are made of: tables as data, and pieces of HTML."""
