@@ -15,9 +15,10 @@ from pikanid.strategies import STRATEGIES
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text(encoding="utf-8")
 
 
-def block(language: str) -> str:
-    """The first fenced block of a language."""
-    found = re.search(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+def block(language: str, after: str = "# pikanid") -> str:
+    """The first fenced block of a language after some words."""
+    rest = README[README.index(after):]
+    found = re.search(rf"^```{language}\n(.*?)^```$", rest, re.MULTILINE | re.DOTALL)
     assert found, f"README has no {language} block"
     return found[1]
 
@@ -27,7 +28,7 @@ def test_python_example(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    exec(compile(block("python"), "README.md", "exec"), names)
+    exec(compile(block("python", "## In Python"), "README.md", "exec"), names)
     estimate = names["estimate"]
     assert isinstance(estimate, pk.Estimate)
     assert abs(estimate.value("l_theta") - 0.045) < 5 * estimate.std("l_theta")

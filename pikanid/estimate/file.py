@@ -72,7 +72,7 @@ def load(path: str | os.PathLike[str], kind: Callable[..., E]) -> E:
 
     content = json_content(path, wrong)
     if not isinstance(content, dict) or content.get("pikanid_estimate") != SCHEMA:
-        raise wrong("it does not hold a saved estimate")
+        raise wrong("it does not hold a saved estimate, as 'identify --save' writes it")
     return from_content(content, wrong, kind)
 
 

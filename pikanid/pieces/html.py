@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pikanid.pieces.sheet import Sheet
 
 NUMBER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]\d+)(?![\w.])")
+MINUS = re.compile(r"(?<![\w)\]-])-(?=[\w(.])")  # lines are not broken after it, unlike a hyphen
 FITS = 34  # layout: characters of a row that a phone shows side by side
 CARDS = 14  # layout: rows that a phone shows one below the other; more of them are scrolled
 SHORT = 24  # layout: characters of a cell that is not broken
@@ -23,10 +24,10 @@ SHORT = 24  # layout: characters of a cell that is not broken
 def text(plain: str) -> str:
     """Text as HTML, with numbers as they are printed in books.
 
-    >>> text("p = 2e-05 < 1, not x1e-05")
-    'p = 2×10⁻⁵ &lt; 1, not x1e-05'
+    >>> text("p = 2e-05 < 1, not x1e-05"), text("Bouc-Wen (-c*v)")
+    ('p = 2×10⁻⁵ &lt; 1, not x1e-05', 'Bouc-Wen (−c*v)')
     """
-    return escape(NUMBER.sub(_power, plain))
+    return escape(MINUS.sub("−", NUMBER.sub(_power, plain)))
 
 
 def _power(found: re.Match[str]) -> str:

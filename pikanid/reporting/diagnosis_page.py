@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING
 
 from pikanid.estimate.rounding import rounded
@@ -112,7 +113,7 @@ def _what(dx: Diagnosis) -> str:
 
 def _explanation(h: Explanation, odds: str) -> str:
     formulas = "".join(f"<li>{text(e.name)} ({text(' or '.join(e.ids))}): "
-                       f"<code>{text(e.expression)}</code></li>" for e in h.effects)
+                       f"<code>{escape(e.expression)}</code></li>" for e in h.effects)
     values = Sheet(("parameter", "estimate ± std. error", "unit"), tuple(
         (n, rounded(v.value, v.std), unit_text(v.unit) or "-")
         for e in h.effects for n, v in e.parameters.items()))
@@ -154,5 +155,8 @@ def _patch(dx: Diagnosis) -> str:
 
 
 def _next(dx: Diagnosis) -> str:
-    return f"<h2>What to do next</h2><p>{text(dx.next_experiment)}</p>" if (
-        dx.next_experiment) else ""
+    last = ("Trust the model as far as it was excited: predict a recording that is moved in another "
+            "way, 'pikanid validate'." if not dx.mismatch else
+            "Use the extended model from here on, and predict a recording that is moved in "
+            "another way with it: 'pikanid validate'.")
+    return f"<h2>What to do next</h2><p>{text(dx.next_experiment or last)}</p>"
