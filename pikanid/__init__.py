@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pikanid.recording import Channel, Recording, datasets, excitation
     from pikanid.simulation import simulate
     from pikanid.strategies import *  # noqa: F403 - all that are listed there
+    from pikanid.strategies.bootstrap import bootstrap
 
 
 # Name -> the module that defines it.
@@ -47,6 +48,7 @@ _HOMES = {
     "Estimate": "pikanid.estimate",
     **dict.fromkeys(strategies.__all__, "pikanid.strategies"),
     "validate": "pikanid.comparison",
+    "bootstrap": "pikanid.strategies.bootstrap",
     "Validation": "pikanid.comparison",
     "resid": "pikanid.comparison",
     "ResidualAnalysis": "pikanid.comparison",
@@ -81,6 +83,7 @@ __all__ = [
     "Channel",
     "Estimate",
     "validate",
+    "bootstrap",
     "Validation",
     "resid",
     "ResidualAnalysis",
