@@ -14,6 +14,7 @@ from pikanid.tracking.settings import TrackingSettings
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
+ENOUGH = 10_000  # numerical: pixels of a picture that tell its colours
 SPACES = {"hsv": (179, 255, 255), "lab": (255, 255, 255)}  # definition: as OpenCV stores 8 bits
 
 
@@ -93,6 +94,10 @@ class Colours:
         matrix = np.array([[*self.weights, self.offset]], np.float32)
         return np.asarray(cv2.transform(picture.astype(np.float32), matrix))
 
+    def shares(self, pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """(...): share of liquid in pixels (..., 3), BGR."""
+        return np.asarray(pixels @ np.asarray(self.weights, np.float32) + np.float32(self.offset))
+
 
 def learn(pictures: Sequence[Picture], settings: TrackingSettings,
           within: ColourRange | None = None) -> Colours:
@@ -106,6 +111,8 @@ def learn(pictures: Sequence[Picture], settings: TrackingSettings,
     Raises:
         BadRecording: If there are no two colours, one above the other.
     """
+    coarse = max(int(np.sqrt(pictures[0].shape[0] * pictures[0].shape[1] / ENOUGH)), 1)
+    pictures = [p[::coarse, ::coarse] for p in pictures]
     stacked = [np.asarray(p, np.float32) for p in pictures]
     height = stacked[0].shape[0]
     strip = max(height // 10, 1)

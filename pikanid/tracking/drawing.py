@@ -46,7 +46,7 @@ def overlaid(picture: Picture, tracker: Tracker, found: Edges, surface: Surface,
     shown = np.ascontiguousarray(picture).copy()
     r = tracker.region
     inside = shown[r.top:r.top + r.height, r.left:r.left + r.width]
-    half = cleaned(tracker.colours.share(r.cut(picture)))
+    half = cleaned(r.cut(picture), tracker.colours)
     mask = cv2.resize(half, (r.width, r.height), interpolation=cv2.INTER_NEAREST).astype(bool)
     inside[mask] = ((1 - SHADE) * inside[mask] + SHADE * np.array([0, 200, 0])).astype(np.uint8)
     cv2.rectangle(shown, (r.left - 1, r.top - 1), (r.left + r.width, r.top + r.height), BOX, 1)

@@ -41,15 +41,14 @@ def edges(picture: Picture, colours: Colours, settings: TrackingSettings) -> Edg
         colours: Of air and liquid.
         settings: Which columns count.
     """
-    share = colours.share(picture)
-    width = share.shape[1]
-    mask = cleaned(share)
+    width = picture.shape[1]
+    mask = cleaned(picture, colours)
     wet = float(mask.mean())
     if wet < 1e-2:  # numerical: of the picture, less is no liquid
         return _none("no liquid in the region")
     if wet > 0.99:  # numerical: of the picture, more leaves no air
         return _none("nothing but liquid in the region")
-    reach, band, columns, split = _band(share, _split(mask, share.shape), settings)
+    reach, band, columns, split = _band(picture, colours, _split(mask, width), settings)
     good = (columns >= settings.margin * width) & (columns < (1 - settings.margin) * width)
     if reach == 0:
         return _none("the surface leaves the region, or its edge is too blurred")
@@ -64,15 +63,16 @@ def edges(picture: Picture, colours: Colours, settings: TrackingSettings) -> Edg
     return Edges(columns[good] + 0.5, split[good] + down)
 
 
-def cleaned(share: NDArray[np.float32]) -> NDArray[np.uint8]:
+def cleaned(picture: Picture, colours: Colours) -> NDArray[np.uint8]:
     """(H // 2, W // 2) 0 or 1: the largest connected piece of liquid, without specks and hairs, at
     half the resolution.
     """
     import cv2
 
-    height, width = share.shape
-    half = cv2.resize(share[:height // 2 * 2, :width // 2 * 2], (width // 2, height // 2),
-                      interpolation=cv2.INTER_AREA)
+    height, width = picture.shape[:2]
+    half = colours.share(np.asarray(cv2.resize(
+        picture[:height // 2 * 2, :width // 2 * 2], (width // 2, height // 2),
+        interpolation=cv2.INTER_AREA), np.uint8))
     square = np.ones((3, 3), np.uint8)
     opened = cv2.morphologyEx((half > 0.5).astype(np.uint8), cv2.MORPH_OPEN, square)
     mask = np.asarray(cv2.morphologyEx(opened, cv2.MORPH_CLOSE, square), np.uint8)
@@ -82,29 +82,29 @@ def cleaned(share: NDArray[np.float32]) -> NDArray[np.uint8]:
     return np.asarray(labels == 1 + np.argmax(about[1:, cv2.CC_STAT_AREA]), np.uint8)
 
 
-def _split(mask: NDArray[np.uint8], shape: tuple[int, ...]) -> NDArray[np.intp]:
-    """(W,) row at which each column's liquid begins, at the resolution of the mask."""
+def _split(mask: NDArray[np.uint8], whole: int) -> NDArray[np.intp]:
+    """(whole,) row at which each column's liquid begins, at the resolution of the mask."""
     height, width = mask.shape
     rows = np.zeros((height + 1, width), np.int32)
     np.cumsum(mask, axis=0, out=rows[1:])
     # The split that fits two levels best: liquid below counts for it, liquid above against.
     gain = rows[-1] - 2 * rows + np.arange(height + 1, dtype=np.int32)[:, None]
     rough = 2 * np.argmax(gain, axis=0)
-    return np.pad(np.repeat(rough, 2), (0, shape[1] - 2 * width), mode="edge")
+    return np.pad(np.repeat(rough, 2), (0, whole - 2 * width), mode="edge")
 
 
-def _band(share: NDArray[np.float32], rough: NDArray[np.intp], settings: TrackingSettings
+def _band(picture: Picture, colours: Colours, rough: NDArray[np.intp], settings: TrackingSettings
           ) -> tuple[int, Array, NDArray[np.intp], NDArray[np.intp]]:
     """How far the edge reaches, rows around it (4·reach, n) in the columns that hold them, these
     columns, and the rows; reach is 0 where no width fits.
     """
-    height, width = share.shape
+    height, width = picture.shape[:2]
     split = rough
     for reach in REACHES:
         columns = np.flatnonzero((split >= 2 * reach) & (split <= height - 2 * reach))
         if len(columns) < settings.columns * width:
             break
-        band = _cut(share, split[columns], columns, 2 * reach)
+        band = colours.shares(_cut(picture, split[columns], columns, 2 * reach))
         if split is rough:
             # centred on the row where half is liquid
             split = rough.copy()
@@ -113,7 +113,7 @@ def _band(share: NDArray[np.float32], rough: NDArray[np.intp], settings: Trackin
                               & (split[columns] <= height - 2 * reach)]
             if len(columns) < settings.columns * width:
                 break
-            band = _cut(share, split[columns], columns, 2 * reach)
+            band = colours.shares(_cut(picture, split[columns], columns, 2 * reach))
         profile = band.mean(axis=1)
         low, high = profile[:reach // 2 + 1].mean(), profile[-(reach // 2 + 1):].mean()
         near = max(abs(profile[reach - 1:reach + 1].mean() - low),
@@ -123,12 +123,11 @@ def _band(share: NDArray[np.float32], rough: NDArray[np.intp], settings: Trackin
     return 0, np.empty((0, 0)), np.empty(0, np.intp), np.empty(0, np.intp)
 
 
-def _cut(share: NDArray[np.float32], split: NDArray[np.intp], columns: NDArray[np.intp],
-         half: int) -> Array:
-    """Rows (2·half, n) around the split of each column."""
-    first = (split - half) * share.shape[1] + columns
-    steps = np.arange(0, 2 * half * share.shape[1], share.shape[1])
-    return np.asarray(share.ravel().take(first + steps[:, None]))
+def _cut(picture: Picture, split: NDArray[np.intp], columns: NDArray[np.intp],
+         half: int) -> NDArray[np.uint8]:
+    """Pixels (2·half, n, 3) in the rows around the split of each column."""
+    rows = split + np.arange(-half, half)[:, None]
+    return np.asarray(picture[rows, columns])
 
 
 def _smooth(levels: Array) -> Array:

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 HUBER = 1.345  # definition: 95 % efficiency under normal noise (Huber, Robust Statistics, 1981)
 MAD = 1.4826  # definition: median absolute deviation to standard deviation, normal noise
 MODES = 3  # definition: shapes that are reported beside level and angle, of degrees 2, 3 and 4
-ROUNDS = 10  # numerical: of reweighting, after which points change no more
+ROUNDS = 8  # numerical: of reweighting, after which points change no more
 
 
 @dataclass(frozen=True)
