@@ -6,6 +6,7 @@ import os
 import secrets
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pikanid import errors
-from pikanid.figures import BAND, COLOURS, WIDE, new_figure, tidy
+from pikanid.figures import BAND, COLOURS, NARROW, WIDE, new_figure, tidy
 from pikanid.tracking.colours import Picture
 from pikanid.tracking.edges import Edges
 from pikanid.tracking.frames import Frame
@@ -32,6 +33,15 @@ FAILED = 4  # layout: of those
 WIDTH = 320  # layout: pixels of a picture on it
 EVERY = 6  # layout: columns between two points that are drawn
 SHADE = 0.35  # layout: how strongly what counts as liquid is tinted
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """A frame that is kept, and what was found in it."""
+
+    frame: Frame
+    found: Edges
+    surface: Surface
 
 
 def overlaid(picture: Picture, tracker: Tracker, found: Edges, surface: Surface,
@@ -173,6 +183,43 @@ def plot(track: Track) -> Figure:
     lower.set_ylabel(f"level [{'px' if track.geometry is None else 'm'}]")
     lower.set_xlabel("t [s]")
     upper.legend(fontsize="small", frameon=False)
+    return figure
+
+
+def detection(track: Track, stills: Sequence[Still], narrow: bool = False) -> Figure:
+    """As Fig. 2 of the paper: a frame with the region, the angle over time, and two frames with
+    points of the surface (yellow) and the line (magenta); `narrow`: for a phone.
+    """
+    figure = new_figure(*(NARROW, 8.0) if narrow else (11.0, 5.2))
+    spaces = figure.add_gridspec(*(3, 2) if narrow else (2, 4))
+    every = slice(None)
+    places = ((0, every), (1, every), (2, 0), (2, 1)) if narrow else (
+        (every, slice(0, 2)), (0, slice(2, 4)), (1, 2), (1, 3))
+    whole, angle, *parts = (figure.add_subplot(spaces[at]) for at in places)
+    r = track.region
+    box = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) * (r.width, r.height) + (
+        r.left - 0.5, r.top - 0.5)
+    whole.plot(*box.T, color="red", linewidth=1.5)
+    degrees = 180 / np.pi
+    _banded(angle, track.time, degrees * track.theta, degrees * track.sigma[:, 0])
+    angle.set(xlabel="t [s]", ylabel="theta [deg]")
+    tidy(angle)
+    for axes, still in zip([whole, *parts], [*stills[:1], *stills], strict=False):
+        assert still.frame.picture is not None
+        axes.imshow(still.frame.picture[..., ::-1])
+        axes.set_axis_off()
+    for axes, still, name in zip(parts, stills, "cd", strict=False):
+        fit = np.polynomial.Polynomial.fit(still.found.x, still.found.y, 1)
+        ends = np.array([r.left, r.left + r.width], float)
+        axes.plot(ends, fit(ends), color="magenta", linewidth=2.4)
+        axes.plot(still.found.x[::EVERY], still.found.y[::EVERY], ".", color="yellow", markersize=3)
+        axes.set(xlim=(r.left - 10, r.left + r.width + 10),
+                 ylim=(r.top + r.height, r.top))
+        axes.set_title(f"({name}) {still.frame.time:.2f} s, "
+                       f"{degrees * still.surface.theta:+.2f}°", fontsize="small")
+        angle.axvline(still.frame.time, color=COLOURS[1], linewidth=0.8)
+    whole.set_title("(a) frame and region", fontsize="small")
+    angle.set_title("(b) angle and its 95 % band", fontsize="small")
     return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +95,7 @@ def _split(mask: NDArray[np.uint8], whole: int) -> NDArray[np.intp]:
 
 
 def _band(picture: Picture, colours: Colours, rough: NDArray[np.intp], settings: TrackingSettings
-          ) -> tuple[int, Array, NDArray[np.intp], NDArray[np.intp]]:
+          ) -> tuple[int, NDArray[Any], NDArray[np.intp], NDArray[np.intp]]:
     """How far the edge reaches, rows around it (4·reach, n) in the columns that hold them, these
     columns, and the rows; reach is 0 where no width fits.
     """
@@ -127,7 +128,7 @@ def _cut(picture: Picture, split: NDArray[np.intp], columns: NDArray[np.intp],
          half: int) -> NDArray[np.uint8]:
     """Pixels (2·half, n, 3) in the rows around the split of each column."""
     rows = split + np.arange(-half, half)[:, None]
-    return np.asarray(picture[rows, columns])
+    return np.asarray(picture[rows, columns], np.uint8)
 
 
 def _smooth(levels: Array) -> Array:
