@@ -1,6 +1,6 @@
 """How well surfaces are tracked in videos whose truth is known.
 
-Usage: python benchmarks/report_tracking.py FOLDER [CLIPS]
+Usage: python benchmarks/report_tracking.py FOLDER [CLIPS] [WORKERS]
 
 Writes FOLDER/tracking.md and FOLDER/figures/tracking-*.png: a grid of conditions, parameters
 identified from CLIPS rendered videos (20 by default), and physics that is named from a video alone.
@@ -9,42 +9,36 @@ identified from CLIPS rendered videos (20 by default), and physics that is named
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 from provenance import provenance
-from tracking_chain import CLIPS, HIDDEN, RATE, SECONDS, Errors, clips, diagnosed
+from tracking_chain import CLIPS, HIDDEN, RATE, SECONDS, Errors, chained_clip, diagnosed
 from tracking_grid import BAD, CONDITIONS, FRAMES, NORMAL, Score, score
 
 from pikanid.figures import save_figure
-from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.reporting.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.tracking.drawing import detection
 from pikanid.validation.study import clip
 
 
-def main(folder: Path, count: int) -> None:
+def main(folder: Path, count: int, workers: int) -> None:
     (folder / "figures").mkdir(parents=True, exist_ok=True)
-    scores = []
-    for k, condition in enumerate(CONDITIONS):
-        print(condition.name, flush=True)
-        scores.append(score(condition, k))
-    chain = []
-    for one in clips(count):
-        print(one, flush=True)
-        chain.append(one)
-    found = {}
-    for effect in HIDDEN:
-        print(effect, flush=True)
-        found[effect] = diagnosed(effect)
+    with ProcessPoolExecutor(workers) as pool:
+        named = {effect: pool.submit(diagnosed, effect) for effect in HIDDEN}
+        scored = [pool.submit(score, c, k) for k, c in enumerate(CONDITIONS)]
+        chained = [pool.submit(chained_clip, seed) for seed in range(count)]
+        scores, chain = ([task.result() for task in tasks] for tasks in (scored, chained))
+        found = {effect: task.result() for effect, task in named.items()}
     shown = clip.film(0)
     save_figure(detection(shown.track, shown.stills), folder / "figures/tracking-detection.png")
     atomically(folder / "tracking.md", text(scores, chain, found).encode())
 
 
-def text(scores: Sequence[Score], chain: Sequence[Errors], found: dict[str, Diagnosis]) -> str:
+def text(scores: Sequence[Score], chain: Sequence[Errors], found: Mapping[str, str]) -> str:
     """The report in Markdown."""
     return "\n\n".join([
         "# From video to angle", _introduction(),
@@ -116,7 +110,7 @@ def chain_sheet(chain: Sequence[Errors]) -> Sheet:
          f"{100 * e.inside:.1f}") for e in chain), numbers=head)
 
 
-def _diagnosis_text(found: dict[str, Diagnosis]) -> str:
+def _diagnosis_text(found: Mapping[str, str]) -> str:
     said = [f"Two videos of {SECONDS:g} s each, one to explain and one to prove it on; Eq. (6) is "
             "given, an effect is hidden in what was filmed."]
     said += [f"Hidden: `{effect}`.\n\n```text\n{dx}\n```" for effect, dx in found.items()]
@@ -124,4 +118,5 @@ def _diagnosis_text(found: dict[str, Diagnosis]) -> str:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else CLIPS)
+    given = [int(word) for word in sys.argv[2:]]
+    main(Path(sys.argv[1]), *(given + [CLIPS, 2][len(given):]))

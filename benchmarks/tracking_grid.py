@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -115,16 +115,3 @@ def score(condition: Condition, seed: int = 0) -> Score:
         float(np.mean(np.abs(left) < 1.96 * sigma[there])), 1.96 * float(np.median(sigma[there])),
         float(np.mean(~there)), float(np.mean(np.abs(left) > 1)),
         float(np.corrcoef(left[1:], left[:-1])[0, 1]), speed)
-
-
-def grid(seed: int = 0) -> Iterator[Score]:
-    """Every condition."""
-    for k, condition in enumerate(CONDITIONS):
-        yield score(condition, seed + k)
-
-
-if __name__ == "__main__":
-    for one in grid():
-        print(f"{one.condition.name:34s} rmse {one.rmse:.4f} worst {one.worst:.3f} inside "
-              f"{one.inside:.3f} half {one.half_width:.4f} failed {one.failed:.3f} "
-              f"alike {one.alike:+.2f} {one.speed:.0f}/s", flush=True)
