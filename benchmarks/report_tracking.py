@@ -19,7 +19,7 @@ from tracking_chain import CLIPS, HIDDEN, RATE, SECONDS, Errors, chained_clip, d
 from tracking_grid import BAD, CONDITIONS, FRAMES, NORMAL, Score, score
 
 from pikanid.figures import save_figure
-from pikanid.reporting.sheet import Sheet
+from pikanid.pieces.sheet import Sheet
 from pikanid.storage.outputs import atomically
 from pikanid.tracking.drawing import detection
 from pikanid.validation.study import clip
