@@ -64,7 +64,7 @@ def reddened(variance: Array, finer: Array, settings: TrackingSettings) -> float
     >>> reddened(np.ones(3), np.ones(3) / 2, USUAL)
     2.277...
     """
-    middle = settings.shape + (settings.independent + 1) / 2
+    middle = settings.degree + (settings.independent + 1) / 2
     falls = np.log(np.median(variance) / np.median(finer)) / settings.independent
     return float(np.exp(max(falls, 0.0) * (middle - 1)))
 

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from pikanid.tracking.settings import TrackingSettings
+from pikanid.tracking.settings import MODES, TrackingSettings
 
 Array = NDArray[np.float64]
 HUBER = 1.345  # definition: 95 % efficiency under normal noise (Huber, Robust Statistics, 1981)
 MAD = 1.4826  # definition: median absolute deviation to standard deviation, normal noise
-MODES = 3  # definition: shapes that are reported beside level and angle, of degrees 2, 3 and 4
 ROUNDS = 8  # numerical: of reweighting, after which points change no more
 
 
@@ -53,14 +52,14 @@ def surface(x: Array, y: Array, left: float, right: float, columns: int,
             settings: TrackingSettings) -> Surface:
     """The surface through points (n,), y up, of the `columns` between walls at `left` and `right`.
 
-    A polynomial of degree `shape`, robustly fitted; the angle is that of its nearest line over the
+    A polynomial, robustly fitted; the angle is that of its nearest line over the
     whole width.  Neighbouring points err alike where a picture is blurred or compressed.  What
     matters is how much of that reaches the lowest degrees; the next higher ones, which a surface
     does not reach, show it: coefficients of an orthonormal series have the variance of the noise's
     spectrum there, whatever its correlation (U. K. Müller, J. Econometrics 141, 2007; series
     variance estimator), and the mean square of K of them has K degrees of freedom.
     """
-    degree, more = settings.shape, settings.independent
+    degree, more = settings.degree, settings.independent
     u = (2 * x - left - right) / (right - left)
     design = legendre.legvander(u, degree + 2 * more)
     low = design[:, :degree + 1]

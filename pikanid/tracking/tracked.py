@@ -17,8 +17,8 @@ from pikanid.tracking.colours import Colours
 from pikanid.tracking.deviation import deviations
 from pikanid.tracking.geometry import Geometry
 from pikanid.tracking.region import Region
-from pikanid.tracking.settings import TrackingSettings
-from pikanid.tracking.surface import MODES, Surface, failed
+from pikanid.tracking.settings import MODES, TrackingSettings
+from pikanid.tracking.surface import Surface, failed
 
 Array = NDArray[np.float64]
 REPEATED = "the same picture as the one before"
