@@ -46,6 +46,8 @@ from pikanid.commands.simulate import EXAMPLES as SIMULATE
 from pikanid.commands.simulate import simulate
 from pikanid.commands.study import EXAMPLES as STUDY
 from pikanid.commands.study import study
+from pikanid.commands.track import EXAMPLES as TRACK
+from pikanid.commands.track import track
 from pikanid.commands.validate import EXAMPLES as VALIDATE
 from pikanid.commands.validate import validate
 
@@ -71,6 +73,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]})
 app.command(epilog=IDENTIFY)(identify)
 app.command(epilog=CHANNELS)(channels)
+app.command(epilog=TRACK)(track)
 app.command(epilog=VALIDATE)(validate)
 app.command(epilog=DIAGNOSE)(diagnose)
 app.command(epilog=EFFECTS)(effects)

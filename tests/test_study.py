@@ -87,14 +87,14 @@ def test_report_shows_both_recordings(small: run.Study, tmp_path: Path) -> None:
     written = study_report.write(small, tmp_path)
     assert {path.name for path in written} == {
         "study.md", "study.html", "study-slosh-trajectories.png", "study-slosh-errors.png",
-        "study-pendulum.png", "study-pendulum-diagnosis.png"}
+        "study-pendulum.png", "study-pendulum-diagnosis.png", "study-video.png"}
 
 
 def test_the_page_says_what_the_report_says(small: run.Study, tmp_path: Path) -> None:
     written = {path.name: path for path in study_report.write(small, tmp_path)}
     html = written["study.html"].read_text(encoding="utf-8")
     sheets = [part for part in study_report.parts(small) if isinstance(part, Sheet)]
-    assert html.count("<table>") == len(sheets) and html.count("<img ") == 4
+    assert html.count("<table>") == len(sheets) and html.count("<img ") == 5
     assert all(f"<td>{escape(cell)}</td>" in html for s in sheets for row in s.rows for cell in row)
     assert escape(small.diagnosis.sentence()) in html
 
@@ -111,6 +111,16 @@ def test_the_study_ends_with_a_diagnosis(small: run.Study) -> None:
         assert found.sentence() in text
         assert "-c*sign(theta_dot)" in text
         assert f"held-out RMSE {proof.rmse_before:.3g} -> {proof.rmse_after:.3g} rad" in text
+
+
+def test_a_video_goes_all_the_way(small: run.Study) -> None:
+    found = small.filmed
+    assert found is not None and found.estimate is not None
+    assert found.estimate.adequacy.verdict == "fits" and len(found.stills) == 2
+    assert np.degrees(found.rmse) < 0.1
+    for name, true in slosh.TRUE.items():
+        assert abs(found.estimate.value(name) - true) < 3 * found.estimate.std(name)
+    assert "From a video" in study_report.text(small, {})
 
 
 def test_tables_show_estimate_error_and_standard_error(small: run.Study) -> None:

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.preparation import prepared
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
@@ -19,6 +20,7 @@ from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model
 from pikanid.noise.level import NoiseModel
 from pikanid.recording import Recording
+from pikanid.recording.channel import Channel
 
 SIGMA, RHO = 0.002, 0.4
 LEVEL = NoiseModel(SIGMA, RHO, 0.0, 0.01, "given")
@@ -170,3 +172,19 @@ def test_squares_that_overflow_are_no_residual() -> None:
     assert whitened.choose_steps(np.array([1.0]))
     assert whitened.residual(np.array([1.0])) is not None
     assert whitened.residual(np.array([35.0])) is None
+
+
+def test_a_sigma_of_each_sample_weighs_it() -> None:
+    """Where σ(t) is given, whitened noise has unit variance in every part of a recording."""
+    run = pk.simulate(model(), pk.excitation.two_pulse())
+    t = run["theta"].time
+    sigma = np.where(t < 2.5, 1e-3, 1e-2)
+    noisy = run["theta"].values + sigma * np.random.default_rng(0).standard_normal(len(t))
+    told = run.with_channels(Channel("theta", t, noisy, "rad", sigma))
+    whitened = Whitened(model(), prepared(model(), (told,), None, [], DEFAULTS))
+    theta = np.array([0.045, 0.15])
+    assert whitened.choose_steps(theta)
+    found = whitened.residual(theta)
+    assert found is not None
+    for part in (t < 2.5, t >= 2.5):
+        assert np.std(found[0][part]) == pytest.approx(1, abs=0.15)  # 250 samples: 3 errors

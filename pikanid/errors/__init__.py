@@ -21,6 +21,7 @@ from pikanid.errors.recording import *
 from pikanid.errors.signals import *
 from pikanid.errors.strategies import *
 from pikanid.errors.symbolic import *
+from pikanid.errors.tracking import *
 from pikanid.errors.validation import *
 from pikanid.errors.wording import made_brief
 

@@ -47,8 +47,21 @@ class NoiseModel:
         source = "as given" if self.source == "given" else f"from {self.source}"
         return f"Noise of '{output}': sigma = {self.sigma:.3g}, {colour}, {source}."
 
-    def whiten(self, rows: Array, t: Array) -> Array:
-        """Rows (N,) or (N, k) at times t as white noise of unit variance.
+    def spreads(self, given: Array | None, n: int) -> Array:
+        """Standard deviation (n,) of every sample: as `given` (n,) where σ was given for each.
+
+        >>> NoiseModel(2.0, 0.0, 0.0, 0.1, "given").spreads(np.array([1.0, 3.0]), 2).tolist()
+        [1.0, 3.0]
+        >>> NoiseModel(2.0, 0.0, 0.0, 0.1, "a quiet stretch").spreads(None, 2).tolist()
+        [2.0, 2.0]
+        """
+        if self.source == "given" and given is not None and np.ptp(given) > 0:
+            return np.asarray(given, float)
+        return np.full(n, self.sigma)
+
+    def whiten(self, rows: Array, t: Array, given: Array | None = None) -> Array:
+        """Rows (N,) or (N, k) at times t as white noise of unit variance; of each sample the σ may
+        be `given` (N,).
 
         The result w has wᵀw = rᵀΣ⁻¹r with Σ the covariance of the noise.  That is exact over gaps:
         the correlation over m intervals is ρ^m.
@@ -58,15 +71,17 @@ class NoiseModel:
         ...                                           np.array([0.0, 0.1, 0.3]))]
         [1.0, 0.0, 0.129]
         """
+        spreads = self.spreads(given, len(t))
+        rows = rows / (spreads[:, None] if rows.ndim == 2 else spreads)
         if self.rho == 0:
-            return rows / self.sigma
+            return rows
         steps = np.maximum(np.rint(np.diff(t) / self.interval), 1.0)
         keep = self.rho ** steps
         left = np.sqrt(1 - keep**2)
         if rows.ndim == 2:
             keep, left = keep[:, None], left[:, None]
         rest = (rows[1:] - keep * rows[:-1]) / left
-        return np.concatenate([rows[:1], rest]) / self.sigma
+        return np.concatenate([rows[:1], rest])
 
 
 def estimate(channel: Channel, quiet: tuple[float, float] | None = None,

@@ -12,6 +12,7 @@ from pikanid.figures import BAND, MEASURED, NARROW, fewer, new_figure, stroke, t
 from pikanid.mismatch.report.drawing import plot_diagnosis
 from pikanid.recording import excitation
 from pikanid.simulation import simulate
+from pikanid.tracking.drawing import detection
 from pikanid.validation.study import slosh
 from pikanid.validation.study.pendulum import Swing
 from pikanid.validation.study.run import Study
@@ -31,6 +32,8 @@ def figures(study: Study, narrow: bool = False) -> Mapping[str, Figure]:
         made["slosh-errors"] = spread(study, narrow)
     if any(r.predicted is not None for r in study.pendulum_fits):
         made["pendulum"] = swing(study, study.swing, narrow)
+    if study.filmed is not None:
+        made["video"] = detection(study.filmed.track, study.filmed.stills, narrow)
     made["pendulum-diagnosis"] = plot_diagnosis(study.diagnosis, narrow)
     return made
 

@@ -1,111 +1,99 @@
-"""The surface's angle in one picture: sub-pixel points by column, a robust line, its error."""
+"""The surface through points: its angle, level and shape, and how far the points agree."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from pikanid import errors
+from pikanid.tracking.settings import MODES, TrackingSettings
 
 Array = NDArray[np.float64]
-
 HUBER = 1.345  # definition: 95 % efficiency under normal noise (Huber, Robust Statistics, 1981)
 MAD = 1.4826  # definition: median absolute deviation to standard deviation, normal noise
+ROUNDS = 8  # numerical: of reweighting, after which points change no more
 
 
 @dataclass(frozen=True)
 class Surface:
-    """What one picture says.
+    """What the points of one picture say.
 
     Attributes:
-        theta: Angle [rad], positive where the surface rises to the right; NaN if it failed.
-        sigma: Its standard error [rad]; NaN if it failed.
-        level: Height of the surface at the middle above the picture's lower edge [px].
+        theta: Angle [rad] of the line that is nearest to the surface from wall to wall, positive
+            where it rises to the right; NaN if it failed.
+        level: Height at the middle of that line, in the unit of the points.
+        shape: Legendre coefficients of degrees 2, 3, 4 of the surface over the width, in the unit
+            of the points.
+        variance: Of a coefficient of an orthonormal function of the points: how far they disagree.
+        finer: The same of functions that vary faster; where errors of neighbours are alike, less.
+        gains: Standard errors of angle [rad], level and shape where `variance` is 1.
+        points: Share of the columns that were used.
         reason: Why it failed; empty if it did not.
     """
 
     theta: float
-    sigma: float
-    level: float
+    level: float = np.nan
+    shape: tuple[float, ...] = ()
+    variance: float = np.nan
+    finer: float = np.nan
+    gains: tuple[float, ...] = ()
+    points: float = 0.0
     reason: str = ""
 
 
-def find(picture: NDArray[np.uint8], window: int = 8, lags: int = 5) -> Surface:
-    """The surface in a picture whose upper rows show air and whose lower rows show liquid.
+def failed(reason: str) -> Surface:
+    """No surface, and why."""
+    return Surface(np.nan, reason=reason)
 
-    Colours are projected onto the difference of both; in each column the edge is where the
-    brightness that is missing in a window of 2·`window` rows says (moment edge).  The line is
-    Huber's, its error the Newey-West sandwich over `lags` columns, since blur ties neighbours.
 
-    Args:
-        picture: (H, W, 3) RGB, cut to the inside of the tank.
-        window: Rows above and below the edge that are summed.
-        lags: Columns over which errors are taken to be correlated.
+def surface(x: Array, y: Array, left: float, right: float, columns: int,
+            settings: TrackingSettings) -> Surface:
+    """The surface through points (n,), y up, of the `columns` between walls at `left` and `right`.
 
-    Raises:
-        BadRecording: If it is no colour picture.
-
-    >>> from pikanid.tracking.render import picture
-    >>> found = find(picture(0.1))
-    >>> bool(abs(found.theta - 0.1) < 5 * found.sigma < 0.02)
-    True
+    A polynomial, robustly fitted; the angle is that of its nearest line over the
+    whole width.  Neighbouring points err alike where a picture is blurred or compressed.  What
+    matters is how much of that reaches the lowest degrees; the next higher ones, which a surface
+    does not reach, show it: coefficients of an orthonormal series have the variance of the noise's
+    spectrum there, whatever its correlation (U. K. Müller, J. Econometrics 141, 2007; series
+    variance estimator), and the mean square of K of them has K degrees of freedom.
     """
-    if picture.ndim != 3 or picture.shape[2] != 3:
-        raise errors.BadRecording(
-            errors.not_of_kind("The picture", f"array of shape {picture.shape}", "(H, W, 3)"))
-    height, width = picture.shape[:2]
-    values = picture.astype(float)
-    band = max(height // 10, 1)
-    air, dye = (np.median(part, axis=(0, 1)) for part in (values[:band], values[-band:]))
-    contrast = float(np.sum((dye - air) ** 2))
-    spread = float(np.std(values[:band] - air) + np.std(values[-band:] - dye))
-    if np.sqrt(contrast) <= 5 * max(spread, 1.0):
-        return _failed("no liquid below and air above")
-    score = (values - air) @ (dye - air) / contrast
-    rows = np.cumsum(np.vstack([np.zeros(width), score]), axis=0)
-    # The split that fits two levels best: liquid below counts for, air above against.
-    gain = rows[-1] - 2 * rows + np.arange(height + 1)[:, None] - height / 2
-    split = np.argmax(gain, axis=0)
-    columns = np.flatnonzero((split >= 2 * window) & (split <= height - 2 * window))
-    if len(columns) < width / 2:
-        return _failed("the surface leaves the picture in half of the columns")
-    at = split[columns]
-
-    def total(first: NDArray[np.int64], last: NDArray[np.int64]) -> Array:
-        return rows[last, columns] - rows[first, columns]
-
-    above = total(at - 2 * window, at - window) / window
-    below = total(at + window, at + 2 * window) / window
-    sharp = np.abs(below - above - 1) < 0.5
-    if np.count_nonzero(sharp) < width / 2:
-        return _failed("no clear edge in half of the columns")
-    liquid = (total(at - window, at + window) - 2 * window * above)[sharp] / (below - above)[sharp]
-    return _line(columns[sharp] + 0.5 - width / 2, height - at[sharp] - window + liquid, lags)
-
-
-def _failed(reason: str) -> Surface:
-    return Surface(float("nan"), float("nan"), float("nan"), reason)
+    degree, more = settings.degree, settings.independent
+    u = (2 * x - left - right) / (right - left)
+    design = legendre.legvander(u, degree + 2 * more)
+    low = design[:, :degree + 1]
+    weight, residual, scale = np.ones_like(y), y, 0.0
+    for k in range(ROUNDS):
+        try:
+            line = np.linalg.solve((low * weight[:, None]).T @ low, low.T @ (weight * y))
+        except np.linalg.LinAlgError:
+            return failed("too few points agree")
+        residual = y - low @ line
+        scale = max(MAD * _median(np.abs(residual[weight > 0])), 1e-6)
+        size = np.abs(residual) / scale
+        # Huber's weights find the surface, Tukey's biweight then leaves out what is none of it
+        weight = (np.minimum(1.0, HUBER / np.maximum(size, HUBER)) if 2 * k < ROUNDS else
+                  np.maximum(1 - (size / settings.outlier) ** 2, 0) ** 2)
+    kept = np.abs(residual) <= settings.outlier * scale
+    used = float(np.count_nonzero(kept)) / columns
+    if scale > settings.rough * (right - left):
+        return failed("the points make no surface")
+    if used < settings.columns:
+        return failed("too few points agree")
+    q, r = np.linalg.qr(design[kept])
+    c = q.T @ y[kept]
+    variance, finer = (float(np.mean(part**2)) for part in np.split(c[degree + 1:], 2))
+    shape = np.linalg.solve(r[:degree + 1, :degree + 1], c[:degree + 1])
+    # Legendre polynomials are orthogonal over the whole width: the nearest line is the first two.
+    slope = 2 * float(shape[1]) / (right - left)
+    gains = np.linalg.norm(np.linalg.inv(r[:degree + 1, :degree + 1]), axis=1)
+    turn = 2 * float(gains[1]) / (right - left) / (1 + slope**2)
+    modes = slice(2, 2 + MODES)
+    return Surface(float(np.arctan(slope)), float(shape[0]), tuple(shape[modes].tolist()),
+                   variance, finer, (turn, float(gains[0]), *gains[modes].tolist()), used)
 
 
-def _line(x: Array, y: Array, lags: int) -> Surface:
-    design = np.column_stack([np.ones_like(x), x])
-    weight = np.ones_like(x)
-    for _ in range(20):
-        root = np.sqrt(weight)
-        line = np.linalg.lstsq(design * root[:, None], y * root, rcond=None)[0]
-        left = y - design @ line
-        scale = max(MAD * float(np.median(np.abs(left))), 1e-6)
-        weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-12))
-    if scale > 2.0:
-        return _failed("the surface is no line")
-    scores = design * (weight * left)[:, None]
-    meat = scores.T @ scores
-    for lag in range(1, lags + 1):
-        cross = scores[lag:].T @ scores[:-lag]
-        meat += (1 - lag / (lags + 1)) * (cross + cross.T)
-    bread = np.linalg.inv(design.T @ (design * (np.abs(left) <= HUBER * scale)[:, None]))
-    slope = float(line[1])
-    error = float(np.sqrt((bread @ meat @ bread)[1, 1])) / (1 + slope**2)
-    return Surface(float(np.arctan(slope)), error, float(line[0]))
+def _median(values: Array) -> float:
+    middle = len(values) // 2
+    return float(np.partition(values, middle)[middle])

@@ -1,71 +1,155 @@
-"""A video of a liquid's surface as a recording: an angle and its standard error for every frame."""
+"""A video of a liquid's surface becomes an angle and its standard error for every frame."""
 
 from __future__ import annotations
 
 import os
-from collections import Counter
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.recording import Recording
-from pikanid.tracking.surface import Surface, find
+from pikanid.settings import of_kind
+from pikanid.tracking.colours import ColourRange, Colours, Picture, learn
+from pikanid.tracking.edges import Edges, edges
+from pikanid.tracking.frames import Film, Frame, open_film
+from pikanid.tracking.geometry import Geometry
+from pikanid.tracking.journal import Journal, question
+from pikanid.tracking.region import Region, propose
+from pikanid.tracking.settings import USUAL, TrackingSettings
+from pikanid.tracking.surface import Surface, failed, surface
+from pikanid.tracking.tracked import Seen, Track, without_repeats
+
+Watch = Callable[[Frame, Edges, Surface], None]
 
 
-def track(path: str | os.PathLike[str], rate: float | None = None,
-          roi: tuple[int, int, int, int] | None = None) -> Recording:
-    """Read a video frame by frame; one picture at a time is held in memory.
+@dataclass(frozen=True, eq=False)
+class Tracker:
+    """Finds the surface in pictures of one camera.
 
-    Channels of the result are ``theta`` [rad] with a sigma for each frame and ``level``, the
-    surface's height at the middle above the region's lower edge, in pixels.  Frames that show no
-    clear surface are NaN; the notes say how many and why, and whether the file ended early.
+    Attributes:
+        region: Of the picture that is looked at.
+        colours: Of air and liquid.
+        settings: What counts as a surface.
+        geometry: Straightens points; pixels are taken as they are if None.
+    """
 
-    Args:
-        path: Of any video that OpenCV reads.
-        rate: Frames per second; as the file says if None.
-        roi: Left, top, width, height [px] of the inside of the tank; the whole picture if None.
+    region: Region
+    colours: Colours
+    settings: TrackingSettings = USUAL
+    geometry: Geometry | None = None
+
+    def find(self, picture: Picture) -> tuple[Edges, Surface]:
+        """The points and the surface in a picture (H, W, 3), BGR; points are in its pixels, whose
+        centres are whole numbers.
+        """
+        region = self.region
+        found = edges(region.cut(picture), self.colours, self.settings)
+        if found.reason:
+            return found, failed(found.reason)
+        # a pixel's edges are whole numbers to `edges`, its centre is one to cameras
+        moved = replace(found, x=found.x - 0.5 + region.left, y=found.y - 0.5 + region.top)
+        if self.geometry is None:
+            bottom, left = region.top + region.height - 0.5, region.left - 0.5
+            x, y, walls = moved.x, bottom - moved.y, (left, left + region.width)
+        else:
+            (x, y), walls = self.geometry.plane(moved.x, moved.y), (0.0, self.geometry.width)
+        return moved, surface(x, y, *walls, region.width, self.settings)
+
+
+def prepare(film: Film, region: Region | None = None, colour: ColourRange | None = None,
+            geometry: Geometry | None = None, settings: TrackingSettings = USUAL) -> Tracker:
+    """A tracker whose region and colours are learned from the first pictures, where not given.
 
     Raises:
-        BadRecording: If the file is no video, or fewer than two frames show a surface.
-        BadSetting: If the rate is not positive, the region lies outside the picture, or OpenCV is
-            not installed.
+        BadRecording: If these show no tank, or no two colours.
+        BadSetting: If the region does not lie within the picture.
     """
+    with closing(film.frames()) as frames:
+        first = [f.picture for f in islice(frames, settings.first) if f.picture is not None]
+    if not first:
+        raise errors.BadRecording(errors.no_video(film.path.name))
+    if region is None:
+        region = propose(first, colour)
+    region.check(film.size)
+    return Tracker(region, learn([region.cut(p) for p in first], settings, colour), settings,
+                   geometry)
+
+
+def track(path: str | os.PathLike[str], rate: float | None = None, region: Region | None = None,
+          colour: ColourRange | str | None = None, geometry: Geometry | None = None,
+          flip: bool = False, settings: TrackingSettings = USUAL,
+          journal: str | os.PathLike[str] | None = None,
+          step: Callable[[int], None] = lambda number: None, watch: Watch | None = None) -> Track:
+    """The surface in every picture of a video; one picture at a time is held in memory.
+
+    Args:
+        path: Of any video that OpenCV reads, or of a folder of numbered images.
+        rate: Pictures per second; as the file says if None.
+        region: The tank's inside; proposed from the first pictures if None.
+        colour: Range of the liquid's colour, or its text; learned from the first pictures if None.
+        geometry: Straightens perspective and lens.
+        flip: Whether the picture's left is the model's positive direction.
+        settings: What counts as a surface.
+        journal: A file that keeps what was found if the run is stopped; it goes on there when it is
+            repeated.  Deleted at the end.
+        step: Called with the number of pictures that are done.
+        watch: Called with every picture and what was found in it.
+
+    Raises:
+        BadRecording: If the file is no video, or its first pictures show no liquid.
+        BadSetting: If rate or region cannot be, or OpenCV is not installed.
+    """
+    of_kind(settings, TrackingSettings)
+    film = open_film(path, rate)
+    within = ColourRange.parse(colour) if isinstance(colour, str) else colour
+    tracker = prepare(film, region, within, geometry, settings)
+    asked = {**question(film.path), "rate": film.rate, "settings": asdict(settings),
+             "region": asdict(tracker.region), "colours": asdict(tracker.colours),
+             "geometry": None if geometry is None else asdict(geometry)}
+    kept = Journal(None if journal is None else Path(journal), asked)
+    seen = list(kept.found) if watch is None else []
+    notes = (f"The first {len(seen)} frames were found by a run that was stopped.",) if seen else ()
+    done = False
     try:
-        import cv2
-    except ImportError:
-        raise errors.BadSetting(errors.not_installed("Video", "cv2", "video")) from None
-    file = Path(path)
-    if not file.is_file():
-        raise errors.BadRecording(errors.no_file(str(file)))
-    found: list[Surface] = []
-    film = cv2.VideoCapture(str(file))
-    try:
-        stated = float(film.get(cv2.CAP_PROP_FPS)) if rate is None else rate
-        promised = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
-        while True:
-            there, picture = film.read()
-            if not there:
-                break
-            left, top, width, height = roi or (0, 0, picture.shape[1], picture.shape[0])
-            if (min(left, top) < 0 or min(width, height) < 1
-                    or left + width > picture.shape[1] or top + height > picture.shape[0]):
-                raise errors.BadSetting(errors.region_outside(roi, picture.shape[:2]))
-            cut = picture[top:top + height, left:left + width]
-            found.append(find(np.asarray(cut, np.uint8)))
+        with closing(film.frames(max(len(seen) - 1, 0))) as frames:
+            # the last one that is known comes again: the next may repeat it
+            before = next(frames).picture if seen else None
+            for frame in frames:
+                found, here = _looked_at(frame, tracker)
+                again = _same(frame.picture, before)
+                before = frame.picture
+                seen.append(Seen(frame.number, frame.time, here, again))
+                kept.add(seen[-1])
+                if watch is not None:
+                    watch(frame, found, here)
+                step(len(seen))
+        done = True
     finally:
-        film.release()
-    if not np.isfinite(stated) or stated <= 0:
-        raise errors.BadSetting(errors.bad_frame_rate(stated))
-    failed = Counter(one.reason for one in found if one.reason)
-    if len(found) - failed.total() < 2:
-        raise errors.BadRecording(errors.no_surface(file.name, len(found), [*failed]))
-    notes = [f"{count} of {len(found)} frames have no angle: {why}."
-             for why, count in failed.items()]
-    if promised > len(found):
-        notes.append(f"The video ends after {len(found)} of {promised} frames; those were read.")
-    made = Recording.from_arrays(
-        np.arange(len(found)) / stated,
-        {"theta": [one.theta for one in found], "level": [one.level for one in found]},
-        {"theta": "rad"}, {"theta": [one.sigma for one in found]}, name=file.stem)
-    return Recording(made.channels, made.name, tuple(notes))
+        kept.close(done)
+    return Track(film.path.stem, _timed(without_repeats(seen), film.rate), film.rate,
+                 film.promised, tracker.region, tracker.colours, settings, geometry, flip, notes)
+
+
+def _same(picture: Picture | None, before: Picture | None) -> bool:
+    """Whether two pictures are equal in every pixel; a few rows mostly tell."""
+    return (picture is not None and before is not None
+            and np.array_equal(picture[::32], before[::32]) and np.array_equal(picture, before))
+
+
+def _looked_at(frame: Frame, tracker: Tracker) -> tuple[Edges, Surface]:
+    if frame.picture is None:
+        nothing = Edges(np.empty(0), np.empty(0), "the picture cannot be read")
+        return nothing, failed(nothing.reason)
+    return tracker.find(frame.picture)
+
+
+def _timed(seen: tuple[Seen, ...], rate: float) -> tuple[Seen, ...]:
+    """Times that do not rise are replaced by numbers over the rate."""
+    times = np.array([s.time for s in seen])
+    if np.all(np.diff(times) > 0):
+        return seen
+    return tuple(replace(s, time=s.number / rate) for s in seen)

@@ -33,12 +33,15 @@ def without_outliers(recording: Recording, output: str, settings: Settings
         sigma, _ = high_band_sigma(channel, settings.rounding)
     except errors.BadRecording:
         return recording, 0
+    # where σ is known sample by sample, an uncertain one is no outlier
+    given = channel.sigma[seen] if isinstance(channel.sigma, np.ndarray) else 0.0
+    own = np.maximum(sigma, given) * np.ones(len(y))
     gap = np.zeros(len(y))
     gap[2:-2] = y[2:-2] - np.convolve(y, CUBIC, "valid")
     bad: list[int] = []
     while len(bad) <= noise.most_outliers * len(y):
-        k = int(np.argmax(np.abs(gap)))
-        if abs(gap[k]) < noise.spike * sigma * np.sqrt(1 + np.sum(CUBIC**2)):
+        k = int(np.argmax(np.abs(gap) / own))
+        if abs(gap[k]) < noise.spike * own[k] * np.sqrt(1 + np.sum(CUBIC**2)):
             break
         bad.append(k)
         y[k] -= gap[k]

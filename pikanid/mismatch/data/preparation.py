@@ -178,7 +178,9 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
         for name, level in found.items():
             f = fits[r, name]
             kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
-            again = refined(level, recording[name], f.t[kept], f.residual[kept], rate, quiet,
+            # of samples whose σ differ, what is left is compared as if all had the common one
+            left = f.residual * level.sigma / level.spreads(f.sigma, len(f.t))
+            again = refined(level, recording[name], f.t[kept], left[kept], rate, quiet,
                             records.settings, explained)
             new[name] = loud_enough(again, recording[name])
         levels.append(new)

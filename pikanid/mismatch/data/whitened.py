@@ -148,7 +148,7 @@ class Whitened:
     def _sigmas(self, r: int) -> np.ndarray:
         """σ (rows,) of every sample of recording r, in the unit of its output."""
         levels, outputs = self.records.levels[r], self.problem.model.outputs
-        return np.concatenate([np.full(len(s.t), levels[outputs[s.output].name].sigma)
+        return np.concatenate([levels[outputs[s.output].name].spreads(s.sigma, len(s.t))
                                for s in self.problem.experiments[r].samples])
 
     def _steps(self, r: int, theta: np.ndarray, allowed: float, finest: int) -> Steps | None:
@@ -225,6 +225,6 @@ class Whitened:
         for s in self.problem.experiments[r].samples:
             level = self.records.levels[r][self.problem.model.outputs[s.output].name]
             part = slice(first, first + len(s.t))
-            out[part] = level.whiten(rows[part], s.t)
+            out[part] = level.whiten(rows[part], s.t, s.sigma)
             first += len(s.t)
         return out

@@ -27,9 +27,9 @@ def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
         spread = propagated(response.sensitivity, h.covariance[np.ix_(own, own)])
         for s in experiment.samples:
             output = problem.model.outputs[s.output]
-            sigma = whitened.records.levels[r][output.name].sigma
+            sigma = whitened.records.levels[r][output.name].spreads(s.sigma, len(s.t))
             fits.append(Fit(experiment.name, output.name, output.unit, s.t, s.y,
-                            response.y[row:row + len(s.t)].copy(), np.full(len(s.t), sigma),
+                            response.y[row:row + len(s.t)].copy(), sigma,
                             spread[row:row + len(s.t)]))
             row += len(s.t)
     adequacy = judge([f.residual for f in fits], [f.sigma for f in fits],

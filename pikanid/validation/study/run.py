@@ -16,7 +16,7 @@ from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.storage.workers import begin
 from pikanid.strategies import STRATEGIES, strategy_class
 from pikanid.validation.benchmark.scenario import Scenario
-from pikanid.validation.study import pendulum, slosh
+from pikanid.validation.study import clip, pendulum, slosh
 
 SEED = 0  # definition: of the study's first recordings
 # Only what is quick is repeated: the study is to stay a matter of minutes.
@@ -32,6 +32,7 @@ class Study:
     pendulum_fits: tuple[pendulum.Result, ...]
     swing: pendulum.Swing
     diagnosis: Diagnosis
+    filmed: clip.Filmed | None
     seeds: int
     seconds: float
 
@@ -39,7 +40,7 @@ class Study:
 def count_steps(strategies: Sequence[str] = tuple(STRATEGIES)) -> int:
     """How many steps `run` announces at most."""
     noisy = sum(1 for s in slosh.SCENARIOS if not s.clean)
-    return 2 + len(strategies) * (len(slosh.SCENARIOS) + noisy + 1)
+    return 3 + len(strategies) * (len(slosh.SCENARIOS) + noisy + 1)
 
 
 def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
@@ -85,13 +86,18 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
             task = pending.get((scenario, name))
             singles.append(slosh.Result(scenario, name, None, errors.left_out_as_slow())
                            if task is None else task.get())
+    step("a rendered video, tracked and identified")
+    try:
+        filmed = clip.film(SEED)
+    except errors.BadSetting:  # without the extra `video`
+        filmed = None
     # Last, when nothing is timed any more: a diagnosis takes what cores there are.
     step("real pendulum, missing physics")
     diagnosis = pendulum.missing_physics(swing)
     order = {(s, n): k for k, (s, n) in enumerate(product(slosh.SCENARIOS, strategies))}
     singles.sort(key=lambda r: order[r.scenario, r.strategy])
     return Study(tuple(singles), tuple(spreads), tuple(real), swing, diagnosis,
-                 seeds, time.perf_counter() - begun)
+                 filmed, seeds, time.perf_counter() - begun)
 
 
 @contextmanager

@@ -1,0 +1,103 @@
+"""What a rendered picture shows: a tank with dyed liquid, its light, and the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Colour = tuple[float, float, float]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Glare:
+    """A reflection: a soft bright ellipse that the camera sees in front of everything.
+
+    Attributes:
+        x, y: Its middle in the picture [px].
+        width, height: Standard deviations along both axes [px].
+        strength: Grey levels that are added in the middle.
+    """
+
+    x: float
+    y: float
+    width: float = 12.0
+    height: float = 30.0
+    strength: float = 120.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A tank of dyed liquid in front of a camera.
+
+    Attributes:
+        size: Height and width of the picture [px].
+        tank: Left, top, width and height of the tank's inside [px], seen straight on.
+        level: Of the surface at rest above the tank's floor, share of the tank's height.
+        air, dye, outside, wall: Colours, RGB from 0 to 255.
+        thickness: Of the tank's wall [px].
+        light: Relative change of brightness from the middle to the right and to the lower edge.
+        glare: Reflections.
+        meniscus: How far the liquid climbs at the walls, and how far from them it does [px].
+        yaw, pitch: Of the camera about the vertical and the horizontal axis [rad].
+        distance: Of the camera from the tank, in widths of the tank.
+        blur: Standard deviation of the optics' Gaussian blur [px].
+        noise: Standard deviation of the sensor's noise [grey levels].
+
+    >>> Scene().waterline
+    255.0
+    """
+
+    size: tuple[int, int] = (480, 640)
+    tank: tuple[int, int, int, int] = (170, 60, 300, 390)
+    level: float = 0.5
+    air: Colour = (205.0, 208.0, 200.0)
+    dye: Colour = (40.0, 80.0, 175.0)
+    outside: Colour = (120.0, 122.0, 118.0)
+    wall: Colour = (170.0, 175.0, 178.0)
+    thickness: int = 5
+    light: tuple[float, float] = (0.0, 0.0)
+    glare: tuple[Glare, ...] = ()
+    meniscus: tuple[float, float] = (0.0, 8.0)
+    yaw: float = 0.0
+    pitch: float = 0.0
+    distance: float = 6.0
+    blur: float = 0.8
+    noise: float = 3.0
+
+    @property
+    def waterline(self) -> float:
+        """Row of the surface at rest, seen straight on [px]."""
+        _, top, _, height = self.tank
+        return top + (1 - self.level) * height
+
+    @property
+    def corners(self) -> Array:
+        """Where the camera sees the corners of the tank's inside (4, 2) [px]: upper left, upper
+        right, lower right, lower left.
+        """
+        left, top, width, height = self.tank
+        flat = np.array([[left, top], [left + width, top], [left + width, top + height],
+                         [left, top + height]], float)
+        return self.seen(flat)
+
+    def seen(self, points: Array) -> Array:
+        """Points (N, 2) of the tank's plane [px], as the turned camera sees them."""
+        moved = np.column_stack([points, np.ones(len(points))]) @ self.homography.T
+        return np.asarray(moved[:, :2] / moved[:, 2:])
+
+    @property
+    def homography(self) -> Array:
+        """From the plane seen straight on to the picture (3, 3): a pinhole camera, turned about
+        the tank's middle.
+        """
+        left, top, width, height = self.tank
+        x, y, far = left + width / 2, top + height / 2, self.distance * width
+        cy, sy, cp, sp = (np.cos(self.yaw), np.sin(self.yaw), np.cos(self.pitch),
+                          np.sin(self.pitch))
+        turned = np.array([[cy, 0, 0], [sp * sy, cp, 0], [cp * sy / far, -sp / far, 1]])
+        there = np.array([[1, 0, -x], [0, 1, -y], [0, 0, 1]])
+        back = np.array([[1, 0, x], [0, 1, y], [0, 0, 1]])
+        return back @ turned @ there

@@ -1,0 +1,44 @@
+"""What decides which pictures show a surface, and what its standard error is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pikanid.settings import Amount, Checked, Count, Share
+
+MODES = 3  # definition: shapes that are reported beside level and angle, of degrees 2, 3 and 4
+
+
+@dataclass(frozen=True)
+class TrackingSettings(Checked):
+    """Settings of the tracker.
+
+    Attributes:
+        contrast: Standard deviations by which air and liquid have to differ.
+        margin: Share of the width that is left out at either wall, where liquid climbs.
+        columns: Least share of the columns that must show an edge.
+        unlike: How far from air above, and liquid below, a column may be; share of their contrast.
+        beyond: How many degrees beyond those that are reported (4) the surface may follow.
+        independent: How many of the next higher degrees tell the error.
+        outlier: Robust standard deviations beyond which a column is left out.
+        rough: Residual [share of the width] beyond which it is no surface.
+        first: How many pictures the colours and the region are learned from.
+    """
+
+    contrast: Amount = 4.0
+    margin: Share = 0.04
+    columns: Share = 0.5
+    unlike: Share = 0.35
+    beyond: Count = 2
+    independent: Count = 8
+    outlier: Amount = 4.0
+    rough: Share = 0.03
+    first: Count = 12
+
+    @property
+    def degree(self) -> int:
+        """Of the polynomial that the surface may follow."""
+        return 1 + MODES + self.beyond
+
+
+USUAL = TrackingSettings()
