@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from math import inf
@@ -145,7 +145,7 @@ def changed(settings: Any) -> dict[str, Any]:
 
 
 @cache
-def _usual(kind: Any) -> dict[str, Any]:
+def _usual(kind: Callable[[], Any]) -> dict[str, Any]:
     return dict(items(kind()))
 
 

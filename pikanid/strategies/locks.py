@@ -5,9 +5,9 @@ from __future__ import annotations
 from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, gauss_newton
 
 STIFF, STIFFEST = 1e10, 1e16  # numerical: λ that makes a trajectory solve its equations
-# One to three do from the λ before; where rounding at such a λ promises decreases for ever, a
-# hundred find no more than ten.
-ITERATIONS = 10  # limit: at one λ
+# A handful do from the λ before, two dozen for a tank that runs empty; where rounding at such a λ
+# promises decreases for ever, more of them find nothing.
+ITERATIONS = 50  # limit: at one λ
 
 
 def follows_physics(system: BandedSystem, at: Linearisation, lam: float) -> bool:
