@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +50,8 @@ def test_what_is_finished_is_written(recorded: str, tmp_path: Path, number: sign
                                      monkeypatch: pytest.MonkeyPatch) -> None:
     usual, names = identify._make, list(STRATEGIES)
 
-    def make(name: str, protocol: str, seed: int) -> Any:
-        return Stopped(number) if name == names[at] else usual(name, protocol, seed)
+    def make(name: str, protocol: str, seed: int, step: Any) -> Any:
+        return Stopped(number) if name == names[at] else usual(name, protocol, seed, step)
 
     monkeypatch.setattr(identify, "_make", make)
     before = signal.getsignal(signal.SIGTERM)
@@ -74,3 +75,20 @@ def test_a_page_of_estimates_has_print_precision(recorded: str, tmp_path: Path) 
     std = found.std("l_theta")
     digits = f"{std:.1e}"[0] + f"{std:.1e}"[2]
     assert f"{digits}</td>" in text and "d(theta)/dt" in text and "theta" in text
+
+
+@pytest.mark.kan
+@pytest.mark.parametrize("name", ["pinn", "pikan"])
+def test_long_fits_say_how_far_they_are(name: str, noisy: pk.Recording) -> None:
+    pytest.importorskip("torch")
+    told: list[tuple[str, bool]] = []
+
+    def step(text: str, within: bool = False) -> None:
+        told.append((text, within))
+
+    strategy: Any = identify._make(name, "default", 0, step)
+    if name == "pinn":
+        strategy = replace(strategy, steps=3)
+    strategy.fit(pk.systems.sloshing(), noisy)
+    assert told and all(within and text.startswith(f"{name}, ") for text, within in told)
+    assert all("lam " in text for text, _ in told)

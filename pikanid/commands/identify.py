@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pikanid.estimate import Estimate
     from pikanid.model import Model
     from pikanid.recording import Recording
+    from pikanid.reporting.console import Step
     from pikanid.strategies.strategy import Strategy
 
 ALL = "all"
@@ -98,12 +99,17 @@ def _check_choice(option: str, value: str, known: Sequence[str]) -> None:
         raise errors.BadSetting(errors.bad_value(option, value, f"one of {', '.join(known)}"))
 
 
-def _make(name: str, protocol: str, seed: int) -> Strategy:
+def _make(name: str, protocol: str, seed: int, step: Step) -> Strategy:
     from pikanid.strategies import strategy_class
 
     kind: Callable[..., Strategy] = strategy_class(name)
     known = {f.name for f in fields(strategy_class(name))}
-    options = {"protocol": protocol, "seed": seed}
+
+    def tell(entry: Mapping[str, float]) -> None:
+        step(", ".join([name, *(f"{key} {entry[key]:.3g}" for key in ("step", "grid", "lam")
+                                if key in entry)]), within=True)
+
+    options = {"protocol": protocol, "seed": seed, "progress": tell}
     return kind(**{key: value for key, value in options.items() if key in known})
 
 
@@ -120,7 +126,7 @@ def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str]
         for k, name in enumerate(names):
             step(name)
             try:
-                found = _make(name, protocol, seed).fit(model, given)
+                found = _make(name, protocol, seed, step).fit(model, given)
             except BaseException as problem:
                 if became(problem) and estimates:
                     stopped = problem

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Protocol, TextIO
 
 from pikanid.pieces.sheet import sentence
 
@@ -44,8 +44,15 @@ def complain(text: str) -> None:
     print(f"Error: {sentence(text)}", file=sys.stderr)
 
 
+class Step(Protocol):
+    """Tells what is being done."""
+
+    def __call__(self, text: str, within: bool = False) -> None:
+        """The next step begins, or, `within` it, how far it is."""
+
+
 @contextmanager
-def working(description: str, total: int, quiet: bool = False) -> Iterator[Callable[[str], None]]:
+def working(description: str, total: int, quiet: bool = False) -> Iterator[Step]:
     """A progress bar on standard error while something runs; nothing where nobody watches.
 
     Yields a function that names the next step and counts the last one as done.
@@ -55,7 +62,7 @@ def working(description: str, total: int, quiet: bool = False) -> Iterator[Calla
     """
     screen = console(sys.stderr)
     if quiet or not screen.is_terminal:
-        yield lambda text: None
+        yield lambda text, within=False: None
         return
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -65,10 +72,10 @@ def working(description: str, total: int, quiet: bool = False) -> Iterator[Calla
         task = progress.add_task(description, total=total)
         started = False
 
-        def step(text: str) -> None:
+        def step(text: str, within: bool = False) -> None:
             nonlocal started
             progress.update(task, description=f"{description}: {sentence(text)}",
-                            advance=1 if started else 0)
+                            advance=1 if started and not within else 0)
             started = True
 
         yield step
