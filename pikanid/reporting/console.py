@@ -6,6 +6,7 @@ plain text, without a single escape sequence, and no progress.
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Iterator
@@ -78,4 +79,23 @@ def working(description: str, total: int, quiet: bool = False) -> Iterator[Step]
                             advance=1 if started and not within else 0)
             started = True
 
-        yield step
+        with _told(step):
+            yield step
+
+
+@contextmanager
+def _told(step: Step) -> Iterator[None]:
+    """What the package logs meanwhile, such as that it compiles, is shown as part of the step."""
+    class Shown(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            step(record.getMessage(), within=True)
+
+    log, handler = logging.getLogger("pikanid"), Shown(logging.INFO)
+    before = log.level
+    log.addHandler(handler)
+    log.setLevel(min(before or logging.INFO, logging.INFO))
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(before)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import importlib.abc
 import importlib.util
+import logging
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -22,6 +23,7 @@ from pikanid.storage.cache import kept, named, sources
 
 Method = Literal["explicit", "implicit"]
 _HERE = Path(__file__).parent
+_LOG = logging.getLogger(__name__)
 
 
 def compiled(model: Model, method: Method = "explicit") -> ModuleType:
@@ -64,6 +66,7 @@ def generated(name: str, source: str) -> ModuleType:
 def _source(model: Model, method: Method) -> str:
     from pikanid.simulation.codegen import generate
 
+    _LOG.info("compiling %s, once", model.name)
     source, lowered = generate(model)
     kind = "hybrid" if lowered.n_dynamic else "smooth"
     step = "rk4" if method == "explicit" else "sdirk"
