@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pikanid.tracking import from_corners, track
-from pikanid.tracking.render import Glare, Scene, write
+from pikanid.tracking.render import Cover, Glare, Scene, Splash, write
 from pikanid.tracking.tracked import Track
 
 FRAMES = 300  # of each clip
@@ -33,6 +33,9 @@ class Condition:
 
 
 GLARE = (Glare(300, 240),)
+CABLE = (Cover((250, 0), (330, 480), 5.0, 60, 240),)
+HAND = (Cover((40, 200), (-80, 420), 45.0, 80, 200, (3.0, 0.0)),)  # goes by from left to right
+SPLASHES = (Splash(300, 260, 70, 120), Splash(390, 250, 180, 230, drops=60, radius=12.0, seed=1))
 CONDITIONS = (
     Condition("plain"),
     Condition("lossless", codec="ffv1"),
@@ -54,13 +57,21 @@ CONDITIONS = (
     Condition("quality 60", quality=60.0),
     Condition("quality 25", quality=25.0, bad=True),
     Condition("MPEG-4, few bits", codec="mp4v", bad=True),
+    Condition("a cable before the tank", {"covers": CABLE}, bad=True),
+    Condition("a hand passes", {"covers": HAND}, bad=True),
+    Condition("a hand as pale as the air", {"covers": (replace(HAND[0], colour=Scene().air),)},
+              bad=True),
+    Condition("a hand in a glove of the dye's colour", {
+        "covers": (replace(HAND[0], colour=Scene().dye),)}, bad=True),
+    Condition("splashes", {"splashes": SPLASHES}, bad=True),
     Condition("all at once", {"noise": 10.0, "blur": 2.0, "light": (0.25, 0.2), "glare": GLARE,
                               "meniscus": (4.0, 7.0)}, quality=60.0, bad=True))
 
 
 @dataclass(frozen=True)
 class Score:
-    """How well one clip was tracked, in degrees; `shares` are of all its frames."""
+    """How well one clip was tracked, in degrees; shares are of all its frames, `blind`
+    of those alone that nothing covers or splashes."""
 
     condition: Condition
     rmse: float
@@ -71,6 +82,7 @@ class Score:
     wrong: float
     alike: float
     speed: float
+    blind: float
 
 
 def swing(frames: int = FRAMES, rate: float = 100.0) -> np.ndarray:
@@ -110,8 +122,11 @@ def score(condition: Condition, seed: int = 0) -> Score:
     sigma = np.degrees(found.sigma[:, 0])
     there = np.isfinite(off)
     left = off[there]
+    alone = np.ones(len(truth), bool)
+    for thing in (*condition.changes.get("covers", ()), *condition.changes.get("splashes", ())):
+        alone[thing.first:thing.last + 1] = False
     return Score(
         condition, float(np.sqrt(np.mean(left**2))), float(np.max(np.abs(left))),
         float(np.mean(np.abs(left) < 1.96 * sigma[there])), 1.96 * float(np.median(sigma[there])),
         float(np.mean(~there)), float(np.mean(np.abs(left) > 1)),
-        float(np.corrcoef(left[1:], left[:-1])[0, 1]), speed)
+        float(np.corrcoef(left[1:], left[:-1])[0, 1]), speed, float(np.mean(~there[alone])))

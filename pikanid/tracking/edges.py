@@ -101,11 +101,12 @@ def _band(picture: Picture, colours: Colours, rough: NDArray[np.intp], settings:
     """
     height, width = picture.shape[:2]
     split = rough
+    packed = np.ascontiguousarray(picture).view("V3")[..., 0]  # a pixel is one thing to take
     for reach in REACHES:
         columns = np.flatnonzero((split >= 2 * reach) & (split <= height - 2 * reach))
         if len(columns) < settings.columns * width:
             break
-        band = colours.shares(_cut(picture, split[columns], columns, 2 * reach))
+        band = colours.shares(_cut(packed, split[columns], columns, 2 * reach))
         if split is rough:
             # centred on the row where half is liquid
             split = rough.copy()
@@ -114,7 +115,7 @@ def _band(picture: Picture, colours: Colours, rough: NDArray[np.intp], settings:
                               & (split[columns] <= height - 2 * reach)]
             if len(columns) < settings.columns * width:
                 break
-            band = colours.shares(_cut(picture, split[columns], columns, 2 * reach))
+            band = colours.shares(_cut(packed, split[columns], columns, 2 * reach))
         profile = band.mean(axis=1)
         low, high = profile[:reach // 2 + 1].mean(), profile[-(reach // 2 + 1):].mean()
         near = max(abs(profile[reach - 1:reach + 1].mean() - low),
@@ -124,11 +125,13 @@ def _band(picture: Picture, colours: Colours, rough: NDArray[np.intp], settings:
     return 0, np.empty((0, 0)), np.empty(0, np.intp), np.empty(0, np.intp)
 
 
-def _cut(picture: Picture, split: NDArray[np.intp], columns: NDArray[np.intp],
+def _cut(packed: NDArray[np.void], split: NDArray[np.intp], columns: NDArray[np.intp],
          half: int) -> NDArray[np.uint8]:
     """Pixels (2·half, n, 3) in the rows around the split of each column."""
-    rows = split + np.arange(-half, half)[:, None]
-    return np.asarray(picture[rows, columns], np.uint8)
+    width = packed.shape[1]
+    first = (split - half) * width + columns
+    taken = packed.ravel().take(first + width * np.arange(2 * half)[:, None])
+    return np.asarray(taken.view(np.uint8).reshape(2 * half, len(columns), 3))
 
 
 def _smooth(levels: Array) -> Array:

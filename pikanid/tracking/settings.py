@@ -21,7 +21,11 @@ class TrackingSettings(Checked):
         beyond: How many degrees beyond those that are reported (4) the surface may follow.
         independent: How many of the next higher degrees tell the error.
         outlier: Robust standard deviations beyond which a column is left out.
+        unsure: How many times less sure the angle may be than a line through every column, by where
+            the points lie.
         rough: Residual [share of the width] beyond which it is no surface.
+        volume: Change of the surface's mean height [share of the width] that counts as one, and
+        jump: robust standard deviations of that height which it must have, too.
         first: How many pictures the colours and the region are learned from.
     """
 
@@ -32,7 +36,10 @@ class TrackingSettings(Checked):
     beyond: Count = 2
     independent: Count = 8
     outlier: Amount = 4.0
+    unsure: Amount = 12.0
     rough: Share = 0.03
+    volume: Share = 0.003
+    jump: Amount = 6.0
     first: Count = 12
 
     @property

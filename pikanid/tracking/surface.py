@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -11,9 +13,11 @@ from numpy.typing import NDArray
 from pikanid.tracking.settings import MODES, TrackingSettings
 
 Array = NDArray[np.float64]
-HUBER = 1.345  # definition: 95 % efficiency under normal noise (Huber, Robust Statistics, 1981)
 MAD = 1.4826  # definition: median absolute deviation to standard deviation, normal noise
 ROUNDS = 8  # numerical: of reweighting, after which points change no more
+SAME = 1e-3  # numerical: change of a weight, share of its greatest, that changes nothing
+BLOCKS = 16  # numerical: of neighbouring points, whose medians find where to start
+TRIPLES = np.array(list(combinations(range(BLOCKS), 3)))  # definition: all parabolas through three
 
 
 @dataclass(frozen=True)
@@ -61,10 +65,11 @@ def surface(x: Array, y: Array, left: float, right: float, columns: int,
     """
     degree, more = settings.degree, settings.independent
     u = (2 * x - left - right) / (right - left)
-    design = legendre.legvander(u, degree + 2 * more)
+    design = _design(u.tobytes(), degree + 2 * more)
     low = design[:, :degree + 1]
-    weight, residual, scale = np.ones_like(y), y, 0.0
-    for k in range(ROUNDS):
+    weight = (np.abs(y - _start(u, y)) <= settings.rough * (right - left)).astype(float)
+    residual, scale = y, 0.0
+    for _ in range(ROUNDS):
         try:
             line = np.linalg.solve((low * weight[:, None]).T @ low, low.T @ (weight * y))
         except np.linalg.LinAlgError:
@@ -72,9 +77,10 @@ def surface(x: Array, y: Array, left: float, right: float, columns: int,
         residual = y - low @ line
         scale = max(MAD * _median(np.abs(residual[weight > 0])), 1e-6)
         size = np.abs(residual) / scale
-        # Huber's weights find the surface, Tukey's biweight then leaves out what is none of it
-        weight = (np.minimum(1.0, HUBER / np.maximum(size, HUBER)) if 2 * k < ROUNDS else
-                  np.maximum(1 - (size / settings.outlier) ** 2, 0) ** 2)
+        # Tukey's biweight: what is no part of the surface must have no weight at all
+        before, weight = weight, np.maximum(1 - (size / settings.outlier) ** 2, 0) ** 2
+        if np.max(np.abs(weight - before)) < SAME:
+            break
     kept = np.abs(residual) <= settings.outlier * scale
     used = float(np.count_nonzero(kept)) / columns
     if scale > settings.rough * (right - left):
@@ -88,10 +94,46 @@ def surface(x: Array, y: Array, left: float, right: float, columns: int,
     # Legendre polynomials are orthogonal over the whole width: the nearest line is the first two.
     slope = 2 * float(shape[1]) / (right - left)
     gains = np.linalg.norm(np.linalg.inv(r[:degree + 1, :degree + 1]), axis=1)
+    if float(gains[1]) > settings.unsure * np.sqrt(3 / columns):
+        return failed("covered: what is left of the surface does not tell its angle")
     turn = 2 * float(gains[1]) / (right - left) / (1 + slope**2)
     modes = slice(2, 2 + MODES)
     return Surface(float(np.arctan(slope)), float(shape[0]), tuple(shape[modes].tolist()),
                    variance, finer, (turn, float(gains[0]), *gains[modes].tolist()), used)
+
+
+def _start(u: Array, y: Array) -> Array:
+    """The parabola (n,) from which half of the surface is least far: least median of squares (P. J.
+    Rousseeuw, J. Am. Stat. Assoc. 79, 1984), over medians of neighbouring points.
+
+    Whatever else has an edge, as a hand, may have nearly as many points as the surface.
+    """
+    size = len(y) // BLOCKS
+    if size == 0:
+        return y
+    x = u[size // 2:BLOCKS * size:size]
+    z = np.partition(y[:BLOCKS * size].reshape(BLOCKS, size), size // 2, axis=1)[:, size // 2]
+    found = (_parabolas(x.tobytes()) @ z[TRIPLES][..., None])[..., 0]
+    far = np.partition(np.abs(found - z), BLOCKS // 2, axis=1)[:, BLOCKS // 2]
+    best = TRIPLES[np.argmin(far)]
+    c = np.linalg.solve(x[best, None] ** [0, 1, 2], z[best])
+    return np.asarray(c[0] + u * (c[1] + u * c[2]), float)
+
+
+@lru_cache(maxsize=4)
+def _parabolas(at: bytes) -> Array:
+    """(triples, blocks, 3): Lagrange's polynomials through three of the points, at all of them."""
+    x = np.frombuffer(at)
+    nodes = x[TRIPLES]
+    factors = [np.prod([(x - nodes[:, j, None]) / (nodes[:, k] - nodes[:, j])[:, None]
+                        for j in range(3) if j != k], axis=0) for k in range(3)]
+    return np.stack(factors, axis=-1)
+
+
+@lru_cache(maxsize=4)
+def _design(at: bytes, degree: int) -> Array:
+    """Legendre polynomials (n, degree + 1) at the points; mostly those of the picture before."""
+    return np.asarray(legendre.legvander(np.frombuffer(at), degree), float)
 
 
 def _median(values: Array) -> float:

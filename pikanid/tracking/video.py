@@ -22,6 +22,7 @@ from pikanid.tracking.region import Region, propose
 from pikanid.tracking.settings import USUAL, TrackingSettings
 from pikanid.tracking.surface import Surface, failed, surface
 from pikanid.tracking.tracked import Seen, Track, without_repeats
+from pikanid.tracking.volume import without_changes
 
 Watch = Callable[[Frame, Edges, Surface], None]
 
@@ -130,7 +131,9 @@ def track(path: str | os.PathLike[str], rate: float | None = None, region: Regio
         done = True
     finally:
         kept.close(done)
-    return Track(film.path.stem, _timed(without_repeats(seen), film.rate), film.rate,
+    width = tracker.region.width if geometry is None else geometry.width
+    kept_ones = without_changes(without_repeats(seen), width, settings)
+    return Track(film.path.stem, _timed(kept_ones, film.rate), film.rate,
                  film.promised, tracker.region, tracker.colours, settings, geometry, flip, notes)
 
 

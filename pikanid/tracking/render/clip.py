@@ -54,8 +54,8 @@ def write(path: str | os.PathLike[str], surfaces: Iterable[float | ArrayLike],
         raise errors.BadRecording(errors.cannot_write(str(file), "OpenCV opens no video there"))
     try:
         film.set(cv2.VIDEOWRITER_PROP_QUALITY, quality)
-        for surface in surfaces:
-            film.write(np.ascontiguousarray(stage.picture(surface, rng)[..., ::-1]))
+        for number, surface in enumerate(surfaces):
+            film.write(np.ascontiguousarray(stage.picture(surface, rng, number)[..., ::-1]))
     finally:
         film.release()
     return file

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Colour = tuple[float, float, float]
-Array = NDArray[np.float64]
+from pikanid.tracking.render.passing import Array, Colour, Cover, Splash
 
 
 @dataclass(frozen=True)
@@ -45,6 +43,8 @@ class Scene:
         distance: Of the camera from the tank, in widths of the tank.
         blur: Standard deviation of the optics' Gaussian blur [px].
         noise: Standard deviation of the sensor's noise [grey levels].
+        covers: What passes in front of the tank.
+        splashes: Drops above the surface.
 
     >>> Scene().waterline
     255.0
@@ -66,6 +66,8 @@ class Scene:
     distance: float = 6.0
     blur: float = 0.8
     noise: float = 3.0
+    covers: tuple[Cover, ...] = ()
+    splashes: tuple[Splash, ...] = ()
 
     @property
     def waterline(self) -> float:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pikanid import errors
-from pikanid.tracking.render.scene import Array, Scene
+from pikanid.tracking.render.passing import Array
+from pikanid.tracking.render.scene import Scene
 
 PARTS = 4  # numerical: strips of a pixel's width whose share below the surface is exact
 PAD = 4  # numerical: standard deviations of the blur that reach around the tank
@@ -42,7 +43,7 @@ class Stage:
         self.inside = self._inside().astype(np.float32)
         self.whole = self._whole(self.inside)
         self.depths = self.z.max(axis=1), self.z.min(axis=1)
-        light = self._light()
+        light = self.light = self._light().astype(np.float32)
         above = np.asarray(scene.outside) * np.ones((height, width, 1))
         above[self.box] += self._wall()[..., None] * (
             np.asarray(scene.wall) - np.asarray(scene.outside))
@@ -57,8 +58,8 @@ class Stage:
         half = np.tan(theta) * self.scene.tank[2] / 2
         return np.array([-half, half])
 
-    def picture(self, surface: float | ArrayLike, rng: np.random.Generator | None = None
-                ) -> Picture:
+    def picture(self, surface: float | ArrayLike, rng: np.random.Generator | None = None,
+                number: int = 0) -> Picture:
         """One picture (H, W, 3), RGB.
 
         Args:
@@ -66,6 +67,7 @@ class Stage:
                 rest (n,) at even distances from wall to wall; (m, n) for m moments of an exposure,
                 of which the picture is the mean.
             rng: Draws the sensor's noise; none if None.
+            number: Of the picture, from 0: covers and splashes are seen in some.
 
         Raises:
             BadSetting: If heights are no numbers, or only one.
@@ -77,8 +79,16 @@ class Stage:
             raise errors.BadSetting(errors.bad_surface(heights.shape))
         moments = np.atleast_2d(heights)
         share = np.mean([self._share(one) for one in moments], axis=0)
+        across, down = (np.arange(n, dtype=float) for n in self.scene.size[::-1])
+        down = down[:, None]
+        for splash in self.scene.splashes:
+            drops = splash.share(across[self.box[1]], down[self.box[0]], number)
+            share = np.maximum(share, (drops * self.whole).astype(np.float32))
         shown = self.above.copy()
         shown[self.box] += self._blurred(self.difference * share[..., None])
+        for cover in self.scene.covers:
+            hidden = self._blurred(cover.share(across, down, number).astype(np.float32))[..., None]
+            shown += hidden * (np.asarray(cover.colour, np.float32) * self.light - shown)
         if rng is not None and self.scene.noise:
             shown += self._noise(rng)
         shown += 0.5  # to the nearest grey level
