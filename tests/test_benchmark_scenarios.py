@@ -120,7 +120,7 @@ def test_the_readmes_scenario_can_be_read(tmp_path: Path) -> None:
     (content,) = (b for b in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
                   if b.startswith("[scenarios"))
     (model,) = (b for b in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
-                if b.startswith("name"))
+                if b.startswith("# my.toml"))
     (tmp_path / "my.toml").write_text(model, "utf-8")
     pk.excitation.two_pulse().write(tmp_path / "motion.csv")
     (tmp_path / "mine.toml").write_text(content, "utf-8")

@@ -158,7 +158,9 @@ def test_recorded_rates_below_the_limit_change_nothing() -> None:
 
 
 def test_a_play_wider_than_the_input_leaves_nothing_to_look_for_in_it() -> None:
-    level = cast(NoiseModel, SimpleNamespace(sigma=0.002, whiten=lambda r, t: r))
+    level = cast(NoiseModel, SimpleNamespace(
+        sigma=0.002, whiten=lambda r, t, given=None: r,
+        spreads=lambda given, n: np.full(n, 0.002)))
     records = Records((pk.simulate(loose(), wandering(), sigma=0.002, seed=1),),
                       ({"theta": level},), DEFAULTS)
     model = loose().with_values(b=9.0)

@@ -139,8 +139,10 @@ def writes(node: ast.Call) -> str | None:
     name = called.split(".")[-1]
     if called in ("os.replace", "os.rename", "np.save", "np.savetxt", "shutil.move"):
         return called
-    if name in ("write_text", "write_bytes", "to_csv", "mkstemp", "NamedTemporaryFile"):
+    if name in ("write_text", "write_bytes", "mkstemp", "NamedTemporaryFile"):
         return called
+    if name == "to_csv" and node.args:
+        return called  # without a path it goes into memory
     if name == "savefig" and "format" not in {k.arg for k in node.keywords}:
         return called  # with a format it goes into memory
     if called in ("open", "gzip.open"):

@@ -248,10 +248,10 @@ def test_the_figure_has_a_panel_a_question_and_units() -> None:
     rec = pk.simulate(model, pk.excitation.multisine(duration=6.0), sigma=SIGMA, seed=1)
     axes = pk.resid(model, rec)[0].plot().axes
     assert [a.get_ylabel() for a in axes] == [
-        "autocorrelation", "correlation with u_x", "residual [s.d.]", "power density",
+        "autocorrelation", "correlation with u_x", "residual [s.d.]", "power density [rad²/Hz]",
         "coherence γ² with u_x", *["residual [s.d.]"] * 3]
     assert [a.get_xlabel() for a in axes[-3:]] == ["theta [rad]", "theta_dot [rad/s]",
-                                                  "u_x [m/s^2]"]
+                                                  "u_x [m/s²]"]
 
 
 @pytest.mark.parametrize("options", [{"lags": 0}, {"rho": 1.0}, {"alpha": 0.0}])

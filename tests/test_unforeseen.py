@@ -66,10 +66,13 @@ def test_debug_shows_the_traceback_wherever_it_stands(
 
 
 def test_the_net_is_the_only_one() -> None:
-    """Elsewhere failures are named; only the net takes them all."""
+    """Elsewhere failures are named; only the net takes them all, and a study of thousands of fits
+    keeps what became of each.
+    """
     package = Path(pk.__file__).parent
     places = [f"{path.relative_to(package)}: {line.strip()}"
               for path in sorted(package.rglob("*.py"))
               for line in path.read_text().splitlines()
               if line.strip().startswith(("except Exception", "except:"))]
-    assert len(places) == 1 and places[0].startswith("cli.py: except Exception as failure:")
+    assert [place.split(":")[0] for place in places] == [
+        "cli.py", "validation/benchmark/spread.py", "validation/benchmark/trial.py"]

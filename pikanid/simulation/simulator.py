@@ -22,7 +22,7 @@ from pikanid.simulation.input_paths import split, with_parts
 MethodChoice = Literal["auto", "explicit", "implicit"]
 _NOTHING = np.empty(0, np.int64)  # definition: an empty array
 FORETOLD = 64  # numerical: times finer: beyond that an error is far from what the order says
-CONVERGING = 0.6  # numerical: of the error, that half the step must leave at most: order 0.7
+CONVERGING = 0.2  # numerical: of the error, that half the step leaves at most where all is smooth
 FINEST = 4096  # limit: sub-steps of the median interval beyond which the explicit route gives up
 
 
@@ -223,7 +223,7 @@ class Simulator:
                         return best
                 else:
                     error, failure = np.inf, fine
-                # what a kink makes slow still converges; what is stiff does not at all
+                # what is smooth is there soon; kinks, and what is stiff, may need another method
                 stuck, before = not error < CONVERGING * before, error
                 rough, longest = fine, longest / 2
                 if stuck and candidate == "explicit" and method == "auto" and (

@@ -65,6 +65,11 @@ def together(files: Mapping[_Path, bytes], private: bool = False) -> None:
                 temporary.unlink()
 
 
+def finished(staged: Path, path: Path) -> None:
+    """Give a file that a library has written piece by piece beside it its name."""
+    os.replace(staged, path)
+
+
 def _write(path: Path, content: bytes, mode: int) -> None:
     # The system takes the user's mask from the mode, which Python could only ask for by setting it.
     with open(path, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:

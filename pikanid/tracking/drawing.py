@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pikanid import errors
 from pikanid.figures import BAND, COLOURS, NARROW, WIDE, new_figure, tidy
+from pikanid.storage.outputs import finished
 from pikanid.tracking.colours import Picture
 from pikanid.tracking.edges import Edges
 from pikanid.tracking.frames import Frame
@@ -108,7 +109,7 @@ class Overlay:
             self._film.release()
         try:
             if done and self._film is not None:
-                os.replace(self.staged, self.path)
+                finished(self.staged, self.path)
         finally:
             with suppress(OSError):
                 self.staged.unlink()
