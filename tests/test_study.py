@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 
@@ -43,6 +43,14 @@ def test_scenarios_are_those_of_the_paper() -> None:
     assert [s.label for s in slosh.SCENARIOS] == [
         "dense, clean", "dense, 0.1°", "dense, 1°", "sparse, clean", "sparse, 0.1°", "sparse, 1°"]
     assert [len(slosh.recording(s, 0)["theta"]) for s in slosh.SCENARIOS] == [501] * 3 + [51] * 3
+
+
+def test_results_of_another_process_find_their_place() -> None:
+    first, second = slosh.SCENARIOS[:2]
+    results = [slosh.Result(replace(second), "nls", None),
+               slosh.Result(replace(first), "pinn", None), slosh.Result(first, "nls", None)]
+    found = [(r.scenario.name, r.strategy) for r in run._in_order(results, ["nls", "pinn"])]
+    assert found == [(first.name, "nls"), (first.name, "pinn"), (second.name, "nls")]
 
 
 def test_sparse_recordings_keep_the_whole_input() -> None:

@@ -94,10 +94,15 @@ def run(seeds: int = 20, strategies: Sequence[str] = tuple(STRATEGIES),
     # Last, when nothing is timed any more: a diagnosis takes what cores there are.
     step("real pendulum, missing physics")
     diagnosis = pendulum.missing_physics(swing)
-    order = {(s, n): k for k, (s, n) in enumerate(product(slosh.SCENARIOS, strategies))}
-    singles.sort(key=lambda r: order[r.scenario, r.strategy])
-    return Study(tuple(singles), tuple(spreads), tuple(real), swing, diagnosis,
+    return Study(_in_order(singles, strategies), tuple(spreads), tuple(real), swing, diagnosis,
                  filmed, seeds, time.perf_counter() - begun)
+
+
+def _in_order(results: Sequence[slosh.Result], strategies: Sequence[str]
+              ) -> tuple[slosh.Result, ...]:
+    """By scenario, then by strategy; another process has made copies of the scenarios."""
+    order = {(s.name, n): k for k, (s, n) in enumerate(product(slosh.SCENARIOS, strategies))}
+    return tuple(sorted(results, key=lambda r: order[r.scenario.name, r.strategy]))
 
 
 @contextmanager
