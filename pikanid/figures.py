@@ -77,7 +77,6 @@ def broken(title: str, figure: FigureBase) -> str:
     return "\n".join(lines).replace("$", r"\$")
 
 
-
 def tidy(axes: Axes) -> None:
     """The look that all figures share."""
     axes.spines[["top", "right"]].set_visible(False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +13,12 @@ from scipy.stats import binom
 from pikanid import errors
 from pikanid.tracking.colours import ColourRange, learn
 from pikanid.tracking.deviation import deviations
+from pikanid.tracking.journal import Journal
 from pikanid.tracking.region import Region, propose
 from pikanid.tracking.render import Glare, Scene, Stage
 from pikanid.tracking.settings import USUAL
-from pikanid.tracking.surface import Surface
+from pikanid.tracking.surface import Surface, failed
+from pikanid.tracking.tracked import Seen
 from pikanid.tracking.video import Tracker
 
 pytest.importorskip("cv2")
@@ -143,3 +146,13 @@ def test_grey_pictures_show_no_tank() -> None:
         propose([np.full((80, 80, 3), 90, np.uint8)])
     with pytest.raises(errors.BadRecording, match="two colours"):
         learn([np.full((80, 80, 3), 90, np.uint8)], USUAL)
+
+
+def test_a_run_that_begins_anew_keeps_no_lines_of_the_one_before(tmp_path: Path) -> None:
+    path, asked = tmp_path / "frames", {"video": "one"}
+    for resume, numbers in ((True, range(5)), (False, range(2))):
+        kept = Journal(path, asked, resume)
+        for number in numbers:
+            kept.add(Seen(number, 0.01 * number, failed("stopped")))
+        kept.close(done=False)
+    assert [seen.number for seen in Journal(path, asked).found] == [0, 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Annotated, Literal
 
 import typer
@@ -74,12 +75,13 @@ def benchmark(
         with interrupted_by_kill(), watching(sofar, quiet) as (begin, tell):
             runner.run(order, folder, resume, begin, tell)
     except KeyboardInterrupt:
-        report.write(folder)  # of what is finished
+        with suppress(errors.PikanidError):  # it may have come before there was a store
+            report.write(folder)  # of what is finished
         raise
-    written = report.write(folder)
+    written, found = report.write(folder)
     if not quiet:
         screen = console()
-        report.show(screen, folder)
+        report.show(screen, found)
         for path in written:
             screen.print(f"written: {path}", markup=False, soft_wrap=True)
     return 0

@@ -24,8 +24,9 @@ EXPLAINED = (
     "time of a fit, median. Shares have Wilson intervals.")
 
 
-def write(folder: Path) -> list[Path]:
-    """Write `summary.md`, `trials.csv` and, with pyarrow, `trials.parquet`; returns the paths.
+def write(folder: Path) -> tuple[list[Path], list[Group]]:
+    """Write `summary.md`, `trials.csv` and, with pyarrow, `trials.parquet`; the paths, and what was
+    found.
 
     Raises:
         BadRecording: There is no store, it is damaged, or the folder cannot be written to.
@@ -33,15 +34,13 @@ def write(folder: Path) -> list[Path]:
     about, frame = export.table(folder)
     found = list(groups(frame)) if len(frame) else []
     files = {folder / "summary.md": text(found, json.loads(about["versions"])).encode(),
-             **export.files(folder)}
+             **export.files(folder, about, frame)}
     together(files)
-    return list(files)
+    return list(files), found
 
 
-def show(screen: Console, folder: Path) -> None:
+def show(screen: Console, found: list[Group]) -> None:
     """All tables on a screen."""
-    _, frame = export.table(folder)
-    found = list(groups(frame)) if len(frame) else []
     for parameter in parameters(found):
         screen.print()
         screen.print(parameter, style="bold", markup=False)

@@ -19,15 +19,16 @@ class Journal:
     Args:
         path: Of the file; nothing is written if None.
         asked: What the pictures depend on.  Lines of another question are not taken up.
+        resume: Whether to go on behind the lines that are there; else they are begun anew.
 
     Raises:
         BadRecording: If the file cannot be written.
     """
 
-    def __init__(self, path: Path | None, asked: dict[str, Any]):
+    def __init__(self, path: Path | None, asked: dict[str, Any], resume: bool = True):
         self.path = path
         self.asked = json.loads(json.dumps(asked))
-        self.found = [] if path is None else _read(path, self.asked)
+        self.found = _read(path, self.asked) if path is not None and resume else []
         self._file: TextIO | None = None
         if path is None:
             return

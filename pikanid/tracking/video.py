@@ -111,8 +111,9 @@ def track(path: str | os.PathLike[str], rate: float | None = None, region: Regio
     asked = {**question(film.path), "rate": film.rate, "settings": asdict(settings),
              "region": asdict(tracker.region), "colours": asdict(tracker.colours),
              "geometry": None if geometry is None else asdict(geometry)}
-    kept = Journal(None if journal is None else Path(journal), asked)
-    seen = list(kept.found) if watch is None else []
+    # what is watched has to be seen from the first picture on
+    kept = Journal(None if journal is None else Path(journal), asked, resume=watch is None)
+    seen = list(kept.found)
     notes = (f"The first {len(seen)} frames were found by a run that was stopped.",) if seen else ()
     done = False
     try:

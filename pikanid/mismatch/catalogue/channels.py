@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def sensor_nonlinearity(site: Site) -> list[Candidate]:
 def sensor_saturation(site: Site) -> list[Candidate]:
     """The sensor clips, on both sides alike or on one."""
     limit = Parameter(site.name("limit"), 1e6, site.output.unit, (1e-9, INF))
-    o, unit = site.output.name, site.output.unit
+    o = site.output.name
     found = []
     for side, words in SIDES.items():
 
@@ -77,7 +78,7 @@ def sensor_saturation(site: Site) -> list[Candidate]:
         text = _clipped(o, limit.name, side)
         found.append(Candidate(
             ("sensor_saturation",), f"{words} sensor", text, "sensor", site,
-            (_sided(limit, side, unit),), _seen_through(o, text), directions, variant=side,
+            (_sided(limit, side),), _seen_through(o, text), directions, variant=side,
             twin="limit of the sensor"))
     return found
 
@@ -86,9 +87,9 @@ def _seen_through(o: str, text: str) -> Callable[[Model], Model]:
     return lambda m: m.map_output(o, function=text)
 
 
-def _sided(limit: Parameter, side: str, unit: str) -> Parameter:
+def _sided(limit: Parameter, side: str) -> Parameter:
     """The level of a limit: of a limit on one side it may have any sign."""
-    return Parameter(limit.name, limit.value, unit, (-INF, INF)) if side else limit
+    return replace(limit, bounds=(-INF, INF)) if side else limit
 
 
 def _clipped(x: str, limit: str, side: str) -> str:
@@ -99,7 +100,7 @@ def _clipped(x: str, limit: str, side: str) -> str:
 
 def _cut(x: np.ndarray, side: str, shares: Sequence[float]) -> list[tuple[float, np.ndarray]]:
     """Levels of a limit, and a channel (L,) cut off there: by shares of its amplitude, or on one
-    side of its range; none where it rests, or where both sides are one.
+    side of its range; none where it rests.
     """
     low, high = float(x.min(initial=0.0)), float(x.max(initial=0.0))
     if not side:
@@ -205,7 +206,7 @@ def input_limits(site: Site) -> list[Candidate]:
 
             text = _clipped(u, limit.name, side)
             found.append(_input(site, u, "input_saturation", f"{words} input",
-                                (_sided(limit, side, unit),), text, clipped, f"limit of {u}",
+                                (_sided(limit, side),), text, clipped, f"limit of {u}",
                                 variant=side, function=text))
 
         def dead(view: View, u: str = u, p: Parameter = width) -> list[TangentDirection]:

@@ -195,8 +195,8 @@ def _rounded(clipped: Candidate) -> Candidate:
     (y + L - ((y - L)² + w²)^½)/2.
     """
     site, o, old = clipped.site, clipped.site.output.name, clipped.parameters[0]
-    unit, start = _unit(clipped, o), f"{old.name}_soft"
-    limit = Parameter(start, 1e6, unit, old.bounds)
+    unit = _unit(clipped, o)
+    limit = Parameter(site.name("limit_soft"), 1e6, unit, old.bounds)
     if not clipped.variant:
         return _curve(clipped, o, "sensor_rounded", f"{limit.name}*tanh({o}/{limit.name})",
                       (limit,), lambda values, states: [

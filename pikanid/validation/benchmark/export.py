@@ -30,9 +30,8 @@ def table(folder: Path) -> tuple[dict[str, str], pd.DataFrame]:
     return about, pd.DataFrame(rows)
 
 
-def files(folder: Path) -> dict[Path, bytes]:
+def files(folder: Path, about: Mapping[str, str], frame: pd.DataFrame) -> dict[Path, bytes]:
     """`trials.csv` and, where pyarrow is installed, `trials.parquet`, to be written."""
-    about, frame = table(folder)
     made = {folder / "trials.csv": frame.to_csv(index=False).encode()}
     with suppress(errors.BadSetting):
         made[folder / "trials.parquet"] = parquet(about, frame)
