@@ -155,4 +155,6 @@ def test_a_run_that_begins_anew_keeps_no_lines_of_the_one_before(tmp_path: Path)
         for number in numbers:
             kept.add(Seen(number, 0.01 * number, failed("stopped")))
         kept.close(done=False)
-    assert [seen.number for seen in Journal(path, asked).found] == [0, 1]
+    last = Journal(path, asked)
+    last.close(done=True)
+    assert [seen.number for seen in last.found] == [0, 1] and not path.exists()
