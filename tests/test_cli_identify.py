@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import pi
 from pathlib import Path
 
@@ -37,6 +38,15 @@ def test_identify_writes_what_was_agreed(run: Run, recorded: str, tmp_path: Path
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert pk.Estimate.load(tmp_path / "b.json.gz").n == 501
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.png", "b.json.gz", "run.csv"]
+
+
+def test_a_page_lists_the_files_that_were_read(run: Run, recorded: str, tmp_path: Path) -> None:
+    pk.systems.sloshing().save(tmp_path / "mine.toml")
+    for model, read in (("mine.toml", ["run.csv", "mine.toml"]), ("sloshing", ["run.csv"])):
+        assert run("identify", recorded, "--model", model, "--quiet", "--report", "a.html")[0] == 0
+        listed = (tmp_path / "a.html").read_text(encoding="utf-8").split("<p>Files: ")[1]
+        shown = re.findall("<code>(.*?)</code>", listed.split("</p>")[0])
+        assert [Path(name).name for name in shown] == read
 
 
 def test_all_strategies_side_by_side(

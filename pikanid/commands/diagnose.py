@@ -18,7 +18,7 @@ from pikanid.commands.options import (
     quantity,
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
-from pikanid.commands.reading import Reading, every_source
+from pikanid.commands.reading import Reading, every_source, files_read
 from pikanid.recording.formats import readable
 
 EXAMPLES = """Examples:
@@ -65,10 +65,10 @@ def diagnose(
     quiet: Quiet = False,
 ) -> int:
     """Find out which physics a model leaves out, and prove it on another recording."""
+    named = [*train, *held_out, model, *catalogue, *([settings] if settings else [])]
     check_outputs({"--json": (json_, [".json"]),
                    "--report": (report, [".html"])},
-                  [*every_source(*train, *held_out), model, *catalogue,
-                   *([settings] if settings else [])])
+                  every_source(*named))
     from pikanid.mismatch.diagnose import diagnose as run
     from pikanid.mismatch.settings.settings import Settings
     from pikanid.model import systems
@@ -90,7 +90,7 @@ def diagnose(
     if report is not None:
         from pikanid.reporting.diagnosis_page import page
 
-        made[report] = page(dx, records[0].name).encode()
+        made[report] = page(dx, records[0].name, files_read(*named)).encode()
     written(made, json_, dx.to_dict())
     if not quiet and json_ != STDOUT:
         print(dx)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,7 +14,7 @@ from pikanid.commands.grouped import grouped
 from pikanid.commands.interrupts import became, interrupted_by_kill
 from pikanid.commands.options import Json, ModelName, Quiet, Sigma, Values, adjusted
 from pikanid.commands.outputs import STDOUT, check_outputs, written
-from pikanid.commands.reading import Reading, every_source
+from pikanid.commands.reading import Reading, every_source, files_read
 from pikanid.figures import ENDINGS, image_for
 from pikanid.recording.formats import readable
 from pikanid.storage.version import __version__
@@ -42,6 +42,17 @@ EXAMPLES = """Examples:
   pikanid identify drive.csv+camera.mf4 --column theta=*/angle --model sloshing
 
 Exit codes: 0 done, 2 bad input, 3 fitted, but the model does not explain the recording."""
+
+
+@dataclass(frozen=True)
+class _Targets:
+    """Where results go, and what was read to make them."""
+
+    json: str | None
+    plot: str | None
+    report: str | None
+    save: str | None
+    read: list[str]
 
 
 @grouped
@@ -91,7 +102,8 @@ def identify(
     if not chosen.free_names:
         raise errors.BadModel(errors.nothing_free(chosen.name))
     given = [files.recording(text, chosen, sigma=sigma) for text in recordings]
-    return _fit_and_tell(chosen, given, names, protocol, seed, json_, plot, report, save, quiet)
+    targets = _Targets(json_, plot, report, save, files_read(*recordings, model))
+    return _fit_and_tell(chosen, given, names, protocol, seed, targets, quiet)
 
 
 def _check_choice(option: str, value: str, known: Sequence[str]) -> None:
@@ -114,8 +126,7 @@ def _make(name: str, protocol: str, seed: int, step: Step) -> Strategy:
 
 
 def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str], protocol: str,
-                  seed: int, json_: str | None, plot: str | None, report: str | None,
-                  save: str | None, quiet: bool) -> int:
+                  seed: int, targets: _Targets, quiet: bool) -> int:
     from pikanid.reporting.console import complain, console, working
 
     begun = time.perf_counter()
@@ -142,8 +153,8 @@ def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str]
         complain(next(iter(failed.values())))
         return errors.PikanidError.exit_code
     seconds = time.perf_counter() - begun
-    _write(model, given, estimates, failed, len(names) > 1, seconds, json_, plot, report, save)
-    if not quiet and json_ != STDOUT:
+    _write(model, given, estimates, failed, len(names) > 1, seconds, targets)
+    if not quiet and targets.json != STDOUT:
         from pikanid.reporting.tables import show_estimates
 
         show_estimates(console(), estimates, failed)
@@ -154,25 +165,24 @@ def _fit_and_tell(model: Model, given: Sequence[Recording], names: Sequence[str]
 
 
 def _write(model: Model, given: Sequence[Recording], estimates: Sequence[Estimate],
-           failed: dict[str, str], several: bool, seconds: float, json_: str | None,
-           plot: str | None, report: str | None, save: str | None) -> None:
+           failed: dict[str, str], several: bool, seconds: float, targets: _Targets) -> None:
     from pikanid.reporting import strict_json
 
     files: dict[str, bytes] = {}
     labels = [r.name for r in given]
     content = (strict_json.of_several(estimates, failed, model.name, labels, __version__, seconds)
                if several else strict_json.of_one(estimates[0], labels))
-    if plot is not None:
+    if targets.plot is not None:
         from pikanid.estimate.plots import plot_strategies
         figure = (plot_strategies({e.strategy: e.fits for e in estimates}, model.name)
                   if len(estimates) > 1 else estimates[0].plot())
-        files[plot] = image_for(figure, plot)
-    if report is not None:
+        files[targets.plot] = image_for(figure, targets.plot)
+    if targets.report is not None:
         from pikanid.reporting.estimate_page import page
 
-        files[report] = page(estimates, failed, ", ".join(labels)).encode()
-    if save is not None:
+        files[targets.report] = page(estimates, failed, ", ".join(labels), targets.read).encode()
+    if targets.save is not None:
         from pikanid.estimate import file as estimate_file
 
-        files[save] = estimate_file.content(estimates[0], save)
-    written(files, json_, content)
+        files[targets.save] = estimate_file.content(estimates[0], targets.save)
+    written(files, targets.json, content)

@@ -125,6 +125,15 @@ def every_source(*texts: str) -> list[str]:
     return [path for text in texts for path in sources(text)]
 
 
+def files_read(*texts: str) -> list[str]:
+    """As `every_source`, without the names of what comes with the package.
+
+    >>> files_read("a.csv+b.csv", "pendulum")
+    ['a.csv', 'b.csv']
+    """
+    return [path for path in every_source(*texts) if Path(path).suffix or Path(path).exists()]
+
+
 def _signals(model: Model) -> list[str]:
     """What of a file a model may need: inputs, outputs, and channels that an effect lets act."""
     from pikanid.model.effect import Effect

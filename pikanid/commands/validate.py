@@ -11,7 +11,7 @@ import typer
 from pikanid.commands.grouped import grouped
 from pikanid.commands.options import Json, Quiet, Sigma
 from pikanid.commands.outputs import STDOUT, check_outputs, written
-from pikanid.commands.reading import Reading, every_source
+from pikanid.commands.reading import Reading, every_source, files_read
 from pikanid.figures import ENDINGS, image_for
 from pikanid.recording.formats import readable
 
@@ -98,7 +98,7 @@ def validate(
         from pikanid.reporting.validation_page import page
 
         made[report] = page(found, ", ".join(r.name for r in records),
-                            compared).encode()
+                            compared, files_read(*model, *data, *train)).encode()
     written(made, json_, found.to_dict())
     if not quiet and json_ != STDOUT:
         from pikanid.reporting.validation_tables import show_validation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -18,12 +19,13 @@ if TYPE_CHECKING:
     from pikanid.mismatch.report.findings import Explanation
 
 
-def page(dx: Diagnosis, title: str) -> str:
+def page(dx: Diagnosis, title: str, files: Sequence[str] = ()) -> str:
     """The page: the verdict, the picture that proves it, what, where, what lost, what next.
 
     Args:
         dx: To show.
         title: Such as the name of the recording.
+        files: What was read, as it was named.
     """
     notes = "".join(f"<li>{text(note)}</li>" for note in (*dx.noise, *dx.notes))
     return document(title, [
@@ -39,7 +41,7 @@ def page(dx: Diagnosis, title: str) -> str:
         f"{dx.alpha:g}; {dx.seconds:.1f} s. {text(str(dx.settings))}</p>"],
         {f"Nominal model: {dx.before.model.name}": dx.before.model},
         [*(f.recording for f in dx.before.fits), *(() if dx.held_out is None else (
-            f"{name} (held out)" for name in dx.held_out.recordings))])
+            f"{name} (held out)" for name in dx.held_out.recordings))], files)
 
 
 def _proof(dx: Diagnosis) -> str:

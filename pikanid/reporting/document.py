@@ -14,14 +14,15 @@ if TYPE_CHECKING:
 
 
 def document(title: str, parts: Sequence[str], models: Mapping[str, Model] = MappingProxyType({}),
-             files: Sequence[str] = ()) -> str:
+             recordings: Sequence[str] = (), files: Sequence[str] = ()) -> str:
     """A page of HTML of its parts, which are HTML already, with version and date.
 
     Args:
         title: Plain text.
         parts: In their order.
         models: By what they are called on the page, whose equations are listed.
-        files: Names of the recordings, listed below them.
+        recordings: Their names, listed below them.
+        files: What was read, as it was named.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -31,7 +32,8 @@ def document(title: str, parts: Sequence[str], models: Mapping[str, Model] = Map
     return room.get_template("page.html").render(
         title=title, parts=[Markup(part) for part in parts if part],
         models={name: equations(model) for name, model in models.items()},
-        files=list(dict.fromkeys(files)), version=__version__, beside=_beside(),
+        recordings=list(dict.fromkeys(recordings)), files=list(dict.fromkeys(files)),
+        version=__version__, beside=_beside(),
         date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"))
 
 

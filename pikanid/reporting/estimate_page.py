@@ -19,13 +19,15 @@ if TYPE_CHECKING:
     from pikanid.estimate import Estimate
 
 
-def page(estimates: Sequence[Estimate], failed: Mapping[str, str], title: str) -> str:
+def page(estimates: Sequence[Estimate], failed: Mapping[str, str], title: str,
+         files: Sequence[str] = ()) -> str:
     """The page: the answer, parameters with errors, the fit of every output, warnings.
 
     Args:
         estimates: At least one, all of one model and the same recordings.
         failed: Strategies that could not be used, and why.
         title: Such as the names of the recordings.
+        files: What was read, as it was named.
     """
     head = estimates[0]
     several = len(estimates) > 1
@@ -44,7 +46,7 @@ def page(estimates: Sequence[Estimate], failed: Mapping[str, str], title: str) -
         + "</ul>" if several else "",
         "<h2>Notes</h2><ul>" + "".join(f"<li>{text(n)}</li>" for n in notes) + "</ul>"
         if notes else "", f"<h2>What to do next</h2><p>{text(_next(estimates))}</p>"],
-        {head.model.name: head.model}, [f.recording for f in head.fits])
+        {head.model.name: head.model}, [f.recording for f in head.fits], files)
 
 
 def answer(estimates: Sequence[Estimate]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,13 +23,15 @@ MOST = 6  # layout: figures of residuals
 
 
 def page(found: Validation, title: str,
-         compared: Mapping[str, Model | Estimated] | None = None) -> str:
+         compared: Mapping[str, Model | Estimated] | None = None,
+         files: Sequence[str] = ()) -> str:
     """The page: the answer, the table, the picture, who is better than whom.
 
     Args:
         found: To show.
         title: Such as the names of the recordings.
         compared: Models and estimates by name, whose parameters and equations are listed.
+        files: What was read, as it was named.
     """
     return document(title, [
         f"<h1>How well is it predicted? {text(title)}</h1>",
@@ -41,7 +43,8 @@ def page(found: Validation, title: str,
         "<h2>Parameters</h2>" + tabled(parameters(compared)) if compared else "",
         _residuals(found), "".join(f"<p>{text(note)}</p>" for note in found.notes), _next(found)],
         {name: one if isinstance(one, Model) else one.fitted_model
-         for name, one in (compared or {}).items()}, [s.recording for s in found.scores])
+         for name, one in (compared or {}).items()}, [s.recording for s in found.scores],
+        files)
 
 
 def parameters(compared: Mapping[str, Model | Estimated]) -> Sheet:
