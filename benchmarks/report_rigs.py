@@ -1,0 +1,138 @@
+"""Diagnoses of concealed recordings of rigs of other kinds than the sloshing tank.
+
+Usage: python benchmarks/report_rigs.py FOLDER [RIG ...]
+
+Makes and diagnoses the sets of the named rigs, of all if none is named, and keeps a row for every
+case in FOLDER/rigs.json, from which FOLDER/rigs.md is written; rows of other rigs stay.  Sets and
+answers lie in build/rigs until the code of the package changes; interrupted, it goes on there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from provenance import provenance
+from rigs import RIGS
+
+import pikanid
+from pikanid.model.effects_file import read_effects
+from pikanid.pieces.sheet import Sheet
+from pikanid.storage.outputs import together
+from pikanid.validation.concealed.score import Score, Share, tally
+from pikanid.validation.own_model.generate import OwnSet, generate
+from pikanid.validation.own_model.rig import Rig
+from pikanid.validation.own_model.trial import Trial, places, trials
+
+CASES = 30  # of each rig at each noise
+NOISES = (0.005, 0.05)  # shares of an output's range
+WORKERS = 2
+# One for each rig and noise, and never looked at before
+SEEDS = {(name, noise): 770_000 + 10 * k + i
+         for k, name in enumerate(RIGS) for i, noise in enumerate(NOISES)}
+COUNTED = ("right", "wrong", "wrong_but_knowable", "false_alarm", "missed", "surely_in_part",
+           "parameters_within_3_std", "held_out_within_1.1_noise")
+INTRODUCTION = f"""# Diagnoses of other rigs
+
+Effects concealed by `pikanid conceal --model` in {len(RIGS)} rigs (benchmarks/rigs.py), simulated
+by SciPy, {CASES} cases at each noise: nothing, one effect, two, or a law of no catalogue. What the
+words in the tables mean is said in [diagnosis.md](diagnosis.md); *place* is the equation, or the
+channel, of right answers. Intervals are Wilson's at 95 %."""
+
+
+def main(folder: str, *names: str) -> None:
+    """Run what is asked for, and write the page."""
+    kept = Path(folder) / "rigs.json"
+    found = json.loads(kept.read_bytes()) if kept.exists() else {}
+    for name in names or RIGS:
+        found[name] = {"made": f"{datetime.now(UTC):%Y-%m-%d}, {provenance()}",
+                       "sets": [_set(name, noise) for noise in NOISES]}
+        together({kept: json.dumps(found, indent=1).encode(),
+                  kept.with_suffix(".md"): page(found).encode()})
+
+
+def _set(name: str, noise: float) -> dict[str, Any]:
+    bench, seed = RIGS[name], SEEDS[name, noise]
+    own = tuple(e for known in bench.catalogue for e in read_effects(known))
+    rig = Rig(bench.model(), bench.experiment(seed), bench.experiment(seed + 5), noise, own)
+    room = Path("build") / "rigs" / f"{name}-{seed}-{_code()}"
+    truth = room / "truth.json"
+    room.mkdir(parents=True, exist_ok=True)
+    if not truth.exists():
+        generate(room / "set", truth, OwnSet(rig, CASES), seed, WORKERS, print)
+    answered = trials(room / "set", truth, rig.model.with_candidates(*own), room / "answers",
+                      WORKERS, print)
+    return {"noise": noise, "seed": seed,
+            "trials": [asdict(one) for one in answered]}
+
+
+def _code() -> str:
+    """Changes when the package does."""
+    known = hashlib.sha256()
+    for path in sorted(Path(pikanid.__file__).parent.rglob("*.py")):
+        known.update(path.read_bytes())
+    return known.hexdigest()[:12]
+
+
+def page(found: Mapping[str, Any]) -> str:
+    """Of all rigs, in Markdown."""
+    sets = {(name, one["noise"]): [_trial(row) for row in one["trials"]]
+            for name, rig in found.items() for one in rig["sets"]}
+    every = [one for some in sets.values() for one in some]
+    parts = [INTRODUCTION, "## Together", _shares(every).to_markdown(),
+             _each(sets).to_markdown(), "## Wrong answers", _wrong(sets)]
+    for name, rig in found.items():
+        parts.append(f"## {name}\n\n{rig['made']}.")
+        for one in rig["sets"]:
+            parts.append(f"### Noise {100 * one['noise']:g} % of the range, seed {one['seed']}")
+            parts.append(_shares(sets[name, one["noise"]]).to_markdown())
+    return "\n\n".join(parts) + "\n"
+
+
+def _trial(row: Mapping[str, Any]) -> Trial:
+    return Trial(**{**row, "score": Score(**row["score"])})
+
+
+def _shares(some: Sequence[Trial]) -> Sheet:
+    shares: dict[str, Share] = tally([one.score for one in some]) | {"place": places(some)}
+    rows = [(name.replace("_", " "), str(shares[name])) for name in (*COUNTED, "place")
+            if shares[name].n]
+    seconds = [one.cpu for one in some]
+    rows.append(("processor seconds of a diagnosis",
+                 f"median {np.median(seconds):.1f}, largest {max(seconds):.1f}"))
+    return Sheet(("what", "share"), tuple(rows))
+
+
+def _each(sets: Mapping[tuple[str, float], Sequence[Trial]]) -> Sheet:
+    def rows() -> Iterator[tuple[str, ...]]:
+        for (name, noise), some in sets.items():
+            shares = tally([one.score for one in some]) | {"place": places(some)}
+            yield (name, f"{100 * noise:g} %", *(
+                f"{shares[n].count}/{shares[n].n}"
+                for n in ("right", "wrong", "false_alarm", "missed", "place")),
+                f"{np.median([one.cpu for one in some]):.1f}")
+
+    heads = ("rig", "noise", "right of nameable", "wrong", "false alarms", "missed", "place",
+             "CPU [s]")
+    return Sheet(heads, tuple(rows()), heads[1:])
+
+
+def _wrong(sets: Mapping[tuple[str, float], Sequence[Trial]]) -> str:
+    rows = tuple((name, f"{100 * noise:g} %", one.score.case, one.hidden,
+                  f"{one.score.verdict}: {one.said}", one.score.reason,
+                  f"{one.score.nominal:.3g}")
+                 for (name, noise), some in sets.items() for one in some
+                 if one.score.outcome == "wrong")
+    return Sheet(("rig", "noise", "case", "hidden", "answer", "why wrong", "size [sigma]"), rows,
+                 ("noise", "size [sigma]")).to_markdown() if rows else "None."
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
