@@ -27,7 +27,8 @@ def gathered(folder: Path, stores: Sequence[str]) -> tuple[dict[str, str], pd.Da
     """
     kept = folder / KEPT
     if stores:
-        abouts, frames = zip(*(export.table(Path(store)) for store in stores), strict=True)
+        abouts, frames = zip(*(export.from_parquet(one) if one.is_file() else export.table(one)
+                               for one in map(Path, stores)), strict=True)
         whole = pd.concat(frames).drop_duplicates(
             ["scenario", "strategy", "protocol", "seed", "parameter"], ignore_index=True)
         scenarios = {k: v for a in reversed(abouts) for k, v in json.loads(a["scenarios"]).items()}

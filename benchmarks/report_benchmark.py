@@ -2,10 +2,10 @@
 
 Usage: python benchmarks/report_benchmark.py FOLDER [STORE ...]
 
-STORE is a folder of `pikanid benchmark`; trials of all are exported to FOLDER/benchmark.parquet.
-Without any the trials exported before are read.  Writes FOLDER/benchmark.md and
-FOLDER/figures/benchmark-*.svg and .png.  Experiments that take long are kept in
-build/benchmark-experiments until their code changes.
+STORE is a folder of `pikanid benchmark`, or a file that trials were exported to; those of all are
+exported to FOLDER/benchmark.parquet.  Without any the trials exported before are read.  Writes
+FOLDER/benchmark.md and FOLDER/figures/benchmark-*.svg and .png.  Experiments that take long are
+kept in build/benchmark-experiments until their code changes.
 """
 
 from __future__ import annotations
