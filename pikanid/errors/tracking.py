@@ -68,3 +68,13 @@ def corners_and_tank() -> str:
 
 def not_so_many_numbers(option: str, text: str, count: int) -> str:
     return f"{option} takes {count} numbers with commas between them, not '{text}'."
+
+
+def marker_outside(place: tuple[int, ...], size: tuple[int, int], least: int) -> str:
+    return (f"The marker {','.join(map(str, place))} must lie within the picture of {size[1]} x "
+            f"{size[0]} pixels and be {least} pixels or more wide and high.")
+
+
+def marker_without_texture(place: tuple[int, ...]) -> str:
+    return (f"The marker {','.join(map(str, place))} has no texture that can be recognised in both "
+            "directions; choose a patch with corners or dots that is found nowhere else.")

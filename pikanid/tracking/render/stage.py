@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pikanid import errors
 from pikanid.tracking.render.passing import Array
+from pikanid.tracking.render.pattern import Pattern
 from pikanid.tracking.render.scene import Scene
 
 PARTS = 4  # numerical: strips of a pixel's width whose share below the surface is exact
@@ -49,9 +50,17 @@ class Stage:
             np.asarray(scene.wall) - np.asarray(scene.outside))
         above[self.box] += self._whole(self.inside)[..., None] * (
             np.asarray(scene.air) - above[self.box])
+        if scene.pattern is not None:
+            above += self._printed(scene.pattern, above)
         self.above = self._blurred(above * light + self._glare()).astype(np.float32)
         difference = (np.asarray(scene.dye) - np.asarray(scene.air)) * light[self.box]
         self.difference = difference.astype(np.float32)
+
+    def at(self, x: float, y: float) -> Stage:
+        """The same when the tank has gone so far [px]; noise goes on."""
+        after = Stage(self.scene.at(x, y))
+        after._drawn = self._drawn
+        return after
 
     def surface(self, theta: float) -> Array:
         """Heights (2,) [px] at both walls of a flat surface that rises to the right."""
@@ -105,7 +114,7 @@ class Stage:
             depth = h[2, 0] * across + h[2, 1] * rows[:, None] + h[2, 2]
             x = (h[0, 0] * across + h[0, 1] * rows[:, None] + h[0, 2]) / depth
             y = (h[1, 0] * across + h[1, 1] * rows[:, None] + h[1, 2]) / depth
-            return x - scene.tank[0], scene.waterline - y
+            return x - scene.place[0], scene.waterline - y
 
         x, z = at(down)
         scale = 1 / (at(down - 0.5)[1] - at(down + 0.5)[1])
@@ -126,7 +135,6 @@ class Stage:
         strips = np.clip(above * self.scale[crossed] + 0.5, 0, 1) * self.inside[crossed]
         share[crossed] = self._whole(strips)
         return share
-
 
     def _noise(self, rng: np.random.Generator) -> NDArray[np.float32]:
         """Noise of one picture: a stretch of a long row of numbers, which begins anywhere."""
@@ -149,6 +157,16 @@ class Stage:
         outer = ((self.x > -t) & (self.x < width + t) & (self.z > floor - t)
                  & (self.z < floor + height))
         return self._whole(outer.astype(float))
+
+    def _printed(self, pattern: Pattern, behind: Array) -> Array:
+        """By what a patch changes the picture."""
+        across, down = (np.arange(n, dtype=float) for n in self.scene.size[::-1])
+        points = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+        moved = np.column_stack([points, np.ones(len(points))]) @ np.linalg.inv(
+            self.scene.homography).T
+        x, y = (moved[:, k] / moved[:, 2] - self.scene.shift[k] for k in range(2))
+        share, grey = (a.reshape(behind.shape[:2])[..., None] for a in pattern.seen(x, y))
+        return share * (grey - behind)
 
     def _whole(self, fine: NDArray[Any]) -> NDArray[Any]:
         rows, columns = fine.shape
