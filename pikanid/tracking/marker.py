@@ -34,7 +34,7 @@ ROUNDS = 20  # numerical: of least squares, which mostly takes four
 SETTLED = 1e-4  # numerical: pixels that a round may still move it
 FAR = 1.5  # numerical: pixels from the whole one, beyond which least squares went astray
 BLOCKS = 4  # numerical: of a patch along either side; one that is unlike all others is covered
-SLACK = 0.5  # numerical: pixels of blur or warp that are no cover
+SLACK = 0.25  # numerical: pixels of blur or warp that are no cover
 TWIN = 0.9  # numerical: of the best likeness, that another place may not have
 
 
@@ -86,6 +86,8 @@ class Marker:
         # the residual has the noise of two pictures; that of the first one moves all alike
         noise = np.abs(np.fft.rfft2(left_over)) ** 2 / 2
         sx, sy = np.sqrt(np.sum(self._gains * noise, axis=(1, 2))) / gain / left_over.size
+        if max(sx, sy) > self.settings.vague:
+            return Place(reason="the marker is too blurred to tell its place")
         return Place(float(left - self.area.left + shift[0]), float(top - self.area.top + shift[1]),
                      float(sx), float(sy))
 
