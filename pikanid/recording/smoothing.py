@@ -9,7 +9,7 @@ matrices have bands, so the cost grows as the number of samples does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ FEWEST = 12  # numerical: samples that a spline is made of
 
 @dataclass(frozen=True, eq=False)
 class Accelerated:
-    """An acceleration, and how fast a motion it follows.
+    """An acceleration, how fast a motion it follows, and others that the positions allow.
 
     Attributes:
         channel: At all times from the first to the last known position, with its standard errors
@@ -39,6 +39,21 @@ class Accelerated:
 
     channel: Channel
     band: float
+    _spline: _Spline = field(repr=False)
+    _power: float = field(repr=False)
+    _scale: float = field(repr=False)
+
+    def draw(self, rng: np.random.Generator) -> Channel:
+        """An acceleration drawn from those that are as likely as their standard errors say;
+        neighbouring errors are as alike as those of `channel` are.
+        """
+        away = self._spline.drawn(self._power, self._times, rng) * self._scale
+        return replace(self.channel, values=self.channel.values + away, sigma=None)
+
+    @property
+    def _times(self) -> Array:
+        t = self.channel.time
+        return np.asarray((t - t[0]) / (t[-1] - t[0]) * self._spline.stop)
 
 
 def acceleration(position: Channel, name: str) -> Accelerated:
@@ -84,7 +99,8 @@ def acceleration(position: Channel, name: str) -> Accelerated:
     unit = position.unit and units.product((position.unit, 1), ("s", -2))
     made = Channel(name, time, values * scale / step**2, unit, spread * scale / step**2, "cubic")
     # a sample an interval: half of an oscillation with λ ω^6 = 1 is left
-    return Accelerated(made, float(10 ** (-power / (2 * ORDER)) / (2 * np.pi * step)))
+    return Accelerated(made, float(10 ** (-power / (2 * ORDER)) / (2 * np.pi * step)), spline,
+                       power, scale / step**2)
 
 
 class _Spline:
@@ -137,6 +153,18 @@ class _Spline:
             variance += times * np.einsum("ma,ma->m", pairs,
                                           covariance[away][window[:, :DEGREE + 1 - away]])
         return self._at(first, local, c), np.sqrt(np.maximum(variance, np.finfo(float).tiny))
+
+    def drawn(self, power: float, at: Array, rng: np.random.Generator) -> Array:
+        """Second derivative at times (m,) of an error with the covariance of the coefficients."""
+        from scipy.linalg import solve_banded
+
+        factor = self._factor(power)
+        upper = np.zeros_like(factor)
+        for away, row in enumerate(factor):
+            upper[DEGREE - away, away:] = row[:len(row) - away]
+        # (L Lᵀ)⁻¹ is the covariance of L⁻ᵀ z
+        z = solve_banded((0, DEGREE), upper, rng.standard_normal(self.basis.n_basis))
+        return self._at(*self.basis.local(at, 2), z)
 
     def _factor(self, power: float) -> Array:
         from scipy.linalg import cholesky_banded
