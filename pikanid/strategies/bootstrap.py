@@ -12,7 +12,7 @@ from pikanid.comparison.bootstrap import block_length
 from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit
 from pikanid.recording import Channel, Recording
-from pikanid.recording.smoothing import acceleration
+from pikanid.recording.acceleration import acceleration
 from pikanid.strategies.nls import NLS
 
 
@@ -32,7 +32,7 @@ def bootstrap(estimate: Estimate, recordings: Recording | Sequence[Recording],
         resamples: How many; the relative error of a standard error is 1/√(2 resamples).
         seed: Of the draws.
         positions: Acceleration among the inputs -> channel of the position, with a sigma, that it
-            was derived from by `pikanid.recording.smoothing`: every resample has another one that
+            was derived from by `pikanid.recording.acceleration`: every resample has another one that
             the position's errors allow.  Errors of inputs are left out of all other covariances.
 
     Raises:

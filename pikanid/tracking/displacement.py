@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pikanid.recording import Recording
-from pikanid.recording.smoothing import acceleration
+from pikanid.recording.acceleration import acceleration
 from pikanid.tracking.deviation import restlessness
 from pikanid.tracking.geometry import Geometry
 from pikanid.tracking.marker import Marker, Place

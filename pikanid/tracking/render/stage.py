@@ -51,7 +51,7 @@ class Stage:
         above[self.box] += self._whole(self.inside)[..., None] * (
             np.asarray(scene.air) - above[self.box])
         if scene.pattern is not None:
-            above += self._printed(scene.pattern, above)
+            self._print(scene.pattern, above)
         self.above = self._blurred(above * light + self._glare()).astype(np.float32)
         difference = (np.asarray(scene.dye) - np.asarray(scene.air)) * light[self.box]
         self.difference = difference.astype(np.float32)
@@ -158,15 +158,21 @@ class Stage:
                  & (self.z < floor + height))
         return self._whole(outer.astype(float))
 
-    def _printed(self, pattern: Pattern, behind: Array) -> Array:
-        """By what a patch changes the picture."""
-        across, down = (np.arange(n, dtype=float) for n in self.scene.size[::-1])
-        points = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
-        moved = np.column_stack([points, np.ones(len(points))]) @ np.linalg.inv(
-            self.scene.homography).T
-        x, y = (moved[:, k] / moved[:, 2] - self.scene.shift[k] for k in range(2))
-        share, grey = (a.reshape(behind.shape[:2])[..., None] for a in pattern.seen(x, y))
-        return share * (grey - behind)
+    def _print(self, pattern: Pattern, picture: Array) -> None:
+        """Draw a patch into a picture (H, W, 3)."""
+        right, down = (np.array([near, near + size]) + gone for near, size, gone in (
+            (pattern.left, pattern.width, self.scene.shift[0]),
+            (pattern.top, pattern.height, self.scene.shift[1])))
+        corners = self.scene.seen(np.array([(x, y) for x in right for y in down]))
+        low = np.maximum(np.floor(corners.min(axis=0)).astype(int) - 1, 0)
+        high = np.maximum(np.ceil(corners.max(axis=0)).astype(int) + 2, 0)
+        part = picture[low[1]:high[1], low[0]:high[0]]
+        y, x = (a + first for a, first in zip(np.indices(part.shape[:2], float), low[::-1],
+                                              strict=True))
+        at = np.stack([x, y, np.ones_like(x)], axis=-1) @ np.linalg.inv(self.scene.homography).T
+        share, grey = pattern.seen(at[..., 0] / at[..., 2] - self.scene.shift[0],
+                                   at[..., 1] / at[..., 2] - self.scene.shift[1])
+        part += share[..., None] * (grey[..., None] - part)
 
     def _whole(self, fine: NDArray[Any]) -> NDArray[Any]:
         rows, columns = fine.shape

@@ -86,15 +86,16 @@ def acceleration(position: Channel, name: str) -> Accelerated:
     sigma = np.broadcast_to(position.sigma, len(position))[known]
     step, scale = position.interval, float(np.median(sigma))
     begin = position.time[known[0]]
-    spline = _Spline((position.time[known] - begin) / step,
+    inside = slice(known[0], known[-1] + 1)
+    time = position.time[inside]
+    # a knot where a sample is missing, too: between its neighbours the motion may be any
+    spline = _Spline((time - begin) / step, (position.time[known] - begin) / step,
                      (position.values[known] - position.values[known[0]]) / scale, sigma / scale)
     tried = np.linspace(*RANGE, TRIED)
     costs = np.array([spline.cost(p) for p in tried])
     best = int(np.clip(np.argmin(costs), 1, TRIED - 2))
     power = float(minimize_scalar(spline.cost, bounds=(tried[best - 1], tried[best + 1]),
                                   method="bounded", options={"xatol": 1e-3}).x)
-    inside = slice(known[0], known[-1] + 1)
-    time = position.time[inside]
     values, spread = spline.second(power, np.clip((time - begin) / step, 0, spline.stop))
     unit = position.unit and units.product((position.unit, 1), ("s", -2))
     made = Channel(name, time, values * scale / step**2, unit, spread * scale / step**2, "cubic")
@@ -104,16 +105,16 @@ def acceleration(position: Channel, name: str) -> Accelerated:
 
 
 class _Spline:
-    """The normal equations of samples (n,) at times (n,), with a knot at each."""
+    """The normal equations of samples (n,) at times (n,), over knots (m,)."""
 
-    def __init__(self, time: Array, values: Array, sigma: Array):
+    def __init__(self, knots: Array, time: Array, values: Array, sigma: Array):
         from pikanid.approximators.bspline import BSpline, knots_from_breakpoints
 
-        self.stop = float(time[-1])
-        self.basis = BSpline(DEGREE, knots_from_breakpoints(time, DEGREE))
+        self.stop = float(knots[-1])
+        self.basis = BSpline(DEGREE, knots_from_breakpoints(knots, DEGREE))
         self.values, self.weight = values, 1 / sigma**2
         node = np.sqrt(3 / 5)
-        middle, half = (time[1:] + time[:-1]) / 2, np.diff(time) / 2
+        middle, half = (knots[1:] + knots[:-1]) / 2, np.diff(knots) / 2
         at = (middle[:, None] + half[:, None] * [-node, 0, node]).ravel()
         share = (half[:, None] * [5 / 9, 8 / 9, 5 / 9]).ravel()
         self.local, self.jerk = self.basis.local(time), self.basis.local(at, ORDER)
