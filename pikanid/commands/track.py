@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -176,21 +175,16 @@ def _geometry(corners: str | None, tank: str | None, lens: float, size: tuple[in
 
 def _pixel(pixel: str | None, tank: str | None, region: Region | None, straightened: bool,
            followed: bool) -> float | None:
-    """Length of a pixel [m] at the marker; None where the tank's corners tell it."""
+    """Length of a pixel [m] at the marker, where these words tell it."""
     if pixel is not None:
         if not followed:
             raise errors.BadSetting(errors.pixel_without_marker())
-        length = quantity(pixel, "m", "--pixel")
-        if not 0 < length < inf:
-            raise errors.BadSetting(errors.bad_pixel(length))
-        return length
-    if not followed or straightened:
+        return quantity(pixel, "m", "--pixel")
+    if not followed or straightened or tank is None or region is None:
         return None
-    if tank is None or region is None:
-        raise errors.BadSetting(errors.no_scale())
     width, height = _lengths(tank)
     across, down = width / region.width, height / region.height
-    if not (0 < across < inf and abs(down / across - 1) <= UNEVEN):
+    if not (across > 0 and abs(down / across - 1) <= UNEVEN):
         raise errors.BadSetting(errors.uneven_pixels(across, down))
     return across
 

@@ -32,8 +32,8 @@ def bootstrap(estimate: Estimate, recordings: Recording | Sequence[Recording],
         resamples: How many; the relative error of a standard error is 1/√(2 resamples).
         seed: Of the draws.
         positions: Acceleration among the inputs -> channel of the position, with a sigma, that it
-            was derived from by `pikanid.recording.acceleration`: every resample has another one that
-            the position's errors allow.  Errors of inputs are left out of all other covariances.
+            was derived from by `pikanid.recording.acceleration`: every resample has another one
+            that the position's errors allow.  Other covariances leave errors of inputs out.
 
     Raises:
         BadSetting: Fewer than two resamples.

@@ -46,12 +46,14 @@ def metres(where: Array, sigma: Array, marker: Marker, geometry: Geometry | None
         sigma: (n, 2) their standard errors.
         marker: What was followed; one on the background goes the other way.
         geometry: Of a tank seen askew.
-        pixel: Length of a pixel [m] at the marker; that of the tank's plane if None.
+        pixel: Length of a pixel [m] at the marker; that in the tank's plane, by `geometry`, if
+            None.
     """
     sign = 1.0 if marker.on == "tank" else -1.0
-    if pixel is not None or geometry is None:
-        scale = np.array([1.0, -1.0]) * (pixel or 1.0)
+    if pixel is not None:
+        scale = np.array([1.0, -1.0]) * pixel
         return sign * scale * where, np.abs(scale) * sigma
+    assert geometry is not None
     there = plane(where, marker, geometry)
     steps = [plane(where + sigma * np.eye(2)[k], marker, geometry) - there for k in range(2)]
     return sign * there, np.sqrt(steps[0] ** 2 + steps[1] ** 2)

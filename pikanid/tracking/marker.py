@@ -158,10 +158,9 @@ class Marker:
         smooth = spline_filter(self._patch, 3, output=np.float64, mode="nearest")
         # of the spline, as it is for the pictures: no bias by another derivative
         h = 1e-3  # numerical: [px]
-        down, right = ((_shifted(smooth, *(h * s)) - _shifted(smooth, *(-h * s)))
-                       for s in (np.array([0.0, 1.0]), np.array([1.0, 0.0])))
-        return tuple(a[PAD:-PAD, PAD:-PAD] / (2 * h)  # type: ignore[return-value]
-                     for a in (right, down))
+        right = (_shifted(smooth, h, 0.0) - _shifted(smooth, -h, 0.0)) / (2 * h)
+        down = (_shifted(smooth, 0.0, h) - _shifted(smooth, 0.0, -h)) / (2 * h)
+        return right[PAD:-PAD, PAD:-PAD], down[PAD:-PAD, PAD:-PAD]
 
     @cached_property
     def _equations(self) -> tuple[Array, Array]:

@@ -116,8 +116,7 @@ class Track:
     @cached_property
     def motion(self) -> tuple[Array, Array]:
         """The tank's displacement (n, 2) since the first picture, in the model's positive direction
-        and up, and its standard errors; [m], or [px] where nothing says how long a pixel is; NaN
-        where the marker was not found.
+        and up, and its standard errors [m]; NaN where the marker was not found.
         """
         assert self.marker is not None
         where, sigma = pixels([s.place or Place() for s in self.seen])

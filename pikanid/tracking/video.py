@@ -155,9 +155,14 @@ def track(path: str | os.PathLike[str], rate: float | None = None, region: Regio
 
     Raises:
         BadRecording: If the file is no video, or its first pictures show no liquid.
-        BadSetting: If rate or region cannot be, or OpenCV is not installed.
+        BadSetting: If rate, region or marker cannot be, nothing tells how long a pixel is at the
+            marker, or OpenCV is not installed.
     """
     of_kind(settings, TrackingSettings)
+    if pixel is not None and not 0 < pixel < np.inf:
+        raise errors.BadSetting(errors.bad_pixel(pixel))
+    if follow is not None and pixel is None and geometry is None:
+        raise errors.BadSetting(errors.no_scale())
     film = open_film(path, rate)
     within = ColourRange.parse(colour) if isinstance(colour, str) else colour
     tracker = prepare(film, region, within, geometry, settings, follow)

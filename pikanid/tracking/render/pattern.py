@@ -36,7 +36,7 @@ class Pattern:
     def seen(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Share of pixels at (x, y) [px] that it fills, and its grey level there.
 
-        >>> share, grey = Pattern(10, 10, contrast=0.0).seen(np.array([5.0, 20.0]), 20.0)
+        >>> share, grey = Pattern(10, 10, contrast=0.0).seen(*np.array([[5.0, 20.0]] * 2))
         >>> share.tolist(), grey.tolist()
         ([0.0, 1.0], [128.0, 128.0])
         """
