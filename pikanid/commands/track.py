@@ -6,9 +6,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -23,15 +22,6 @@ if TYPE_CHECKING:
     from pikanid.tracking.geometry import Geometry
     from pikanid.tracking.region import Region
     from pikanid.tracking.tracked import Track
-
-
-
-class Side(StrEnum):
-    """What a marker is on."""
-
-    TANK = "tank"
-    BACKGROUND = "background"
-
 
 FILMS = (".mp4", ".avi")
 UNEVEN = 0.05  # numerical: by which sides of a square pixel may differ
@@ -90,9 +80,9 @@ def track(
         metavar="LEFT,TOP,WIDTH,HEIGHT", show_default=False,
         help="a patch with texture in the first picture, which is followed instead of --motion [px]"
     )] = None,
-    marker_on: Annotated[Side, typer.Option(
+    marker_on: Annotated[Literal["tank", "background"], typer.Option(
         "--marker-on", help="what it is on: the tank, before a camera that stands, or the "
-        "background of one that moves with the tank")] = Side.TANK,
+        "background of one that moves with the tank")] = "tank",
     pixel: Annotated[str | None, typer.Option(
         metavar="LENGTH", show_default=False,
         help="of a pixel at the marker, as 0.22mm; by --tank if not given")] = None,
@@ -129,8 +119,7 @@ def track(
     if marker is not None and motion is not None:
         raise errors.BadSetting(errors.marker_or_motion())
     region = None if roi is None else Region(*_numbers("--roi", roi, 4))
-    follow = None if marker is None else (
-        Region(*_numbers("--marker", marker, 4)), marker_on.value)
+    follow = None if marker is None else (Region(*_numbers("--marker", marker, 4)), marker_on)
     within = None if colour is None else ColourRange.parse(colour)
     film = open_film(video, rate)
     geometry = _geometry(corners, tank, lens, film.size, marker is not None)

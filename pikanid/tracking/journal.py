@@ -91,7 +91,7 @@ def _read(path: Path, asked: dict[str, Any]) -> list[Seen]:
             seen = Seen(int(number), float(time), Surface(
                 float(theta), float(level), tuple(map(float, shape)), float(variance),
                 float(finer), tuple(map(float, gains)), float(points), str(reason)), bool(again),
-                None if place is None else Place(*map(float, place[:4]), str(place[4])))
+                None if place is None else Place(*place))
         except (ValueError, TypeError):  # the line at which it was stopped
             break
         if not math.isfinite(seen.time):

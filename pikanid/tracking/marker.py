@@ -160,7 +160,8 @@ class Marker:
         h = 1e-3  # numerical: [px]
         right = (_shifted(smooth, h, 0.0) - _shifted(smooth, -h, 0.0)) / (2 * h)
         down = (_shifted(smooth, 0.0, h) - _shifted(smooth, 0.0, -h)) / (2 * h)
-        return right[PAD:-PAD, PAD:-PAD], down[PAD:-PAD, PAD:-PAD]
+        inner = slice(PAD, -PAD)
+        return np.asarray(right[inner, inner], float), np.asarray(down[inner, inner], float)
 
     @cached_property
     def _equations(self) -> tuple[Array, Array]:
@@ -243,9 +244,9 @@ def _shifted(spline: Array, x: float, y: float) -> Array:
         t = shift - whole
         weights = ((1 - t) ** 3 / 6, (3 * t**3 - 6 * t**2 + 4) / 6,
                    (-3 * t**3 + 3 * t**2 + 3 * t + 1) / 6, t**3 / 6)
-        spline = sum((w * np.roll(spline, 1 - whole - k, axis=axis)
-                      for k, w in enumerate(weights)), np.zeros_like(spline))
-    return spline
+        spline = np.sum([w * np.roll(spline, 1 - whole - k, axis=axis)
+                         for k, w in enumerate(weights)], axis=0)
+    return np.asarray(spline)
 
 
 def _blocks(values: Array) -> Array:
