@@ -20,9 +20,8 @@ from pikanid.recording.channel import Array, Channel, check_times, check_values
 
 DEGREE = 5  # definition: of the spline whose third derivative is penalised
 ORDER = 3  # definition: of that derivative
-# numerical: log10 of λ in units of noise and interval; outside, nothing or all is smoothed, and
-# the matrices are singular to rounding
-RANGE = (-5.0, 11.0)
+# log10 of λ in units of noise and interval; outside, nothing or all is smoothed
+RANGE = (-5.0, 11.0)  # numerical: there the matrices are not singular to rounding
 TRIED = 33  # numerical: values of λ, between the best of which the optimum is looked for
 FEWEST = 12  # numerical: samples that a spline is made of
 

@@ -158,17 +158,17 @@ class Marker:
         smooth = spline_filter(self._patch, 3, output=np.float64, mode="nearest")
         # of the spline, as it is for the pictures: no bias by another derivative
         h = 1e-3  # numerical: [px]
-        right = (_shifted(smooth, h, 0.0) - _shifted(smooth, -h, 0.0)) / (2 * h)
-        down = (_shifted(smooth, 0.0, h) - _shifted(smooth, 0.0, -h)) / (2 * h)
-        inner = slice(PAD, -PAD)
-        return np.asarray(right[inner, inner], float), np.asarray(down[inner, inner], float)
+        right, down = (
+            (_shifted(smooth, x, y) - _shifted(smooth, -x, -y))[PAD:-PAD, PAD:-PAD] / (2 * h)
+            for x, y in ((h, 0.0), (0.0, h)))
+        return right, down
 
     @cached_property
     def _equations(self) -> tuple[Array, Array]:
         """Design matrix (pixels, 4) of patch, offset and slopes, and its pseudo-inverse."""
         inner = self._patch[PAD:-PAD, PAD:-PAD]
         design = np.column_stack([a.ravel() for a in (inner, np.ones_like(inner), *self._slope)])
-        return design, np.linalg.pinv(design)
+        return design, np.asarray(np.linalg.pinv(design), float)
 
     @cached_property
     def _gains(self) -> Array:
