@@ -25,13 +25,15 @@ if TYPE_CHECKING:
 
 FILMS = (".mp4", ".avi")
 UNEVEN = 0.05  # numerical: by which sides of a square pixel may differ
+SMOOTH = ("Text files do not say that 'u_x' runs smoothly between its samples: write .parquet, or "
+          "give the model hold = \"cubic\".")
 EXAMPLES = """Examples:
 
   pikanid track run.mp4 --out run.csv
 
   pikanid track run.mp4 --out run.csv --motion shuttle.csv --column u_x=acc --delay 12ms
 
-  pikanid track run.mp4 --out run.csv --marker 180,20,40,40 --pixel 0.22mm
+  pikanid track run.mp4 --out run.parquet --marker 180,20,40,40 --pixel 0.22mm
 
   pikanid track images/ --rate 240 --out run.csv --roi 170,120,300,330 --plot theta.png
 
@@ -133,6 +135,9 @@ def track(
     recording = found.recording()
     if motion is not None:
         recording = with_motion(recording, motion, accelerations, positions, late)
+    notes = recording.notes
+    if marker is not None and not out.endswith((".parquet", ".pq")):
+        notes += (SMOOTH,)
     files = {out: content(recording.channels, out)}
     if plot is not None:
         files[plot] = image_for(drawing.plot(found), plot)
@@ -142,7 +147,7 @@ def track(
         drawing.overlay(overlay, film, found)
     written(files, json_, {"schema_version": 1, "video": found.name, **found.summary()})
     if not quiet and json_ != STDOUT:
-        _show(found, recording.notes, [*files, *([overlay] if overlay else [])], seconds)
+        _show(found, notes, [*files, *([overlay] if overlay else [])], seconds)
     return 0
 
 
