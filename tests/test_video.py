@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,10 @@ from typer.testing import CliRunner
 from pikanid import errors
 from pikanid.cli import app
 from pikanid.recording import Recording
+from pikanid.tracking import drawing
+from pikanid.tracking.frames import open_film
 from pikanid.tracking.region import Region
-from pikanid.tracking.render import Scene, Stage, write
+from pikanid.tracking.render import Cover, Scene, Stage, write
 from pikanid.tracking.video import track
 
 cv2 = pytest.importorskip("cv2")
@@ -143,6 +146,19 @@ def test_the_command_writes_all_that_is_asked_for(clip: Path, tmp_path: Path) ->
     assert json.loads((tmp_path / "q.json").read_text())["angles"] == 80
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([*asked.values(), "m.csv"])
     assert len(track(tmp_path / "o.mp4", region=Region(34, 40, 170, 130)).seen) == 80
+
+
+def test_no_line_is_drawn_where_the_whole_track_says_that_there_is_none(tmp_path: Path) -> None:
+    cover = Cover((100, 95), (200, 95), 16.0, 40, 41, (0.0, 0.0), SCENE.dye)
+    path = write(tmp_path / "run.avi", TRUTH, replace(SCENE, covers=(cover,)), rate=50.0)
+    at_once: list[bool] = []
+    found = track(path, watch=lambda frame, edges, surface: at_once.append(bool(surface.reason)))
+    assert not any(at_once) and [s.number for s in found.seen if s.surface.reason] == [40, 41]
+    shown = list(drawing.stills(open_film(path), found, range(38, 44)))
+    assert [s.frame.number for s in shown if not len(s.found.x)] == [40, 41]
+    there, flagged = (drawing.overlaid(s, found) for s in shown[1:3])
+    assert (there == drawing.LINE).all(axis=2).any()
+    assert not (flagged == drawing.LINE).all(axis=2).any()
 
 
 @pytest.mark.parametrize(("words", "told"), [

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -20,14 +20,20 @@ from pikanid.recording.formats import written_endings
 
 if TYPE_CHECKING:
     from pikanid.tracking.geometry import Geometry
+    from pikanid.tracking.region import Region
     from pikanid.tracking.tracked import Track
 
 FILMS = (".mp4", ".avi")
+UNEVEN = 0.05  # numerical: by which sides of a square pixel may differ
+SMOOTH = ("Text files do not say that 'u_x' runs smoothly between its samples: write .parquet, or "
+          "give the model hold = \"cubic\".")
 EXAMPLES = """Examples:
 
   pikanid track run.mp4 --out run.csv
 
   pikanid track run.mp4 --out run.csv --motion shuttle.csv --column u_x=acc --delay 12ms
+
+  pikanid track run.mp4 --out run.parquet --marker 180,20,40,40 --pixel 0.22mm
 
   pikanid track images/ --rate 240 --out run.csv --roi 170,120,300,330 --plot theta.png
 
@@ -58,7 +64,7 @@ def track(
         help="of the tank's inside in the picture, from upper left clockwise [px]")] = None,
     tank: Annotated[str | None, typer.Option(
         metavar="WIDTH,HEIGHT", show_default=False,
-        help="between these corners, as 66mm,90mm")] = None,
+        help="between these corners, or of --roi, as 66mm,90mm")] = None,
     lens: Annotated[float, typer.Option(
         metavar="K", help="radial distortion, with --corners")] = 0.0,
     flip: Annotated[bool, typer.Option(
@@ -72,6 +78,16 @@ def track(
         "--position", metavar="NAME=COLUMN", show_default=False,
         help="column of --motion that holds a position, of which NAME is the acceleration"
     )] = [],  # noqa: B006
+    marker: Annotated[str | None, typer.Option(
+        metavar="LEFT,TOP,WIDTH,HEIGHT", show_default=False,
+        help="a patch with texture in the first picture, which is followed instead of --motion [px]"
+    )] = None,
+    marker_on: Annotated[Literal["tank", "background"], typer.Option(
+        "--marker-on", help="what it is on: the tank, before a camera that stands, or the "
+        "background of one that moves with the tank")] = "tank",
+    pixel: Annotated[str | None, typer.Option(
+        metavar="LENGTH", show_default=False,
+        help="of a pixel at the marker, as 0.22mm; by --tank if not given")] = None,
     delay: Annotated[str, typer.Option(
         metavar="TIME", help="when the motion's clock begins on the camera's, as 12ms")] = "0s",
     plot: Annotated[str | None, typer.Option(
@@ -95,7 +111,6 @@ def track(
     from pikanid.tracking.frames import open_film
     from pikanid.tracking.motion import with_motion
     from pikanid.tracking.region import Region
-    from pikanid.tracking.video import prepare
     from pikanid.tracking.video import track as run
 
     late = quantity(delay, "s", "--delay")
@@ -103,61 +118,76 @@ def track(
     positions = assignments("--position", position, "u_x=x")
     if motion is None and (accelerations or positions or late):
         raise errors.BadSetting(errors.no_motion())
+    if marker is not None and motion is not None:
+        raise errors.BadSetting(errors.marker_or_motion())
     region = None if roi is None else Region(*_numbers("--roi", roi, 4))
+    follow = None if marker is None else (Region(*_numbers("--marker", marker, 4)), marker_on)
     within = None if colour is None else ColourRange.parse(colour)
     film = open_film(video, rate)
-    geometry = _geometry(corners, tank, lens, film.size)
-    tracker = prepare(film, region, within, geometry)
-    contacts = drawing.Contacts(tracker)
-    shown = None if overlay is None else drawing.Overlay(overlay, film.rate)
-
-    def watch(frame: Any, found: Any, surface: Any) -> None:
-        if contact_sheet is not None:
-            contacts.add(frame, found, surface)
-        if shown is not None and frame.picture is not None:
-            shown.add(drawing.overlaid(frame.picture, tracker, found, surface,
-                                       f"{frame.number}: {frame.time:.3f} s"))
-
-    watched = contact_sheet is not None or shown is not None
+    geometry = _geometry(corners, tank, lens, film.size, marker is not None)
+    length = _pixel(pixel, tank, region, geometry is not None, marker is not None)
     journal = Path(out).with_name(f".{Path(out).name}.frames")
-    done = False
     begun = time.perf_counter()
-    try:
-        with interrupted_by_kill(), _counting(film.promised, quiet) as step:
-            found = run(video, rate, tracker.region, within, geometry, flip, journal=journal,
-                        step=step, watch=watch if watched else None)
-        recording = found.recording()
-        if motion is not None:
-            recording = with_motion(recording, motion, accelerations, positions, late)
-        done = True
-    finally:
-        if shown is not None:
-            shown.close(done)
+    with interrupted_by_kill(), _counting(film.promised, quiet) as step:
+        found = run(video, rate, region, within, geometry, flip, journal=journal, step=step,
+                    follow=follow, pixel=length)
+    seconds = time.perf_counter() - begun
+    recording = found.recording()
+    if motion is not None:
+        recording = with_motion(recording, motion, accelerations, positions, late)
+    notes = recording.notes
+    if marker is not None and not out.endswith((".parquet", ".pq")):
+        notes += (SMOOTH,)
     files = {out: content(recording.channels, out)}
     if plot is not None:
         files[plot] = image_for(drawing.plot(found), plot)
     if contact_sheet is not None:
-        files[contact_sheet] = image_for(contacts.sheet(), contact_sheet)
-    seconds = time.perf_counter() - begun
+        files[contact_sheet] = image_for(drawing.contact_sheet(film, found), contact_sheet)
+    if overlay is not None:
+        drawing.overlay(overlay, film, found)
     written(files, json_, {"schema_version": 1, "video": found.name, **found.summary()})
     if not quiet and json_ != STDOUT:
-        _show(found, recording.notes, [*files, *([overlay] if overlay else [])], seconds)
+        _show(found, notes, [*files, *([overlay] if overlay else [])], seconds)
     return 0
 
 
-def _geometry(corners: str | None, tank: str | None, lens: float, size: tuple[int, int]
-              ) -> Geometry | None:
+def _geometry(corners: str | None, tank: str | None, lens: float, size: tuple[int, int],
+              others: bool) -> Geometry | None:
     from pikanid.tracking.geometry import from_corners
 
-    if (corners is None) != (tank is None) or (lens and corners is None):
-        raise errors.BadSetting(errors.corners_and_tank())
-    if corners is None or tank is None:
+    if corners is None:
+        if lens or (tank is not None and not others):
+            raise errors.BadSetting(errors.corners_and_tank())
         return None
-    points = [_numbers("--corners", pair, 2, float) for pair in corners.split()]
-    lengths = [quantity(text, "m", "--tank") for text in tank.split(",")]
-    if len(points) != 4 or len(lengths) != 2:
+    if tank is None:
         raise errors.BadSetting(errors.corners_and_tank())
-    return from_corners(points, lengths[0], lengths[1], size, lens)
+    points = [_numbers("--corners", pair, 2, float) for pair in corners.split()]
+    if len(points) != 4:
+        raise errors.BadSetting(errors.corners_and_tank())
+    return from_corners(points, *_lengths(tank), size, lens)
+
+
+def _pixel(pixel: str | None, tank: str | None, region: Region | None, straightened: bool,
+           followed: bool) -> float | None:
+    """Length of a pixel [m] at the marker, where these words tell it."""
+    if pixel is not None:
+        if not followed:
+            raise errors.BadSetting(errors.pixel_without_marker())
+        return quantity(pixel, "m", "--pixel")
+    if not followed or straightened or tank is None or region is None:
+        return None
+    width, height = _lengths(tank)
+    across, down = width / region.width, height / region.height
+    if not (across > 0 and abs(down / across - 1) <= UNEVEN):
+        raise errors.BadSetting(errors.uneven_pixels(across, down))
+    return across
+
+
+def _lengths(tank: str) -> tuple[float, float]:
+    lengths = [quantity(text, "m", "--tank") for text in tank.split(",")]
+    if len(lengths) != 2:
+        raise errors.BadSetting(errors.corners_and_tank())
+    return lengths[0], lengths[1]
 
 
 def _numbers(option: str, text: str, count: int, kind: type = int) -> list[Any]:
@@ -214,6 +244,17 @@ def _show(found: Track, notes: tuple[str, ...], files: list[str], seconds: float
              f"{degrees * np.nanmax(found.theta):.3g} deg, standard error "
              f"{degrees * about['sigma_median']:.2g} deg (median), "
              f"{degrees * about['sigma_largest']:.2g} deg (largest)",
+             *_followed(found),
              *(f"note: {note}" for note in notes), *(f"written: {path}" for path in files)]
     for line in lines:
         screen.print(line, markup=False, soft_wrap=True)
+
+
+def _followed(found: Track) -> list[str]:
+    import numpy as np
+
+    if found.marker is None:
+        return []
+    where, sigma = (a[:, 0] for a in found.motion)
+    return [f"x: {1e3 * np.nanmin(where):.4g} to {1e3 * np.nanmax(where):.4g} mm, standard error "
+            f"{1e3 * np.nanmedian(sigma):.2g} mm (median), by the marker on the {found.marker.on}"]

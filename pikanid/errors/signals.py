@@ -15,6 +15,10 @@ def derivative_short(name: str, n: int, wanted: int) -> str:
     return f"Channel '{name}' has {n} samples; this derivative needs at least {wanted}."
 
 
+def no_sigma_to_smooth(name: str) -> str:
+    return f"Channel '{name}' has no sigma, which says how smooth it is: give it one."
+
+
 def savgol_uneven(name: str) -> str:
     return f"Channel '{name}' is not evenly sampled: use method='spline'."
 

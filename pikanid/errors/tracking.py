@@ -68,3 +68,36 @@ def corners_and_tank() -> str:
 
 def not_so_many_numbers(option: str, text: str, count: int) -> str:
     return f"{option} takes {count} numbers with commas between them, not '{text}'."
+
+
+def marker_outside(place: tuple[int, ...], size: tuple[int, int], least: int) -> str:
+    return (f"The marker {','.join(map(str, place))} must lie within the picture of {size[1]} x "
+            f"{size[0]} pixels and be {least} pixels or more wide and high.")
+
+
+def marker_without_texture(place: tuple[int, ...]) -> str:
+    return (f"The marker {','.join(map(str, place))} has no texture that can be recognised in both "
+            "directions; choose a patch with corners or dots that is found nowhere else.")
+
+
+def marker_or_motion() -> str:
+    return "--marker and --motion both say what moved the tank: give one of them."
+
+
+def no_scale() -> str:
+    return ("How long a pixel is at the marker is not known: give --pixel, as 0.22mm, or the size "
+            "of the tank's inside as --tank 66mm,90mm together with its place as --roi or "
+            "--corners.")
+
+
+def bad_pixel(length: float) -> str:
+    return f"A pixel of {length:g} m cannot be: give its length at the marker, such as 0.22mm."
+
+
+def pixel_without_marker() -> str:
+    return "--pixel is the length of a pixel at a marker: name the marker's place with --marker."
+
+
+def uneven_pixels(across: float, down: float) -> str:
+    return (f"By --tank and --roi a pixel is {across:.4g} m wide and {down:.4g} m high: the region "
+            "is not the tank's inside, or the camera looks askew; give --corners, or --pixel.")

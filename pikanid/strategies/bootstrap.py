@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +12,13 @@ from pikanid.comparison.bootstrap import block_length
 from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit
 from pikanid.recording import Channel, Recording
+from pikanid.recording.acceleration import acceleration
 from pikanid.strategies.nls import NLS
 
 
 def bootstrap(estimate: Estimate, recordings: Recording | Sequence[Recording],
-              resamples: int = 100, seed: int = 0) -> Estimate:
+              resamples: int = 100, seed: int = 0,
+              positions: Mapping[str, str] | None = None) -> Estimate:
     """The estimate with covariance and bands by the residual bootstrap.
 
     Every resample is the fitted output with residuals drawn in circular blocks, as long as their
@@ -29,6 +31,9 @@ def bootstrap(estimate: Estimate, recordings: Recording | Sequence[Recording],
         recordings: Those that it was fitted to, in their order.
         resamples: How many; the relative error of a standard error is 1/√(2 resamples).
         seed: Of the draws.
+        positions: Acceleration among the inputs -> channel of the position, with a sigma, that it
+            was derived from by `pikanid.recording.acceleration`: every resample has another one
+            that the position's errors allow.  Other covariances leave errors of inputs out.
 
     Raises:
         BadSetting: Fewer than two resamples.
@@ -49,13 +54,16 @@ def bootstrap(estimate: Estimate, recordings: Recording | Sequence[Recording],
     if len(estimate.fits) != outputs * len(given):
         raise errors.BadRecording(errors.bad_value(
             "recordings", len(given), "those of the fit, in their order"))
+    moved = [{new: acceleration(r[old], new) for new, old in (positions or {}).items()}
+             for r in given]
     rng = np.random.default_rng(seed)
     start = estimate.fitted_model
     thetas, curves = [], []
     for _ in range(resamples):
         drawn = [recording.with_channels(*(
             _resampled(fit, recording[fit.output], rng)
-            for fit in estimate.fits[k * outputs:(k + 1) * outputs]))
+            for fit in estimate.fits[k * outputs:(k + 1) * outputs]),
+            *(found.draw(rng) for found in moved[k].values()))
             for k, recording in enumerate(given)]
         again = NLS().fit(start, drawn)
         thetas.append(again.theta)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +18,10 @@ from pikanid.figures import BAND, COLOURS, NARROW, WIDE, new_figure, tidy
 from pikanid.storage.outputs import finished
 from pikanid.tracking.colours import Picture
 from pikanid.tracking.edges import Edges
-from pikanid.tracking.frames import Frame
+from pikanid.tracking.frames import Film, Frame
+from pikanid.tracking.region import Region
 from pikanid.tracking.surface import Surface
-from pikanid.tracking.tracked import Track
+from pikanid.tracking.tracked import Seen, Track
 from pikanid.tracking.video import Tracker
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINT, LINE = (0, 255, 255), (255, 0, 255)  # layout: colours, BGR
-BOX, TEXT = (0, 0, 255), (0, 0, 0)  # layout: colours, BGR
+BOX, TEXT, MARKER = (0, 0, 255), (0, 0, 0), (255, 80, 0)  # layout: colours, BGR
+NOTHING = Edges(np.empty(0), np.empty(0))  # definition: no points
 TILES = 8  # layout: pictures of a contact sheet, besides those that failed
 FAILED = 4  # layout: of those
 WIDTH = 320  # layout: pixels of a picture on it
@@ -38,37 +40,52 @@ SHADE = 0.35  # layout: how strongly what counts as liquid is tinted
 
 @dataclass(frozen=True, eq=False)
 class Still:
-    """A frame that is kept, and what was found in it."""
+    """A frame that is kept, and what was found in it.
+
+    Attributes:
+        frame: The picture.
+        found: Points of the surface.
+        surface: Through them.
+        region: The tank's inside in this picture; where it is in all of them if None.
+        marker: Where the marker is; None if there is none.
+    """
 
     frame: Frame
     found: Edges
     surface: Surface
+    region: Region | None = None
+    marker: Region | None = None
 
 
-def overlaid(picture: Picture, tracker: Tracker, found: Edges, surface: Surface,
-             label: str = "") -> Picture:
+def overlaid(still: Still, track: Track) -> Picture:
     """A picture (H, W, 3), BGR, with the region (red), what counts as liquid (tinted), points of
-    the surface (yellow) and the nearest line (magenta).
+    the surface (yellow) and the nearest line (magenta), and the marker (blue).
     """
     import cv2
 
     from pikanid.tracking.edges import cleaned
 
-    shown = np.ascontiguousarray(picture).copy()
-    r = tracker.region
-    inside = shown[r.top:r.top + r.height, r.left:r.left + r.width]
-    half = cleaned(r.cut(picture), tracker.colours)
-    mask = cv2.resize(half, (r.width, r.height), interpolation=cv2.INTER_NEAREST).astype(bool)
-    inside[mask] = ((1 - SHADE) * inside[mask] + SHADE * np.array([0, 200, 0])).astype(np.uint8)
-    cv2.rectangle(shown, (r.left - 1, r.top - 1), (r.left + r.width, r.top + r.height), BOX, 1)
-    if np.isfinite(surface.theta):
+    frame, found, surface = still.frame, still.found, still.surface
+    assert frame.picture is not None
+    shown = np.ascontiguousarray(frame.picture).copy()
+    r = still.region or track.region
+    if r.within(shown.shape[:2]):
+        inside = r.cut(shown)
+        half = cleaned(r.cut(frame.picture), track.colours)
+        mask = cv2.resize(half, (r.width, r.height), interpolation=cv2.INTER_NEAREST).astype(bool)
+        inside[mask] = ((1 - SHADE) * inside[mask] + SHADE * np.array([0, 200, 0])).astype(np.uint8)
+    for box, colour in ((r, BOX), (still.marker, MARKER)):
+        if box is not None:
+            cv2.rectangle(shown, (box.left - 1, box.top - 1),
+                          (box.left + box.width, box.top + box.height), colour, 1)
+    if len(found.x):
         fit = np.polynomial.Polynomial.fit(found.x, found.y, 1)
         ends = [(int(x), round(float(fit(x)))) for x in (r.left, r.left + r.width)]
         cv2.line(shown, ends[0], ends[1], LINE, 2, cv2.LINE_AA)
     for x, y in zip(found.x[::EVERY], found.y[::EVERY], strict=True):
         cv2.circle(shown, (round(x), round(y)), 2, POINT, -1, cv2.LINE_AA)
-    said = label + (f"  {np.degrees(surface.theta):+.2f} deg" if not surface.reason else
-                    f"  {surface.reason}")
+    said = f"{frame.number}: {frame.time:.3f} s  " + (
+        surface.reason or f"{np.degrees(surface.theta):+.2f} deg")
     cv2.rectangle(shown, (0, 0), (shown.shape[1], 20), (255, 255, 255), -1)
     cv2.putText(shown, said, (6, 15), cv2.FONT_HERSHEY_SIMPLEX, 0.45, TEXT, 1, cv2.LINE_AA)
     return shown
@@ -115,55 +132,74 @@ class Overlay:
                 self.staged.unlink()
 
 
-class Contacts:
-    """Small pictures, evenly over a clip, and the first that failed; few are kept at any time."""
+def stills(film: Film, track: Track, numbers: Collection[int] | None = None) -> Iterator[Still]:
+    """Pictures that can be read, and what the whole track says of them, one at a time in memory.
 
-    def __init__(self, tracker: Tracker):
-        self.tracker = tracker
-        self.every = 1
-        self.tiles: list[tuple[int, Picture]] = []
-        self.failed: list[tuple[int, Picture]] = []
+    Args:
+        film: The video, which is read once more: which pictures show no surface is known at its
+            end only.
+        track: What was found in it.
+        numbers: Of the pictures that are wanted; all if None.
+    """
+    tracker = Tracker(track.region, track.colours, track.settings, track.geometry, track.marker)
+    with closing(film.frames()) as frames:
+        for frame, seen in zip(frames, track.seen, strict=False):
+            if frame.picture is None or (numbers is not None and frame.number not in numbers):
+                continue
+            region, found = tracker.at(seen.shift), NOTHING
+            if not seen.surface.reason:
+                found, _ = tracker.find(frame.picture, seen.shift)
+            yield Still(frame, found, seen.surface, region, _box(track, seen))
 
-    def add(self, frame: Frame, found: Edges, surface: Surface) -> None:
-        """Look at one more."""
-        if frame.picture is None:
-            return
-        if surface.reason and len(self.failed) < FAILED:
-            self.failed.append((frame.number, self._tile(frame, found, surface)))
-        elif frame.number % self.every == 0 and not surface.reason:
-            self.tiles.append((frame.number, self._tile(frame, found, surface)))
-            if len(self.tiles) >= 2 * TILES:
-                self.every *= 2
-                self.tiles = [t for t in self.tiles if t[0] % self.every == 0]
 
-    def sheet(self) -> Figure:
-        """The pictures as a figure."""
-        import cv2
+def contact_sheet(film: Film, track: Track) -> Figure:
+    """Small pictures, evenly over a clip, and the first that failed."""
+    good, bad = ([s.number for s in track.seen if bool(s.surface.reason) is failed]
+                 for failed in (False, True))
+    last = len(good) - 1
+    pick = {good[round(last * k / (TILES - 1))] for k in range(TILES)} if good else set()
+    shown = [_tile(still, track) for still in stills(film, track, pick | {*bad[:FAILED]})]
+    columns = min(4, max(len(shown), 1))  # layout: of four pictures
+    rows = max(-(-len(shown) // columns), 1)
+    shape = shown[0].shape if shown else (3, 4)
+    figure = new_figure(3 * columns, 3 * rows * shape[0] / shape[1])
+    for k, tile in enumerate(shown):
+        axes = figure.add_subplot(rows, columns, k + 1)
+        axes.imshow(tile[..., ::-1])
+        axes.set_axis_off()
+    return figure
 
-        last = len(self.tiles) - 1
-        pick = sorted({round(last * k / (TILES - 1)) for k in range(TILES)}) if self.tiles else []
-        shown = sorted([*(self.tiles[k] for k in pick), *self.failed], key=lambda tile: tile[0])
-        columns = min(4, max(len(shown), 1))  # layout: of four pictures
-        rows = max(-(-len(shown) // columns), 1)
-        shape = shown[0][1].shape if shown else (3, 4)
-        figure = new_figure(3 * columns, 3 * rows * shape[0] / shape[1])
-        for k, (_, tile) in enumerate(shown):
-            axes = figure.add_subplot(rows, columns, k + 1)
-            axes.imshow(cv2.cvtColor(tile, cv2.COLOR_BGR2RGB))
-            axes.set_axis_off()
-        return figure
 
-    def _tile(self, frame: Frame, found: Edges, surface: Surface) -> Picture:
-        import cv2
+def overlay(path: str | os.PathLike[str], film: Film, track: Track) -> None:
+    """A video of the pictures with what was found in them.
 
-        assert frame.picture is not None
-        label = f"{frame.number}: {frame.time:.3f} s"
-        drawn = overlaid(frame.picture, self.tracker, found, surface, label)
-        height = round(WIDTH * drawn.shape[0] / drawn.shape[1])
-        if drawn.shape[1] <= 2 * WIDTH:
-            return drawn
-        return np.asarray(cv2.resize(drawn, (2 * WIDTH, 2 * height),
-                                     interpolation=cv2.INTER_AREA), np.uint8)
+    Raises:
+        BadRecording: If OpenCV cannot write there.
+    """
+    shown, done = Overlay(path, film.rate), False
+    try:
+        for still in stills(film, track):
+            shown.add(overlaid(still, track))
+        done = True
+    finally:
+        shown.close(done)
+
+
+def _box(track: Track, seen: Seen) -> Region | None:
+    if track.marker is None or seen.shift is None:
+        return None
+    return track.marker.area.moved(*seen.shift)
+
+
+def _tile(still: Still, track: Track) -> Picture:
+    import cv2
+
+    drawn = overlaid(still, track)
+    height = round(WIDTH * drawn.shape[0] / drawn.shape[1])
+    if drawn.shape[1] <= 2 * WIDTH:
+        return drawn
+    return np.asarray(cv2.resize(drawn, (2 * WIDTH, 2 * height),
+                                 interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def plot(track: Track) -> Figure:

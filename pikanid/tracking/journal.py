@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import os
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TextIO
 
 from pikanid import errors
+from pikanid.tracking.marker import Place
 from pikanid.tracking.surface import Surface
 from pikanid.tracking.tracked import Seen
 
@@ -68,7 +70,8 @@ def question(path: Path) -> dict[str, Any]:
 def _line(seen: Seen) -> str:
     s = seen.surface
     row = (seen.number, seen.time, s.theta, s.level, s.shape, s.variance, s.finer, s.gains,
-           s.points, s.reason, seen.repeated)
+           s.points, s.reason, seen.repeated,
+           None if seen.place is None else astuple(seen.place))
     return json.dumps(row) + "\n"
 
 
@@ -83,10 +86,12 @@ def _read(path: Path, asked: dict[str, Any]) -> list[Seen]:
     for line in lines[1:]:
         try:
             row = json.loads(line)
-            number, time, theta, level, shape, variance, finer, gains, points, reason, again = row
+            (number, time, theta, level, shape, variance, finer, gains, points, reason, again,
+             place) = row
             seen = Seen(int(number), float(time), Surface(
                 float(theta), float(level), tuple(map(float, shape)), float(variance),
-                float(finer), tuple(map(float, gains)), float(points), str(reason)), bool(again))
+                float(finer), tuple(map(float, gains)), float(points), str(reason)), bool(again),
+                None if place is None else Place(*place))
         except (ValueError, TypeError):  # the line at which it was stopped
             break
         if not math.isfinite(seen.time):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +29,27 @@ class Region:
         """The part of a picture that lies within."""
         return picture[self.top:self.top + self.height, self.left:self.left + self.width]
 
+    def moved(self, x: float, y: float) -> Region:
+        """The region of a tank that has gone so far [px], to the nearest pixel.
+
+        >>> Region(10, 20, 30, 40).moved(1.6, -2.0)
+        Region(left=12, top=18, width=30, height=40)
+        """
+        return replace(self, left=self.left + round(x), top=self.top + round(y))
+
+    def within(self, size: tuple[int, int]) -> bool:
+        """Whether it lies in a picture of that height and width."""
+        height, width = size
+        return (min(self.left, self.top) >= 0 and self.left + self.width <= width
+                and self.top + self.height <= height)
+
     def check(self, size: tuple[int, int]) -> None:
         """Refuse a region that is not within a picture of that height and width.
 
         Raises:
             BadSetting: If it is not, or too small to hold a surface.
         """
-        height, width = size
-        if (min(self.left, self.top) < 0 or min(self.width, self.height) < 24
-                or self.left + self.width > width or self.top + self.height > height):
+        if not self.within(size) or min(self.width, self.height) < 24:
             raise errors.BadSetting(errors.region_outside(
                 (self.left, self.top, self.width, self.height), size))
 

@@ -26,6 +26,10 @@ class TrackingSettings(Checked):
         rough: Residual [share of the width] beyond which it is no surface.
         volume: Change of the surface's mean height [share of the width] that counts as one, and
         jump: robust standard deviations of that height which it must have, too.
+        alike: Least correlation of a marker with its first picture.
+        cover: Times the squared difference from that picture that a part of a marker may have.
+        vague: Standard error [px] beyond which a marker has no place.
+        texture: Grey levels per pixel by which a marker must change in every direction.
         first: How many pictures the colours and the region are learned from.
     """
 
@@ -40,6 +44,10 @@ class TrackingSettings(Checked):
     rough: Share = 0.03
     volume: Share = 0.003
     jump: Amount = 6.0
+    alike: Share = 0.8
+    cover: Amount = 5.0
+    vague: Amount = 0.2
+    texture: Amount = 2.0
     first: Count = 12
 
     @property

@@ -19,7 +19,8 @@ CODECS = {"mjpg": ("MJPG", ".avi"), "mp4v": ("mp4v", ".mp4"), "ffv1": ("FFV1", "
 
 def write(path: str | os.PathLike[str], surfaces: Iterable[float | ArrayLike],
           scene: Scene | None = None, rate: float = 100.0, codec: str | None = None,
-          quality: float = 95.0, seed: int = 0) -> Path:
+          quality: float = 95.0, seed: int = 0,
+          motion: Iterable[tuple[float, float]] | None = None) -> Path:
     """Draw one picture after the other and write them as a video.
 
     Args:
@@ -30,6 +31,8 @@ def write(path: str | os.PathLike[str], surfaces: Iterable[float | ArrayLike],
         codec: "mjpg", "mp4v" or "ffv1" (lossless); by the ending if None.
         quality: Of Motion JPEG, from 1 to 100.
         seed: Of the sensor's noise.
+        motion: How far the tank has moved (x, y) [px] in every frame, as far as surfaces go; at
+            rest if None.
 
     Raises:
         BadSetting: If ending or codec is unknown, or OpenCV is not installed.
@@ -54,7 +57,10 @@ def write(path: str | os.PathLike[str], surfaces: Iterable[float | ArrayLike],
         raise errors.BadRecording(errors.cannot_write(str(file), "OpenCV opens no video there"))
     try:
         film.set(cv2.VIDEOWRITER_PROP_QUALITY, quality)
+        moved = None if motion is None else iter(motion)
         for number, surface in enumerate(surfaces):
+            if moved is not None:
+                stage = stage.at(*next(moved))
             film.write(np.ascontiguousarray(stage.picture(surface, rng, number)[..., ::-1]))
     finally:
         film.release()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pikanid.tracking.render.passing import Array, Colour, Cover, Splash
+from pikanid.tracking.render.pattern import Pattern
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,10 @@ class Scene:
         noise: Standard deviation of the sensor's noise [grey levels].
         covers: What passes in front of the tank.
         splashes: Drops above the surface.
+        pattern: A printed patch in the tank's plane, if there is one.
+        glued: Whether it is on the tank; else on what stands behind it.
+        riding: Whether the camera moves with the tank; else it stands.
+        gone: How far the tank has moved since the first picture (x, y) [px], seen straight on.
 
     >>> Scene().waterline
     255.0
@@ -68,19 +73,43 @@ class Scene:
     noise: float = 3.0
     covers: tuple[Cover, ...] = ()
     splashes: tuple[Splash, ...] = ()
+    pattern: Pattern | None = None
+    glued: bool = True
+    riding: bool = False
+    gone: tuple[float, float] = (0.0, 0.0)
+
+    def at(self, x: float, y: float) -> Scene:
+        """The same when the tank has gone so far [px].
+
+        >>> Scene().at(3.0, 1.0).place, Scene(riding=True).at(3.0, 1.0).place
+        ((173.0, 61.0), (170.0, 60.0))
+        """
+        return replace(self, gone=(x, y))
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Left and top of the tank's inside now [px], seen straight on."""
+        moves = 0.0 if self.riding else 1.0
+        return self.tank[0] + moves * self.gone[0], self.tank[1] + moves * self.gone[1]
+
+    @property
+    def shift(self) -> tuple[float, float]:
+        """By which the pattern has moved (x, y) [px], seen straight on."""
+        moves = float(self.glued) - float(self.riding)
+        return moves * self.gone[0], moves * self.gone[1]
 
     @property
     def waterline(self) -> float:
         """Row of the surface at rest, seen straight on [px]."""
-        _, top, _, height = self.tank
-        return top + (1 - self.level) * height
+        _, _, _, height = self.tank
+        return self.place[1] + (1 - self.level) * height
 
     @property
     def corners(self) -> Array:
         """Where the camera sees the corners of the tank's inside (4, 2) [px]: upper left, upper
         right, lower right, lower left.
         """
-        left, top, width, height = self.tank
+        (left, top), (_, _, width, height) = self.place, self.tank
         flat = np.array([[left, top], [left + width, top], [left + width, top + height],
                          [left, top + height]], float)
         return self.seen(flat)
@@ -93,7 +122,7 @@ class Scene:
     @property
     def homography(self) -> Array:
         """From the plane seen straight on to the picture (3, 3): a pinhole camera, turned about
-        the tank's middle.
+        the middle of the tank where it was first.
         """
         left, top, width, height = self.tank
         x, y, far = left + width / 2, top + height / 2, self.distance * width

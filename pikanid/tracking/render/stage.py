@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pikanid import errors
 from pikanid.tracking.render.passing import Array
+from pikanid.tracking.render.pattern import Pattern
 from pikanid.tracking.render.scene import Scene
 
 PARTS = 4  # numerical: strips of a pixel's width whose share below the surface is exact
@@ -49,9 +50,17 @@ class Stage:
             np.asarray(scene.wall) - np.asarray(scene.outside))
         above[self.box] += self._whole(self.inside)[..., None] * (
             np.asarray(scene.air) - above[self.box])
+        if scene.pattern is not None:
+            self._print(scene.pattern, above)
         self.above = self._blurred(above * light + self._glare()).astype(np.float32)
         difference = (np.asarray(scene.dye) - np.asarray(scene.air)) * light[self.box]
         self.difference = difference.astype(np.float32)
+
+    def at(self, x: float, y: float) -> Stage:
+        """The same when the tank has gone so far [px]; noise goes on."""
+        after = Stage(self.scene.at(x, y))
+        after._drawn = self._drawn
+        return after
 
     def surface(self, theta: float) -> Array:
         """Heights (2,) [px] at both walls of a flat surface that rises to the right."""
@@ -105,7 +114,7 @@ class Stage:
             depth = h[2, 0] * across + h[2, 1] * rows[:, None] + h[2, 2]
             x = (h[0, 0] * across + h[0, 1] * rows[:, None] + h[0, 2]) / depth
             y = (h[1, 0] * across + h[1, 1] * rows[:, None] + h[1, 2]) / depth
-            return x - scene.tank[0], scene.waterline - y
+            return x - scene.place[0], scene.waterline - y
 
         x, z = at(down)
         scale = 1 / (at(down - 0.5)[1] - at(down + 0.5)[1])
@@ -126,7 +135,6 @@ class Stage:
         strips = np.clip(above * self.scale[crossed] + 0.5, 0, 1) * self.inside[crossed]
         share[crossed] = self._whole(strips)
         return share
-
 
     def _noise(self, rng: np.random.Generator) -> NDArray[np.float32]:
         """Noise of one picture: a stretch of a long row of numbers, which begins anywhere."""
@@ -149,6 +157,22 @@ class Stage:
         outer = ((self.x > -t) & (self.x < width + t) & (self.z > floor - t)
                  & (self.z < floor + height))
         return self._whole(outer.astype(float))
+
+    def _print(self, pattern: Pattern, picture: Array) -> None:
+        """Draw a patch into a picture (H, W, 3)."""
+        right, down = (np.array([near, near + size]) + gone for near, size, gone in (
+            (pattern.left, pattern.width, self.scene.shift[0]),
+            (pattern.top, pattern.height, self.scene.shift[1])))
+        corners = self.scene.seen(np.array([(x, y) for x in right for y in down]))
+        low = np.maximum(np.floor(corners.min(axis=0)).astype(int) - 1, 0)
+        high = np.maximum(np.ceil(corners.max(axis=0)).astype(int) + 2, 0)
+        part = picture[low[1]:high[1], low[0]:high[0]]
+        y, x = (a + first for a, first in zip(np.indices(part.shape[:2], float), low[::-1],
+                                              strict=True))
+        at = np.stack([x, y, np.ones_like(x)], axis=-1) @ np.linalg.inv(self.scene.homography).T
+        share, grey = pattern.seen(at[..., 0] / at[..., 2] - self.scene.shift[0],
+                                   at[..., 1] / at[..., 2] - self.scene.shift[1])
+        part += share[..., None] * (grey[..., None] - part)
 
     def _whole(self, fine: NDArray[Any]) -> NDArray[Any]:
         rows, columns = fine.shape
