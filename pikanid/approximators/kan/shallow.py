@@ -16,7 +16,8 @@ import numpy as np
 from scipy import sparse
 
 from pikanid import errors
-from pikanid.approximators.kan.bases import power_blossom, silu, spline_rows
+from pikanid.approximators import local_matrix
+from pikanid.approximators.kan.bases import Index, power_blossom, silu, spline_rows
 from pikanid.approximators.kan.blank import plan_of
 from pikanid.approximators.kan.kinks import Kink, KinkTable
 from pikanid.approximators.kan.plan import Array
@@ -113,6 +114,15 @@ class ShallowKAN:
         Raises:
             BadSetting: If a time leaves the grid.
         """
+        first, values = self.local(t, derivative)
+        return local_matrix(first, values, self.n_basis)
+
+    def local(self, t: Array, derivative: int = 0) -> tuple[Index, Array]:
+        """First basis function of each row of ``basis`` (M,), and the row's values (M, width).
+
+        Raises:
+            BadSetting: If a time leaves the grid.
+        """
         t = self._inside(t)
         active, values = spline_rows(t, self.knots, self.degree, derivative)
         rows = np.arange(t.size)[:, None]
@@ -124,10 +134,7 @@ class ShallowKAN:
         local[at, self._kink_at[kink] - first[at]] = heights / self._scale[kink]
         if self.has_base:
             local[:, -1] = silu(t, derivative)
-        width = self._row_width
-        indices = (first[:, None] + np.arange(width)).ravel()
-        pointers = width * np.arange(t.size + 1)
-        return sparse.csr_array((local.ravel(), indices, pointers), shape=(t.size, self.n_basis))
+        return first, local
 
     def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
         """The curve for coefficients (n_basis,) or (n_basis, outputs) at ``t`` (M,)."""
