@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from pikanid.approximators import local_matrix
 from pikanid.approximators.kan.bases import Index, power_blossom, silu, spline_rows
 from pikanid.approximators.kan.blank import plan_of
 from pikanid.approximators.kan.kinks import Kink, KinkTable
-from pikanid.approximators.kan.plan import Array
+from pikanid.approximators.kan.plan import Array, PlannedKan
 from pikanid.approximators.kan.refine import change_of_knots, refine
 from pikanid.approximators.kan.tensors import read, write
 
@@ -37,7 +38,8 @@ class ShallowKAN:
     so that every row of the basis is short; with w_b the rows are full.
 
     Args:
-        kan: A pykan model of width [1, n] (`build_kan`).
+        kan: A pykan model of width [1, n] (`build_kan`), or one that is made when its coefficients
+            are asked for (`planned_kan`).
         kinks: Times of the kinks [s], inside the grid, or ready `Kink`s on the same knots.
         orders: Orders at each time, 1 to k, by default 2 and 3 (2 alone at k = 2); order k next to
             a knot is left out (it is a knot).
@@ -53,12 +55,12 @@ class ShallowKAN:
 
     def __init__(self, kan: Any, kinks: Sequence[float | Kink] = (),
                  orders: Sequence[int] | None = None) -> None:
-        plan = plan_of(kan)
+        plan = kan.plan if isinstance(kan, PlannedKan) else plan_of(kan)
         if plan.depth != 1 or plan.width[0] != (1, 0) or plan.width[1][1]:
             raise errors.BadSetting(errors.kan_not_shallow([list(layer) for layer in plan.width]))
-        if float(kan.symbolic_fun[0].mask.abs().sum()) > 0.0:
+        if not isinstance(kan, PlannedKan) and float(kan.symbolic_fun[0].mask.abs().sum()) > 0.0:
             raise errors.BadSetting(errors.kan_symbolic(0))
-        self.kan = kan
+        self._given = kan
         self.degree = plan.k
         self.knots = plan.knots[0][0]
         self.n_outputs = plan.nodes(1)
@@ -71,6 +73,11 @@ class ShallowKAN:
         self._jumps = np.zeros((len(self._kinks), self.n_outputs))
         for number, place in enumerate(self._kinks):
             self._jumps[number] = held.get(place, 0.0)
+
+    @cached_property
+    def kan(self) -> Any:
+        """The pykan model."""
+        return self._given.make() if isinstance(self._given, PlannedKan) else self._given
 
     @property
     def start(self) -> float:
