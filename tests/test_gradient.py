@@ -153,6 +153,8 @@ def test_torch_functional_is_the_functional(form: str) -> None:
     for wanted, part in zip(traced, (data, physics), strict=True):
         pulls = [torch.autograd.grad(p, at, retain_graph=True)[0] for p in (part, wanted)]
         np.testing.assert_allclose(*pulls, rtol=1e-10, atol=1e-11 * float(pulls[1].abs().max()))
+    assert loss.slope(z, lam)[:2] == (float(data.detach()), float(physics.detach()))
+    np.testing.assert_array_equal(loss.slope(z, lam)[2], slope)
     again, jacobian = loss.linearised(z, lam)
     point = loss.unpack(z)
     np.testing.assert_allclose(functional.residual(point.coefficients, point.theta, lam), r,

@@ -12,7 +12,7 @@ from pikanid import errors
 torch = pytest.importorskip("torch", reason="needs the `kan` extra")
 pytest.importorskip("kan.MultKAN", reason="needs the `kan` extra")
 
-from pikanid.approximators import LinearApproximator, local_rows  # noqa: E402
+from pikanid.approximators import LinearApproximator  # noqa: E402
 from pikanid.approximators.kan import ShallowKAN, build_kan  # noqa: E402
 from pikanid.approximators.kan.bases import silu  # noqa: E402
 from pikanid.approximators.kan.tensors import read, write  # noqa: E402
@@ -99,7 +99,7 @@ def test_rows_are_short_and_equally_long(kinks: tuple[float, ...]) -> None:
     t = np.linspace(0.0, 5.0, 501)
     for derivative in range(4):
         matrix = shallow.basis(t, derivative)
-        first, values = local_rows(matrix)
+        first, values = shallow.local(t, derivative)
         assert values.shape[1] == (6 if not kinks else 8)  # at most one switch in reach here
         dense = np.zeros(matrix.shape)
         np.put_along_axis(dense, first[:, None] + np.arange(values.shape[1]), values, axis=1)

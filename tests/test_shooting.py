@@ -139,3 +139,15 @@ def test_steps_that_are_fine_stay_as_they_are_when_asked_for_again() -> None:
     for _ in range(3):
         assert not shooting.choose_steps(theta, "fine")
     assert shooting.steps[0].longest == fine
+
+
+def test_the_last_residual_leaves_its_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """States and sensitivities at the optimum are those of the residual there, not run again."""
+    shooting = Shooting(Problem(model(), recording(0, True)))
+    theta = shooting.problem.guess
+    shooting.choose_steps(theta, "fine")
+    residual = shooting.residual(theta)
+    monkeypatch.setattr(type(shooting.simulators[0]), "run", None)
+    (response,) = shooting.responses(theta)
+    np.testing.assert_array_equal((response.y - shooting.y) * shooting.weights, residual)
+    np.testing.assert_allclose(response.states[:, 0], np.exp(-response.t), rtol=1e-3)

@@ -291,3 +291,14 @@ def test_random_inputs_on_random_times_agree_with_the_reference(
     # the classical Runge-Kutta error at this frequency: (ωh)^4 of the amplitude, per 120
     limit = 1e-8 + (14.8 * step) ** 4 / 20 * np.abs(expected).max()
     assert np.abs(ours - expected).max() < limit
+
+
+def test_stops_that_no_parameter_moves_are_laid_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a model that only equals one that was simulated before, too."""
+    recording = excitation.two_pulse()
+    first, second = (Simulator(m, bind(m, recording, need_outputs=False))
+                     for m in (systems.sloshing(), systems.sloshing()))
+    p = np.array([0.045, 0.15, 0.3, 9.81])
+    assert first.acting == second.model and first.acting is not second.model
+    monkeypatch.setattr("pikanid.simulation.simulator.delays", None)
+    assert second.grid(p) is second.grid(1.1 * p)

@@ -48,28 +48,17 @@ class LinearApproximator(Protocol):
     def basis(self, t: Array, derivative: int = 0) -> sparse.csr_array:
         """Basis (M, n_basis): equally many consecutive nonzeros a row, one-sided from the right."""
 
+    def local(self, t: Array, derivative: int = 0) -> tuple[NDArray[np.int64], Array]:
+        """The same as first column of each row (M,) and values (M, width)."""
+
 
 def is_linear(approximator: Any) -> TypeGuard[LinearApproximator]:
     """Whether an approximator is its basis; as `isinstance` says, which takes 20 µs to say it."""
     return hasattr(approximator, "basis")
 
 
-def local_rows(matrix: sparse.csr_array) -> tuple[NDArray[np.int64], Array]:
-    """Split a local basis matrix into (first column of each row (M,), values (M, width)).
-
-    >>> first, values = local_rows(sparse.csr_array([[1.0, 2.0, 0.0], [0.0, 3.0, 4.0]]))
-    >>> first, values
-    (array([0, 1]), array([[1., 2.],
-           [3., 4.]]))
-    """
-    rows = matrix.shape[0]
-    width = matrix.nnz // rows if rows else 0
-    first = matrix.indices[::width].astype(np.int64) if width else np.zeros(rows, np.int64)
-    return first, np.asarray(matrix.data, dtype=float).reshape(rows, width)
-
-
 def local_matrix(first: NDArray[np.int64], values: Array, n: int) -> sparse.csr_array:
-    """Put a local basis matrix (M, n) together again from first columns (M,), values (M, width).
+    """A local basis matrix (M, n) from the first column of each row (M,) and values (M, width).
 
     >>> local_matrix(np.array([0, 1]), np.array([[1.0, 2.0], [3.0, 4.0]]), 3).toarray()
     array([[1., 2., 0.],

@@ -35,10 +35,13 @@ class Adjoint:
         self._sums = [np.empty((*size, width)) for width in at.net.hidden]
         self._backs = [np.empty((*size, width)) for width in at.net.hidden]
         self._slopes = [np.empty((size[1], width)) for width in at.net.hidden]
+        self._sums[0][2:] = 0.0  # the first layer's: time has no second derivative
         self._weights: list[Array] = []
 
     def jet(self, c: Array) -> Array:
         """Value and derivatives (order + 1, M) for coefficients c (n,)."""
+        from pikanid.approximators.mlp_layers import forward
+
         net = self.at.net
         linear, *self._weights = np.split(c, self._ends)
         last = len(net.hidden)
@@ -48,21 +51,11 @@ class Adjoint:
             if layer == 0:
                 np.multiply.outer(self._time, matrix[0], out=sums[0])
                 sums[1:2] = self._rate * matrix[0]
-                sums[2:] = 0.0
             else:
                 np.matmul(self._flat(self._jets[layer - 1]), matrix, out=self._flat(sums))
             np.add(sums[0], bias, out=jet[0])
             torch.from_numpy(jet[0]).tanh_()  # twice as fast as NumPy's
-            np.multiply(jet[0], jet[0], out=s)
-            np.subtract(1.0, s, out=s)
-            if len(jet) > 1:
-                np.multiply(s, sums[1], out=jet[1])
-            if len(jet) > 2:
-                np.multiply(jet[0], jet[1], out=jet[2])
-                jet[2] *= sums[1]
-                jet[2] *= -2.0
-                if layer:
-                    jet[2] += s * sums[2]
+            forward(self._planes(sums), self._planes(jet), s.ravel())
         out = (self._jets[-1] @ self._layer(last)[0])[:, :, 0]
         out[0] += self._weights[-1]
         out *= net.scale
@@ -74,6 +67,8 @@ class Adjoint:
 
     def pull(self, adjoint: Array) -> Array:
         """The gradient (n,) by c of Σ adjoint·jet, adjoint (order + 1, M), at the last `jet`."""
+        from pikanid.approximators.mlp_layers import backward
+
         net = self.at.net
         grads: list[Array] = [np.einsum("kmn,km->n", self._linear, adjoint)]
         if self._gate is not None:
@@ -85,8 +80,9 @@ class Adjoint:
         back = self._backs[-1]
         np.multiply.outer(adjoint, self._layer(last)[0][:, 0], out=back)
         for layer in reversed(range(last)):
-            self._through(layer)
             back = self._backs[layer]
+            backward(self._planes(self._jets[layer]), self._slopes[layer].ravel(),
+                     self._planes(back))
             found.append(back[0].sum(0))
             if layer == 0:
                 by_matrix = self._time @ back[0]
@@ -99,29 +95,6 @@ class Adjoint:
                       out=self._flat(self._backs[layer - 1]))
         return np.concatenate([*grads, *reversed(found)])
 
-    def _through(self, layer: int) -> None:
-        """From the adjoint of a layer's jet to that of its sums, in place; see `mlp._TanhJet`."""
-        jet, s, grad = self._jets[layer], self._slopes[layer], self._backs[layer]
-        if len(jet) == 1:
-            grad[0] *= s
-            return
-        a, rate = jet[0], jet[1]
-        inner = grad[1] * rate
-        if len(jet) > 2:
-            inner += grad[2] * jet[2]
-            bent = grad[2] * rate
-        inner *= a
-        inner *= -2.0
-        grad *= s
-        grad[0] += inner
-        if len(jet) > 2:
-            np.multiply(rate, bent, out=inner)
-            inner *= -2.0
-            grad[0] += inner
-            bent *= a
-            bent *= -4.0
-            grad[1] += bent
-
     def _layer(self, layer: int) -> tuple[Array, Array]:
         shapes = self.at.net.shapes
         return (self._weights[2 * layer].reshape(shapes[2 * layer]), self._weights[2 * layer + 1])
@@ -129,6 +102,10 @@ class Adjoint:
     @staticmethod
     def _flat(jets: Array) -> Array:
         return jets.reshape(-1, jets.shape[-1])
+
+    @staticmethod
+    def _planes(jets: Array) -> Array:
+        return jets.reshape(len(jets), -1)
 
 
 def _product(gate: Array, jet: Array) -> Array:

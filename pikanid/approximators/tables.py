@@ -18,7 +18,6 @@ from pikanid.approximators import (
     LinearApproximator,
     is_linear,
     local_matrix,
-    local_rows,
 )
 from pikanid.approximators.bspline import BSpline
 
@@ -53,7 +52,7 @@ class Table:
         """Tabulate; a linear approximator is evaluated here once and for all."""
         if not is_linear(approximator):
             return Table(approximator, t, derivative, part)
-        first, local = _window(approximator, t, derivative)
+        first, local = approximator.local(t, derivative)
         return Table(approximator, t, derivative, part, first + part.start, local)
 
     @property
@@ -145,19 +144,12 @@ def _placing(approximator: LinearApproximator, t: Array, derivative: int
     """Width of a local basis, and what writes its first functions (M,) and values to a place."""
     if isinstance(approximator, BSpline):  # no values before the place is known
         return approximator.degree + 1, functools.partial(approximator.fill, t, derivative)
-    found = local_rows(approximator.basis(t, derivative))
+    found = approximator.local(t, derivative)
 
     def place(first: NDArray[np.int64], local: Array) -> None:
         first[:], local[:] = found
 
     return found[1].shape[1], place
-
-
-def _window(approximator: LinearApproximator, t: Array, derivative: int
-            ) -> tuple[NDArray[np.int64], Array]:
-    if isinstance(approximator, BSpline):
-        return approximator.local(t, derivative)
-    return local_rows(approximator.basis(t, derivative))
 
 
 def gauss_nodes(breakpoints: Array, points: int) -> tuple[Array, Array]:
@@ -200,7 +192,7 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
             return None
         rows = []
         for q in range(length):
-            first, values = _window(approximator, at, q)
+            first, values = approximator.local(at, q)
             row = values[0].tolist()
             sizes = [abs(value) for value in row]
             if first[0] or max(sizes[q + 1:], default=0.0) > 1e-9 * max(sizes):

@@ -47,7 +47,7 @@ class Level:
     def trajectories(self) -> list[Trajectory]:
         """The fitted states."""
         return [Trajectory(r.t, r.states)
-                for r in self.shooting.responses(self.fit.theta, states=True)]
+                for r in self.shooting.responses(self.fit.theta)]
 
     def visiting(self, nominal: Problem, equation: str) -> Level:
         """The level with what its own trajectories went through."""

@@ -45,7 +45,7 @@ def _responses(shooting: Shooting, theta: np.ndarray, equation: str, plans: Sequ
                force: Force) -> np.ndarray:
     problem = shooting.problem
     parts = []
-    for r, response in enumerate(shooting.responses(theta, states=True)):
+    for r, response in enumerate(shooting.responses(theta)):
         p = problem.parameters(theta, r)
         parts.append(_one(problem, r, p, response.t, response.states, equation, plans, force))
     return np.concatenate(parts) * shooting.weights[:, None]

@@ -81,15 +81,13 @@ class Shooting:
         """
         self.limits = list(self.steps) if on else []
 
-    def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
-        """Simulate every recording at θ with sensitivities of its own parameters."""
-        if states:
-            return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r],
-                          states=True) for r, s in enumerate(self.simulators)]
+    def responses(self, theta: np.ndarray) -> list[Response]:
+        """Simulate every recording at θ: states, and sensitivities of its own parameters."""
         return [self._trial(theta, r, steps, True) for r, steps in enumerate(self.steps)]
 
     def _trial(self, theta: np.ndarray, r: int, steps: Steps, likely: bool) -> Response:
-        """The response of recording r at θ, with sensitivities if the steps are `likely` used.
+        """The response of recording r at θ, with states and sensitivities if the steps are `likely`
+        used.
 
         Those at the latest θ are kept: where steps are checked the optimiser starts.
         """
@@ -101,7 +99,7 @@ class Shooting:
         if key in kept:
             return kept[key]
         active = self.columns[r][0] if likely else None
-        response = self.simulators[r].run(self.problem.parameters(theta, r), active, steps)
+        response = self.simulators[r].run(self.problem.parameters(theta, r), active, steps, likely)
         if likely:
             kept[key] = response
         return response

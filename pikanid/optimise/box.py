@@ -1,10 +1,11 @@
-"""Quadratic programmes in a box, as every step within bounds is one."""
+"""Boxes: which bounds are met, and quadratic programmes, as every step within bounds is one."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
@@ -58,6 +59,19 @@ def box_minimum(matrix: Array, slope: Array, lower: Array, upper: Array) -> Arra
             break
         bound[int(np.argmax(wrong))] = False
     return np.clip(change, lower, upper)
+
+
+def met(theta: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
+    """Which entries of θ (n,) lie at a bound, up to rounding.
+
+    >>> met(np.array([1.0, 5.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([2.0, np.inf, 1.0]))
+    array([ True, False,  True])
+    """
+    return _at(theta, lower) | _at(theta, upper)
+
+
+def _at(theta: Array, bound: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.isfinite(bound) & (np.abs(theta - bound) <= 1e-6 * np.abs(bound)))
 
 
 def _minimum(matrix: Array, slope: Array, root: Array) -> Array:

@@ -6,6 +6,7 @@ but not what was found; both are deterministic, and leave torch's global setting
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -29,6 +30,13 @@ class Loss(Protocol):
 
     def __call__(self, z: Tensor) -> tuple[Tensor, Tensor]:
         """Data and physics part, differentiable scalars."""
+
+
+class Slope(Protocol):
+    """The same with the gradient of data + λ·physics."""
+
+    def __call__(self, z: Array, lam: float) -> tuple[float, float, Array]:
+        """Data and physics part at z (n,), and the gradient (n,)."""
 
 
 class Weight(Protocol):
@@ -145,12 +153,11 @@ def adam(loss: Loss, start: Array, *, steps: int, weight: Weight, goal: float | 
     best, best_cost, best_parts, history = z.clone(), np.inf, (np.nan, np.nan), []
     bad, lam, step = False, 0.0, 0
     limit = np.inf
+    slope = _slope_of(loss, device)
     for step in range(1, steps + 1):
-        z.requires_grad_()
         lam = weight(step - 1, loss, z)
-        data, physics = loss(z)
-        (gradient,) = torch.autograd.grad(data + lam * physics, z)
-        parts = (float(data.detach()), float(physics.detach()))
+        data, physics, pull = slope(z.cpu().numpy(), lam)
+        parts, gradient = (data, physics), _tensor(pull, device)
         cost = parts[0] + (lam if goal is None else goal) * parts[1]
         if not cost < limit:
             bad = True
@@ -158,19 +165,17 @@ def adam(loss: Loss, start: Array, *, steps: int, weight: Weight, goal: float | 
         if step == 1:
             limit = DIVERGED * max(cost, 1e-300)
         if cost < best_cost or goal is None:
-            best.copy_(z.detach())
+            best.copy_(z)
             best_cost, best_parts = cost, parts
         if step % EVERY == 0 or step == 1:
             history.append(_report(step, lam, parts, progress))
-        with torch.no_grad():
-            z = z.detach()
-            first.lerp_(gradient, 1.0 - BETAS[0])
-            second.mul_(BETAS[1]).addcmul_(gradient, gradient, value=1.0 - BETAS[1])
-            size = rate * decay ** (step / steps) / (1.0 - BETAS[0] ** step)
-            spread = (second / (1.0 - BETAS[1] ** step)).sqrt_().add_(EPSILON)
-            z.addcdiv_(first, spread, value=-size)
-            if box[0] is not None and box[1] is not None:
-                torch.clamp(z, box[0], box[1], out=z)
+        first.lerp_(gradient, 1.0 - BETAS[0])
+        second.mul_(BETAS[1]).addcmul_(gradient, gradient, value=1.0 - BETAS[1])
+        size = rate * decay ** (step / steps) / (1.0 - BETAS[0] ** step)
+        spread = (second / (1.0 - BETAS[1] ** step)).sqrt_().add_(EPSILON)
+        z.addcdiv_(first, spread, value=-size)
+        if box[0] is not None and box[1] is not None:
+            torch.clamp(z, box[0], box[1], out=z)
     return Descent(best.cpu().numpy(), lam if goal is None else goal, *best_parts, step, np.nan,
                    False, bad, tuple(history))
 
@@ -183,22 +188,17 @@ def lbfgs(loss: Loss, start: Array, *, steps: int, lam: float, lower: Array | No
 
     best, parts_of_best, history = start.copy(), (np.nan, np.nan), []
     least, gradient_there, broken, count = np.inf, np.nan, False, 0
-    latest = (np.nan, np.nan)
+    slope_at = _slope_of(loss, device)
 
     def cost(z: Array) -> tuple[float, Array]:
-        nonlocal best, parts_of_best, least, gradient_there, broken, latest
-        at = _tensor(z, device).requires_grad_()
-        data, physics = loss(at)
-        total = data + lam * physics
-        (gradient,) = torch.autograd.grad(total, at)
-        slope = gradient.cpu().numpy().astype(float)
-        value = float(total.detach())
+        nonlocal best, parts_of_best, least, gradient_there, broken
+        data, physics, slope = slope_at(z, lam)
+        value = data + lam * physics
         if not np.isfinite(value) or not np.all(np.isfinite(slope)):
             broken = True
             return 1e300, np.zeros_like(z)  # the line search turns back
-        latest = (float(data.detach()), float(physics.detach()))
         if value < least:
-            best, least, parts_of_best = z.copy(), value, latest
+            best, least, parts_of_best = z.copy(), value, (data, physics)
             gradient_there = float(np.linalg.norm(_projected(slope, z, lower, upper)))
         return value, slope
 
@@ -216,6 +216,20 @@ def lbfgs(loss: Loss, start: Array, *, steps: int, lam: float, lower: Array | No
     finished = bool(found.status == 0) and not broken
     return Descent(best, lam, *parts_of_best, int(found.nit), gradient_there, finished,
                    not np.isfinite(least), tuple(history))
+
+
+def _slope_of(loss: Loss, device: str) -> Slope:
+    """The loss' own `slope`, which may do without a graph, or else `traced_slope`."""
+    own: Slope | None = getattr(loss, "slope", None)
+    return functools.partial(traced_slope, loss, device) if own is None else own
+
+
+def traced_slope(loss: Loss, device: str, z: Array, lam: float) -> tuple[float, float, Array]:
+    """Data and physics part at z (n,) and the gradient of data + λ·physics, by torch's graph."""
+    at = _tensor(z, device).requires_grad_()
+    data, physics = loss(at)
+    (gradient,) = torch.autograd.grad(data + lam * physics, at)
+    return float(data.detach()), float(physics.detach()), gradient.cpu().numpy().astype(float)
 
 
 def _projected(slope: Array, z: Array, lower: Array | None, upper: Array | None) -> Array:

@@ -19,6 +19,7 @@ from pikanid.approximators.mlp import MLP
 from pikanid.approximators.mlp_adjoint import adjoints
 from pikanid.objective.functional import Functional, Sites
 from pikanid.optimise.gauss_newton import Point
+from pikanid.optimise.gradient import traced_slope
 from pikanid.optimise.gradient_adjoint import AtOnce, Parts
 from pikanid.simulation.torch_field import TorchField
 
@@ -79,6 +80,13 @@ class TorchFunctional:
             data, physics = AtOnce.apply(self, z)
             return data, physics
         return self.traced(z)
+
+    def slope(self, z: Array, lam: float) -> tuple[float, float, Array]:
+        """Data and physics part at z (n,) and the gradient of data + λ·physics."""
+        if self._adjoints is None:
+            return traced_slope(self.traced, self.device, z, lam)
+        parts = self.parts(z)
+        return parts.data, parts.physics, self.packed(*parts.gradient(1.0, lam))
 
     def traced(self, z: Tensor) -> tuple[Tensor, Tensor]:
         """The same by a graph of every formula, on any device and for any order."""

@@ -14,6 +14,7 @@ from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
 from pikanid.optimise.bordered import Bordered, BorderedSystem, Evaluation, Solved
+from pikanid.optimise.box import met
 from pikanid.optimise.covariance import invert
 from pikanid.optimise.local_rows import Family, Layout
 
@@ -34,8 +35,7 @@ def network_covariance(system: BorderedSystem, at: Evaluation, noise: Noise
         LinAlgError: If Eq. (2) is not finite at the point.
     """
     problem, theta = system.functional.problem, at.point.theta
-    stuck = np.isclose(theta, problem.lower, rtol=1e-6, atol=0.0)
-    stuck |= np.isclose(theta, problem.upper, rtol=1e-6, atol=0.0)
+    stuck = met(theta, problem.lower, problem.upper)
     schur = np.zeros((theta.size, theta.size))
     responses: list[Array] = []
     effective = 0.0

@@ -61,10 +61,14 @@ def _number(expr: sp.Expr, table: dict[str, float]) -> float:
 
 @dataclass(frozen=True)
 class InitialState:
-    """The symbolic initial state as functions of p (P,) and the first inputs u0 (m,)."""
+    """The symbolic initial state as functions of p (P,) and the first inputs u0 (m,).
+
+    `driven` says whether u0 enters.
+    """
 
     value: Callable[[np.ndarray, np.ndarray], np.ndarray]
     jacobian: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    driven: bool
 
 
 @functools.lru_cache(maxsize=64)
@@ -74,7 +78,7 @@ def initial_state(model: Model) -> InitialState:
     start = [s.initial for s in model.states]
     if all(e.is_number for e in start):
         x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
-        return InitialState(lambda p, u: x0, lambda p, u: zero)
+        return InitialState(lambda p, u: x0, lambda p, u: zero, False)
     used = [k for k, q in enumerate(p_symbols) if any(e.has(q) for e in start)]
     value, slopes = _start_functions(tuple(start), tuple(p_symbols[k] for k in used),
                                      model.input_names)
@@ -90,7 +94,8 @@ def initial_state(model: Model) -> InitialState:
             full[:, used] = np.array(slopes(p[used], u), float).reshape(n, len(used))
         return full
 
-    return InitialState(at, jacobian)
+    driven = any(e.has(symbol(q)) for q in model.input_names for e in start)
+    return InitialState(at, jacobian, driven)
 
 
 # models that differ elsewhere begin alike

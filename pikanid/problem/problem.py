@@ -103,6 +103,8 @@ class Experiment:
 
     @functools.cached_property
     def _first_inputs(self) -> np.ndarray:
+        if not self._initial.driven:
+            return np.zeros(len(self.held))
         return self.inputs(np.array([self.t0]))[0]
 
     @property

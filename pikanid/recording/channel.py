@@ -148,6 +148,8 @@ class Channel:
         where = f"channel '{self.name}'"
         units.check(self.unit, where)
         units.check(unit, where)
+        if unit == self.unit:
+            return self
         if units.parse(self.unit) == units.parse(unit):
             return replace(self, unit=unit)
         if not units.convertible(self.unit, unit):

@@ -97,9 +97,14 @@ class Simulator:
             c.delay != 0 for c in self.model.outputs]
         return not any(delayed)
 
+    @functools.cached_property
+    def _fixed(self) -> bool:
+        """Whether parameters move no stop."""
+        return self._undelayed and not any(i.shaped for i in self.model.inputs)
+
     def grid(self, p: np.ndarray) -> Grid:
         """The stops at parameters p; kept, since only delays and paths change them."""
-        if self._undelayed and self.acting is self.model:
+        if self._fixed:
             return self._fixed_grid
         delay_in = delays(self.acting.inputs, self.model, p)
         delay_out = delays(self.model.outputs, self.model, p)

@@ -12,6 +12,7 @@ from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
 from pikanid.objective.shooting import Shooting
+from pikanid.optimise.box import met
 from pikanid.optimise.propagation import propagated
 from pikanid.problem.problem import Problem
 from pikanid.storage.version import __version__
@@ -34,9 +35,10 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     if adequacy.source != "given":
         r = shooting.residual(theta)
         scale = float(r @ r) / adequacy.dof
-    at_bound = np.isclose(theta, problem.lower, rtol=1e-6, atol=0) | np.isclose(
-        theta, problem.upper, rtol=1e-6, atol=0)
-    cov = covariance(jacobian, ~at_bound) * scale
+    at_bound = met(theta, problem.lower, problem.upper)
+    # all that follows takes JᵀJ alone, which R of J = QR holds in as few rows as there are columns
+    root: np.ndarray = np.asarray(np.linalg.qr(jacobian, mode="r"))
+    cov = covariance(root, ~at_bound) * scale
     fits, trajectories = evaluate(problem, shooting, theta, cov)
     notes = [*warnings]
     if not converged:
@@ -49,7 +51,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         notes.append("The model, simulated at these estimates, does not explain the recording: "
                      "they are biased or make up for missing physics, and standard errors mean "
                      "little.")
-    notes += identifiability_warnings(jacobian, problem.free, ~at_bound, uncertainty)
+    notes += identifiability_warnings(root, problem.free, ~at_bound, uncertainty)
     notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
     for e in problem.experiments:
         if e.unused:
@@ -68,7 +70,7 @@ def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray,
     the states.
     """
     fits, trajectories = [], []
-    responses = shooting.responses(theta, states=True)
+    responses = shooting.responses(theta)
     for r, (e, response) in enumerate(zip(problem.experiments, responses, strict=True)):
         trajectories.append(Trajectory(response.t, response.states))
         own = problem.columns(r)[1]

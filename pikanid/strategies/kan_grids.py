@@ -14,7 +14,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.approximators import Array
-from pikanid.approximators.kan import ShallowKAN, build_kan
+from pikanid.approximators.kan import ShallowKAN, planned_kan
 from pikanid.approximators.tables import gauss_nodes
 from pikanid.problem.chains import Chains
 from pikanid.problem.problem import Experiment, Problem
@@ -70,8 +70,8 @@ class KanGrid:
             switches = self._switches(e.breakpoints(), e.t0, e.t1)
             found.append(tuple(
                 ShallowKAN(
-                    build_kan([1, 1], grid=self.intervals, k=self.degree, base=self.base,
-                              grid_range=(e.t0, e.t1), seed=self.seed),
+                    planned_kan([1, 1], self.intervals, self.degree, (e.t0, e.t1), base=self.base,
+                                seed=self.seed),
                     kinks=switches, orders=range(m, self.degree + 1))
                 for m in chains.lengths))
         return found

@@ -21,6 +21,7 @@ from pikanid.estimate import Estimate
 from pikanid.formula.expressions import symbol
 from pikanid.model import Model
 from pikanid.objective.functional import Functional
+from pikanid.optimise.box import met
 from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.covariance import invert
 from pikanid.optimise.gauss_newton import BandedSystem, Point
@@ -202,8 +203,7 @@ def _covariance(functional: Functional, system: BandedSystem, point: Point, rho:
     """Noise carried through both steps: dθ = -(J_θᵀJ_θ)⁻¹ J_θᵀJ_c A⁻¹ B_dᵀ dε (residuals small)."""
     problem = functional.problem
     gram = _physics(functional, point).gram
-    stuck = np.isclose(point.theta, problem.lower, rtol=1e-6, atol=0.0) | np.isclose(
-        point.theta, problem.upper, rtol=1e-6, atol=0.0)
+    stuck = met(point.theta, problem.lower, problem.upper)
     stuck[list(_first_states(functional, point))] = True  # these are not regressed
     bread = invert(gram, ~stuck)
     coupled = BandedSystem(functional).linearise(point, 1.0)

@@ -160,7 +160,7 @@ def _simulated(problem: Problem, r: int) -> Array | None:
     shooting = Shooting(problem)
     try:
         shooting.choose_steps(problem.guess, "coarse")
-        response = shooting.responses(problem.guess, states=True)[r]
+        response = shooting.responses(problem.guess)[r]
     except errors.SimulationFailed:
         return None
     return response.states if response.finished else None

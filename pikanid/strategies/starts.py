@@ -22,13 +22,13 @@ def starting_points(problem: Problem, starts: int | Literal["auto"],
     """
     guess = problem.guess
     yield guess
+    count = (extra + 1 if starts == "auto" else starts) - 1
+    if protocol != "paper" and (count < 1 or len(guess) == 0):
+        return
     rng = np.random.default_rng(seed)
     if protocol == "paper":
         draws = rng.uniform(0.8, 1.2, (4, len(guess))) * guess
         yield from np.clip(draws, problem.lower, problem.upper)
-        return
-    count = (extra + 1 if starts == "auto" else starts) - 1
-    if count < 1 or len(guess) == 0:
         return
     from scipy.stats import qmc
 

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from pikanid.approximators.kan.build import build_kan, from_state
+from pikanid.approximators.kan.build import build_kan, from_state, planned_kan
 from pikanid.approximators.kan.curve import KanCurve
 from pikanid.approximators.kan.deep import DeepKAN
 from pikanid.approximators.kan.file import load, save
@@ -29,6 +29,7 @@ __all__ = [
     "build_kan",
     "from_state",
     "load",
+    "planned_kan",
     "plot",
     "prune",
     "refine",

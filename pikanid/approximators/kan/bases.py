@@ -6,7 +6,8 @@ from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
+
+from pikanid.approximators.bspline import BSpline
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -15,31 +16,17 @@ Index = NDArray[np.int64]
 def spline_rows(t: Array, knots: Array, degree: int, derivative: int = 0) -> tuple[Index, Array]:
     """First active basis function at ``t`` (M,), and its degree + 1 active values (M, degree + 1).
 
-    SciPy's design matrix of the lower degree on the trimmed knots, then
-    B'_{i,k} = k (B_{i,k-1}/(ξ_{i+k}-ξ_i) - B_{i+1,k-1}/(ξ_{i+k+1}-ξ_{i+1})).  Trimming keeps the
-    end of the grid the end of the base interval, so that the last time takes its limit from the
-    left; pykan's own recursion takes it from outside the grid, which falsifies the k-th derivative.
+    The last time takes its limit from the left, inside the grid; pykan's own recursion takes it
+    from outside, which falsifies the k-th derivative.
+
+    Raises:
+        ValueError: If a time leaves the grid.
 
     >>> first, values = spline_rows(np.array([0.5]), np.arange(-1.0, 3.0), degree=1)
     >>> first, values
     (array([0]), array([[0.5, 0.5]]))
     """
-    low = degree - derivative
-    if low < 0:
-        first, values = spline_rows(t, knots, degree)
-        return first, np.zeros_like(values)
-    trimmed = knots[derivative : knots.size - derivative]
-    matrix = BSpline.design_matrix(t, trimmed, low)
-    values = np.asarray(matrix.data).reshape(t.size, low + 1)
-    first = matrix.indices[:: low + 1].astype(np.int64) + derivative
-    for raised in range(low + 1, degree + 1):
-        index = first[:, None] + np.arange(raised)
-        scaled = raised * values / (knots[index + raised] - knots[index])
-        values = np.zeros((t.size, raised + 1))
-        values[:, 1:] = scaled
-        values[:, :-1] -= scaled
-        first = first - 1
-    return first, values
+    return BSpline(degree, knots).local(t, derivative)
 
 
 def power_blossom(knots: Array, degree: int, centre: float, order: int) -> Array:

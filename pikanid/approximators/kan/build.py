@@ -8,13 +8,13 @@ directory, touching a random generator or asking for another default dtype.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache, wraps
+from functools import lru_cache, partial, wraps
 from typing import Any, Literal
 
 import numpy as np
 
 from pikanid.approximators.kan.blank import blank_kan
-from pikanid.approximators.kan.plan import Array, Base, KanPlan, plan_kan
+from pikanid.approximators.kan.plan import Array, Base, KanPlan, PlannedKan, plan_kan
 from pikanid.approximators.kan.plot import plot
 from pikanid.approximators.kan.prune import prune
 from pikanid.approximators.kan.quiet import pykan_module, undisturbed
@@ -81,6 +81,21 @@ def build_kan(width: Sequence[int | Sequence[int]], grid: int | Sequence[int] = 
             write(kan.act_fun[layer].scale_base, generator.uniform(-bound, bound, shape[:2]))
     kan.cache_data = _default_batch(plan, device)
     return kan
+
+
+def planned_kan(width: Sequence[int | Sequence[int]], grid: int, k: int,
+                grid_range: Sequence[float], *, base: Base = "zero", seed: int = 0) -> PlannedKan:
+    """The plan of `build_kan`, which makes the model when it is asked for.
+
+    Raises:
+        BadSetting: If an argument cannot make a KAN, or torch or pykan is missing.
+
+    >>> planned_kan([1, 1], 10, 3, (0.0, 5.0)).make().act_fun[0].coef.shape
+    torch.Size([1, 1, 13])
+    """
+    plan = plan_kan(width, grid, k, grid_range, base, 2)
+    kan_class()  # whatever is missing is missed now
+    return PlannedKan(plan, partial(build_kan, width, grid, k, grid_range, base=base, seed=seed))
 
 
 def from_state(state: KanState, device: str = "cpu") -> Any:

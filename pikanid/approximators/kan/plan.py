@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,14 @@ class KanPlan:
     def intervals(self, layer: int) -> int:
         """Grid intervals G of a layer of edges."""
         return int(self.knots[layer].shape[1] - 2 * self.k - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedKan:
+    """A pykan model that is not made yet: pykan takes milliseconds, and most fits need its plan."""
+
+    plan: KanPlan
+    make: Callable[[], Any]
 
 
 def uniform_extended_knots(start: float, stop: float, intervals: int, k: int) -> Array:

@@ -10,16 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from pikanid import errors
-from pikanid.approximators.kan.bases import power_blossom, silu, spline_rows
+from pikanid.approximators import local_matrix
+from pikanid.approximators.kan.bases import Index, power_blossom, silu, spline_rows
 from pikanid.approximators.kan.blank import plan_of
 from pikanid.approximators.kan.kinks import Kink, KinkTable
-from pikanid.approximators.kan.plan import Array
+from pikanid.approximators.kan.plan import Array, PlannedKan
 from pikanid.approximators.kan.refine import change_of_knots, refine
 from pikanid.approximators.kan.tensors import read, write
 
@@ -36,7 +38,8 @@ class ShallowKAN:
     so that every row of the basis is short; with w_b the rows are full.
 
     Args:
-        kan: A pykan model of width [1, n] (`build_kan`).
+        kan: A pykan model of width [1, n] (`build_kan`), or one that is made when its coefficients
+            are asked for (`planned_kan`).
         kinks: Times of the kinks [s], inside the grid, or ready `Kink`s on the same knots.
         orders: Orders at each time, 1 to k, by default 2 and 3 (2 alone at k = 2); order k next to
             a knot is left out (it is a knot).
@@ -52,12 +55,12 @@ class ShallowKAN:
 
     def __init__(self, kan: Any, kinks: Sequence[float | Kink] = (),
                  orders: Sequence[int] | None = None) -> None:
-        plan = plan_of(kan)
+        plan = kan.plan if isinstance(kan, PlannedKan) else plan_of(kan)
         if plan.depth != 1 or plan.width[0] != (1, 0) or plan.width[1][1]:
             raise errors.BadSetting(errors.kan_not_shallow([list(layer) for layer in plan.width]))
-        if float(kan.symbolic_fun[0].mask.abs().sum()) > 0.0:
+        if not isinstance(kan, PlannedKan) and float(kan.symbolic_fun[0].mask.abs().sum()) > 0.0:
             raise errors.BadSetting(errors.kan_symbolic(0))
-        self.kan = kan
+        self._given = kan
         self.degree = plan.k
         self.knots = plan.knots[0][0]
         self.n_outputs = plan.nodes(1)
@@ -70,6 +73,11 @@ class ShallowKAN:
         self._jumps = np.zeros((len(self._kinks), self.n_outputs))
         for number, place in enumerate(self._kinks):
             self._jumps[number] = held.get(place, 0.0)
+
+    @cached_property
+    def kan(self) -> Any:
+        """The pykan model."""
+        return self._given.make() if isinstance(self._given, PlannedKan) else self._given
 
     @property
     def start(self) -> float:
@@ -113,6 +121,15 @@ class ShallowKAN:
         Raises:
             BadSetting: If a time leaves the grid.
         """
+        first, values = self.local(t, derivative)
+        return local_matrix(first, values, self.n_basis)
+
+    def local(self, t: Array, derivative: int = 0) -> tuple[Index, Array]:
+        """First basis function of each row of ``basis`` (M,), and the row's values (M, width).
+
+        Raises:
+            BadSetting: If a time leaves the grid.
+        """
         t = self._inside(t)
         active, values = spline_rows(t, self.knots, self.degree, derivative)
         rows = np.arange(t.size)[:, None]
@@ -124,10 +141,7 @@ class ShallowKAN:
         local[at, self._kink_at[kink] - first[at]] = heights / self._scale[kink]
         if self.has_base:
             local[:, -1] = silu(t, derivative)
-        width = self._row_width
-        indices = (first[:, None] + np.arange(width)).ravel()
-        pointers = width * np.arange(t.size + 1)
-        return sparse.csr_array((local.ravel(), indices, pointers), shape=(t.size, self.n_basis))
+        return first, local
 
     def values(self, t: Array, coefficients: Array, derivative: int = 0) -> Array:
         """The curve for coefficients (n_basis,) or (n_basis, outputs) at ``t`` (M,)."""
