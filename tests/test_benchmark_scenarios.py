@@ -118,7 +118,7 @@ def test_a_file_of_ones_own(tmp_path: Path) -> None:
 def test_the_readmes_scenario_can_be_read(tmp_path: Path) -> None:
     readme = (Path(__file__).resolve().parents[1] / "README.md").read_text("utf-8")
     (content,) = (b for b in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
-                  if b.startswith("[scenarios"))
+                  if b.startswith("# mine.toml"))
     (model,) = (b for b in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
                 if b.startswith("# my.toml"))
     (tmp_path / "my.toml").write_text(model, "utf-8")
