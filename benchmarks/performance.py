@@ -65,7 +65,7 @@ def _table(name: str, entries: list[dict[str, Any]]) -> list[str]:
     for e in sorted(entries, key=lambda e: e["stats"]["median"]):
         s, more = e["stats"], e["extra_info"]
         mark = " (reference)" if more.get("reference") else ""
-        cells = [_label(e["name"]) + mark, _time(s["median"]), _time(s["iqr"])]
+        cells = [_label(e["name"], name) + mark, _time(s["median"]), _time(s["iqr"])]
         cells += [f"{s['median'] / base:.3g}"] if base else []
         if published:
             then = more.get("published")
@@ -76,9 +76,10 @@ def _table(name: str, entries: list[dict[str, Any]]) -> list[str]:
     return [*lines, ""]
 
 
-def _label(name: str) -> str:
-    name = name.removeprefix("test_")
-    return name[name.index("[") + 1:-1] if "[" in name else name.replace("_", " ")
+def _label(name: str, group: str) -> str:
+    """What is timed: the parameter of the test, or the test where the group says the parameter."""
+    test, _, parameter = name.removeprefix("test_").rstrip("]").partition("[")
+    return parameter if parameter and not group.endswith(parameter) else test.replace("_", " ")
 
 
 def _time(seconds: float) -> str:

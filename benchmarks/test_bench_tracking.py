@@ -42,6 +42,7 @@ def seconds(work, path: Path) -> float:
 def test_track(benchmark, clip: Path) -> None:
     benchmark.group = f"Surface in {FRAMES} frames of 640 x 480, {clip.stem}"
     found = benchmark.pedantic(track, (clip,), warmup_rounds=1, rounds=3)
+    benchmark.extra_info["frames/s"] = round(FRAMES / benchmark.stats.stats.median)
     assert np.count_nonzero(np.isfinite(found.theta)) == FRAMES
 
 
@@ -49,6 +50,7 @@ def test_opencv_decoding_alone(benchmark, clip: Path) -> None:
     benchmark.group = f"Surface in {FRAMES} frames of 640 x 480, {clip.stem}"
     benchmark.extra_info["reference"] = True
     assert benchmark.pedantic(decode, (clip,), warmup_rounds=1, rounds=3) == FRAMES
+    benchmark.extra_info["frames/s"] = round(FRAMES / benchmark.stats.stats.median)
 
 
 def test_tracking_takes_few_times_as_long_as_decoding(clip: Path) -> None:

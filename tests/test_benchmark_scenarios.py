@@ -122,7 +122,7 @@ def test_the_readmes_scenario_can_be_read(tmp_path: Path) -> None:
     (model,) = (b for b in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
                 if b.startswith("# my.toml"))
     (tmp_path / "my.toml").write_text(model, "utf-8")
-    pk.excitation.two_pulse().write(tmp_path / "motion.csv")
+    pk.excitation.two_pulse().write(tmp_path / "run.csv")
     (tmp_path / "mine.toml").write_text(content, "utf-8")
     (one,) = files.chosen([str(tmp_path / "mine.toml")])
     assert one.true == {"l": 0.05} and one.fitted.values["l"] == 0.06
