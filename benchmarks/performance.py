@@ -16,6 +16,7 @@ import platform
 import sys
 import tempfile
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -62,10 +63,11 @@ def _table(name: str, entries: list[dict[str, Any]]) -> list[str]:
             *(["published", "published / ours"] if published else []), *notes]
     rule = "| --- |" + " ---: |" * (len(head) - 1)
     lines = [f"## {name}", "", "| " + " | ".join(head) + " |", rule]
-    for e in sorted(entries, key=lambda e: e["stats"]["median"]):
+    ordered = sorted(entries, key=lambda e: e["stats"]["median"])
+    for e, label in zip(ordered, _labels([e["name"] for e in ordered]), strict=True):
         s, more = e["stats"], e["extra_info"]
         mark = " (reference)" if more.get("reference") else ""
-        cells = [_label(e["name"], name) + mark, _time(s["median"]), _time(s["iqr"])]
+        cells = [label + mark, _time(s["median"]), _time(s["iqr"])]
         cells += [f"{s['median'] / base:.3g}"] if base else []
         if published:
             then = more.get("published")
@@ -76,10 +78,13 @@ def _table(name: str, entries: list[dict[str, Any]]) -> list[str]:
     return [*lines, ""]
 
 
-def _label(name: str, group: str) -> str:
-    """What is timed: the parameter of the test, or the test where the group says the parameter."""
-    test, _, parameter = name.removeprefix("test_").rstrip("]").partition("[")
-    return parameter if parameter and not group.endswith(parameter) else test.replace("_", " ")
+def _labels(names: Sequence[str]) -> list[str]:
+    """What is timed: parameters of the tests, or the tests where they share the parameter."""
+    tests, parameters = zip(*(n.removeprefix("test_").rstrip("]").split("[") if "[" in n
+                              else (n.removeprefix("test_"), "") for n in names), strict=True)
+    told = [p or t for t, p in zip(tests, parameters, strict=True)]
+    return [one.replace("_", " ") if one in tests else one
+            for one in (told if len({*told}) == len(told) else tests)]
 
 
 def _time(seconds: float) -> str:
