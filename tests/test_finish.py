@@ -220,3 +220,12 @@ def test_the_band_of_the_fit_covers_the_true_output_as_often_as_it_says() -> Non
     # samples of one fit go together: the spread over fits says how sure the mean is
     for found in (inside, new):
         assert abs(np.mean(found) - 0.95) < 3.5 * np.std(found) / np.sqrt(len(found))
+
+
+def test_errors_of_an_input_are_said_to_be_left_out() -> None:
+    model = pk.systems.sloshing()
+    run = pk.simulate(model, pk.excitation.two_pulse(), sigma=2e-3, seed=0)
+    rough = run.with_channels(replace(run["u_x"], sigma=0.1))
+    told = [any("u_x" in w and "positions" in w for w in pk.NLS().fit(model, given).warnings)
+            for given in (run, rough)]
+    assert told == [False, True]

@@ -41,7 +41,8 @@ class Experiment:
     """One recording as the model sees it.
 
     The simulation starts at `t0`, the first instant of any channel that the model uses; an input
-    has its first value before its record begins and its last one after it ends.
+    has its first value before its record begins and its last one after it ends.  `unused` are
+    channels that the model does not know, `uncertain` inputs with a sigma, which no residual has.
     """
 
     model: Model
@@ -51,6 +52,7 @@ class Experiment:
     held: tuple[HeldInput, ...]
     samples: tuple[Samples, ...]
     unused: tuple[str, ...] = ()
+    uncertain: tuple[str, ...] = ()
 
     @functools.cached_property
     def fixed_delays(self) -> np.ndarray:
@@ -227,8 +229,10 @@ def bind(model: Model, recording: Recording, need_outputs: bool = True) -> Exper
     ends = np.array([[t[0], t[-1]] for t in times])
     used = {*model.input_names, *model.output_names}
     unused = tuple(n for n in recording.channels if n not in used)
+    uncertain = tuple(n for n in model.input_names
+                      if n in recording.channels and recording[n].sigma is not None)
     return Experiment(model, recording.name, float(ends[:, 0].min()), float(ends[:, 1].max()),
-                      held, samples, unused)
+                      held, samples, unused, uncertain)
 
 
 def _held(recording: Recording, item: Input) -> HeldInput:

@@ -56,6 +56,10 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     for e in problem.experiments:
         if e.unused:
             notes.append(f"Recording '{e.name}': the model does not use {', '.join(e.unused)}.")
+        if e.uncertain:
+            notes.append(f"Recording '{e.name}': standard errors and the verdict leave out those "
+                         f"of {', '.join(e.uncertain)}; of an acceleration that was derived of a "
+                         "position, pikanid.bootstrap(..., positions=...) counts them.")
     return Estimate(
         model=problem.model, strategy=strategy, free=problem.free, theta=np.array(theta),
         covariance=cov, fits=fits, trajectories=trajectories, cost=total_cost(fits),
