@@ -64,7 +64,7 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
         return jacobian(z * scale) * scale
 
     def columns(z: np.ndarray) -> np.ndarray:
-        return np.ascontiguousarray(jacobian(z * scale).T) * scale[:, None]
+        return np.multiply(jacobian(z * scale).T, scale[:, None], order="C")
 
     def boxed(z: np.ndarray) -> np.ndarray:
         return residual(np.clip(z * scale, lower, upper))
