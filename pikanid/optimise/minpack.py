@@ -56,8 +56,9 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     def scaled(z: np.ndarray) -> np.ndarray:
         theta = z * scale
         # plain numbers: for a few parameters NumPy's overhead is a third of the optimiser's
-        if not all(low <= q <= high for q, (low, high) in zip(theta.tolist(), box, strict=True)):
-            return np.full(rows, REFUSED)
+        for q, (low, high) in zip(theta.tolist(), box, strict=True):
+            if not low <= q <= high:
+                return np.full(rows, REFUSED)
         return residual(theta)
 
     def slopes(z: np.ndarray) -> np.ndarray:

@@ -61,7 +61,8 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     wanted = [np.maximum(s.t - delay_out[s.output], t0) for s in experiment.samples]
     end = max([experiment.t1 if not wanted else t0, *(w[-1] for w in wanted if len(w))])
     pairs = list(zip(held, delay_in, strict=True))
-    breaks = [b[(b > t0) & (b < end)] for b in (h.switches + d for h, d in pairs)]
+    breaks = [b[(b > t0) & (b < end)]
+              for b in (h.switches + d for h, d in pairs if len(h.switches))]
     T = _merge(np.concatenate([[t0, end], *breaks, *wanted]), 1e-11 * max(end - t0, 1e-300))
     if len(T) < 2:
         T = np.array([t0, t0 + 1e-9])
@@ -73,6 +74,9 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     # column by column: reductions along rows as short as these take longer
     for j, (h, d) in enumerate(pairs):
         u, v = U[:, j], V[:, j]
+        if h.flat and not len(h.switches):  # one value for ever
+            u[:] = h.values[0]
+            continue
         u[:-1], u[-1:] = h.at(middle, d), h.at(T[-1:], d)
         ends = u[:-1]
         if not h.flat:
