@@ -133,17 +133,18 @@ class Shooting:
                 row += len(r.y)
         residual = predicted - self.y
         residual *= self.weights
-        # column by column: of rows as short as these, broadcasting would take longer
-        weighted = np.empty(jacobian.shape)
-        for k in range(jacobian.shape[1]):
-            np.multiply(jacobian[:, k], self.weights, out=weighted[:, k])
-        return residual, weighted
+        # column by column, as MINPACK takes it
+        weighted = np.empty(jacobian.shape[::-1])
+        np.multiply(jacobian.T, self.weights, out=weighted)
+        return residual, weighted.T
 
     def adequacy(self, theta: np.ndarray) -> Adequacy:
         """The χ² verdict at θ."""
-        r = self.residual(theta) / self.weights
-        ends = np.cumsum([len(d) for d in self.data])[:-1]
-        return judge(np.split(r, ends), self.known, self.data, len(theta), self.settings)
+        r, own, row = self.residual(theta) / self.weights, [], 0
+        for d in self.data:
+            own.append(r[row:row + len(d)])
+            row += len(d)
+        return judge(own, self.known, self.data, len(theta), self.settings)
 
     def explains(self, theta: np.ndarray) -> bool:
         """Whether the fit at θ is within the noise, so that no other start is needed."""

@@ -56,15 +56,16 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     def scaled(z: np.ndarray) -> np.ndarray:
         theta = z * scale
         # plain numbers: for a few parameters NumPy's overhead is a third of the optimiser's
-        if not all(low <= q <= high for q, (low, high) in zip(theta.tolist(), box, strict=True)):
-            return np.full(rows, REFUSED)
+        for q, (low, high) in zip(theta.tolist(), box, strict=True):
+            if not low <= q <= high:
+                return np.full(rows, REFUSED)
         return residual(theta)
 
     def slopes(z: np.ndarray) -> np.ndarray:
         return jacobian(z * scale) * scale
 
     def columns(z: np.ndarray) -> np.ndarray:
-        return np.ascontiguousarray(jacobian(z * scale).T) * scale[:, None]
+        return np.multiply(jacobian(z * scale).T, scale[:, None], order="C")
 
     def boxed(z: np.ndarray) -> np.ndarray:
         return residual(np.clip(z * scale, lower, upper))

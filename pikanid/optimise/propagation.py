@@ -17,7 +17,7 @@ def propagated(sensitivity: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """
     C = finite(covariance)
     return np.asarray(np.sqrt(np.maximum(
-        np.sum((sensitivity @ C) * sensitivity, axis=1), 0.0)))
+        np.einsum("ij,ij->i", sensitivity @ C, sensitivity), 0.0)))
 
 
 def finite(covariance: np.ndarray) -> np.ndarray:

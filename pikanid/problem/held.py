@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class HeldInput:
 
     def slope(self, t: np.ndarray, delay: float = 0.0) -> np.ndarray:
         """du/dt inside the intervals that hold the times t."""
-        if self.hold == "zero" or len(self.time) < 2:
+        if self.flat:
             return np.zeros(len(t))
         index = np.searchsorted(self.time, np.asarray(t) - delay, side="right") - 1
         inside = (index >= 0) & (index < len(self.time) - 1)
@@ -55,9 +55,14 @@ class HeldInput:
         change = np.abs(np.diff(slopes)) > 1e-9 * np.max(np.abs(slopes), initial=0.0)
         return self.time[change]
 
+    @property
+    def flat(self) -> bool:
+        """Whether it stands still between its switches."""
+        return self.hold == "zero" or len(self.time) < 2
+
     @functools.cached_property
     def _spacing(self) -> float:
-        return float(np.min(np.diff(self.time))) if len(self.time) > 1 else 1.0
+        return float(np.diff(self.time).min()) if len(self.time) > 1 else 1.0
 
 
 def held_input(name: str, time: np.ndarray, values: np.ndarray,
@@ -89,6 +94,7 @@ class PiecewiseInput:
     knots: np.ndarray
     values: np.ndarray
     slopes: np.ndarray
+    flat: ClassVar[bool] = False
 
     def at(self, t: np.ndarray, delay: float = 0.0, side: Side = "right") -> np.ndarray:
         """Values at times t (M,), `delay` seconds late."""

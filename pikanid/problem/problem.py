@@ -226,13 +226,12 @@ def bind(model: Model, recording: Recording, need_outputs: bool = True) -> Exper
     times = [s.t for s in samples] + [h.time for h in held if h.name in recording.channels]
     if not samples:
         times.append(recording.t)
-    ends = np.array([[t[0], t[-1]] for t in times])
     used = {*model.input_names, *model.output_names}
     unused = tuple(n for n in recording.channels if n not in used)
     uncertain = tuple(n for n in model.input_names
                       if n in recording.channels and recording[n].sigma is not None)
-    return Experiment(model, recording.name, float(ends[:, 0].min()), float(ends[:, 1].max()),
-                      held, samples, unused, uncertain)
+    return Experiment(model, recording.name, min(float(t[0]) for t in times),
+                      max(float(t[-1]) for t in times), held, samples, unused, uncertain)
 
 
 def _held(recording: Recording, item: Input) -> HeldInput:
@@ -247,8 +246,10 @@ def _samples(recording: Recording, output: Output, index: int) -> Samples:
     channel = recording.as_output(output.name, _unit(recording, output))
     seen = np.isfinite(channel.values)
     sigma = output.sigma if channel.sigma is None else channel.sigma
-    spread = None if sigma is None else np.broadcast_to(sigma, channel.values.shape)[seen]
-    return Samples(index, channel.time[seen], channel.values[seen], spread)
+    t = channel.time[seen]
+    spread = (None if sigma is None else sigma[seen] if isinstance(sigma, np.ndarray)
+              else np.full(len(t), sigma))
+    return Samples(index, t, channel.values[seen], spread)
 
 
 def _unit(recording: Recording, item: Input | Output) -> str | None:

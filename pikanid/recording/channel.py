@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, fields, replace
 from typing import Literal, get_args
 
@@ -125,7 +126,7 @@ class Channel:
         steps = np.diff(self.time)
         return bool(np.all(np.abs(steps - self.interval) <= 1e-3 * self.interval))
 
-    @property
+    @functools.cached_property
     def changes_at(self) -> float:
         """Time [s] of the first sample that differs from those before it; infinite if none does.
 
@@ -135,6 +136,19 @@ class Channel:
         seen = np.flatnonzero(np.isfinite(self.values))
         other = seen[self.values[seen] != self.values[seen[:1]]] if seen.size else seen
         return float(self.time[other[0]]) if other.size else float("inf")
+
+    # looked at once, since a channel never changes and every fit asks
+
+    @functools.cached_property
+    def _rises(self) -> bool:
+        """Whether all times are numbers, each later than the one before."""
+        usable = bool(np.all(np.abs(self.time) <= LARGEST))
+        return usable and bool(np.all(np.diff(self.time) > 0))
+
+    @functools.cached_property
+    def _whole(self) -> bool:
+        """Whether every value is a number that can be squared."""
+        return bool(np.all(np.abs(self.values) <= LARGEST))
 
     def converted(self, unit: str) -> Channel:
         """The same signal in another unit; its sigma goes along.
@@ -163,6 +177,8 @@ def check_times(channel: Channel, where: str) -> None:
     """Raise BadRecording unless there are two or more finite, strictly rising times."""
     if len(channel) < 2:
         raise errors.BadRecording(errors.too_short(where, channel.name, len(channel)))
+    if channel._rises:
+        return
     time = channel.time
     bad = np.flatnonzero(~(np.abs(time) <= LARGEST))
     if bad.size:
@@ -176,6 +192,8 @@ def check_times(channel: Channel, where: str) -> None:
 
 def check_values(channel: Channel, where: str, missing_allowed: bool) -> None:
     """Raise BadRecording on infinite or absurd values and on NaN where none may be."""
+    if channel._whole and len(channel) > 1:
+        return
     values = channel.values
     with np.errstate(invalid="ignore"):
         wild = np.flatnonzero(np.abs(values) > LARGEST)

@@ -17,6 +17,7 @@ from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
 from pikanid.simulation.printing import printed
+from pikanid.simulation.spline_lines import Splines
 
 HEADER = '''"""Generated from a model; not meant to be edited."""
 import math
@@ -39,6 +40,8 @@ def inlined(function):
 
 
 '''
+
+Partials = list[tuple[int, str]]  # of an expression: index of what by, local name of the value
 
 # called once per stage or stop: pasted into the caller, most of the time of small models
 HOT = ("variational", "observe", "observe_sensitivity")
@@ -80,7 +83,7 @@ class Writer:
                inline_switches: bool = False) -> str:
         """A function that fills `out` with the values of `exprs`."""
         own = self.own_switches(inline_switches)
-        splines = Splines(self, [*exprs, *own])
+        splines = Splines(self.model, [*exprs, *own])
         body = self.unpack([*exprs, *splines.arguments, *own]) + self.prelude(splines, own)
         body += self.block([(f"{out}[{i}]", e) for i, e in enumerate(exprs)], splines)
         return _function(name, arguments, body)
@@ -93,25 +96,8 @@ class Writer:
         `fp` (rows, P + 1) is scratch whose last column stays zero: the "parameter" of an initial
         state.  `values` names an array for the expressions themselves.
         """
-        by_x, by_u, targets = [], [], list(more)
-        for r, e in enumerate(exprs):
-            if values:
-                targets.append((f"{values}[{r}]", e))
-            by_x.append(self._partials(e, self.x, f"_x{r}", targets))
-            by_u.append([] if self.still else self._partials(e, self.u, f"_u{r}", targets))
-            for k, q in enumerate(self.p):
-                derivative = e.diff(q)
-                if derivative != 0:
-                    targets.append((f"fp[{r}, {k}]", derivative))
-        own = self.own_switches(inline_switches)
-        used = [*(e for _, e in targets), *own]
-        splines = Splines(self, used)
-        edge_targets, clear, edge_lines = splines.coefficient_columns(exprs)
-        # a coefficient inside the argument of another spline needs that one's derivative as well
-        splines = Splines(self, [*used, *(e for _, e in edge_targets)])
-        body = self.unpack([*used, *splines.arguments, *(e for _, e in edge_targets)])
-        body += self.prelude(splines, own) + clear
-        body += self.block([*targets, *edge_targets], splines) + edge_lines
+        body, by_x, by_u = self.linearised(
+            exprs, f"{values}[{{}}]" if values else None, more, inline_switches)
         body += ["for a in range(len(act)):", "    k = act[a]"]
         for r in range(len(exprs)):
             terms = [f"{n}*S[a, {j}]" if n != "1" else f"S[a, {j}]" for j, n in by_x[r]]
@@ -120,8 +106,36 @@ class Writer:
             body.append(f"    {place} = " + " + ".join([*terms, f"fp[{r}, k]"]))
         return _function(name, arguments, body)
 
+    def linearised(self, exprs: Sequence[sp.Expr], value: str | None,
+                   more: Sequence[tuple[str, sp.Expr]] = (), inline_switches: bool = False
+                   ) -> tuple[list[str], list[Partials], list[Partials]]:
+        """Lines that assign the partial derivatives of `exprs`, those by parameters to `fp`.
+
+        With the lines come, for each expression, indices and local names of those by states and by
+        inputs.  `value` is a place such as ``f[{}]`` for the expressions themselves.
+        """
+        by_x, by_u, targets = [], [], list(more)
+        for r, e in enumerate(exprs):
+            if value:
+                targets.append((value.format(r), e))
+            by_x.append(self._partials(e, self.x, f"_x{r}", targets))
+            by_u.append([] if self.still else self._partials(e, self.u, f"_u{r}", targets))
+            for k, q in enumerate(self.p):
+                derivative = e.diff(q)
+                if derivative != 0:
+                    targets.append((f"fp[{r}, {k}]", derivative))
+        own = self.own_switches(inline_switches)
+        used = [*(e for _, e in targets), *own]
+        splines = Splines(self.model, used)
+        edge_targets, clear, edge_lines = splines.coefficient_columns(exprs)
+        # a coefficient inside the argument of another spline needs that one's derivative as well
+        splines = Splines(self.model, [*used, *(e for _, e in edge_targets)])
+        body = self.unpack([*used, *splines.arguments, *(e for _, e in edge_targets)])
+        body += self.prelude(splines, own) + clear
+        return body + self.block([*targets, *edge_targets], splines) + edge_lines, by_x, by_u
+
     def _partials(self, e: sp.Expr, symbols: Sequence[sp.Symbol], prefix: str,
-                  targets: list[tuple[str, sp.Expr]]) -> list[tuple[int, str]]:
+                  targets: list[tuple[str, sp.Expr]]) -> Partials:
         found = []
         for j, q in enumerate(symbols):
             derivative = e.diff(q)
@@ -156,71 +170,6 @@ class Writer:
                 lines += self._switches_for([g], pending, splines)
                 lines.append(f"{printed(q)} = sgn({printed(splines.swap(g))})")
         return lines
-
-
-class Splines:
-    """The spline evaluations that a function needs: basis values and sums, once per argument."""
-
-    def __init__(self, writer: Writer, exprs: Sequence[sp.Expr]):
-        self.writer = writer
-        atoms = set().union(*(e.atoms(spline_value) for e in exprs)) if exprs else set()
-        keys = {(int(a.args[0]), a.args[2]) for a in atoms}
-        self.keys = sorted(keys, key=lambda key: (key[1].count_ops(), sp.default_sort_key(key[1])))
-        self.orders = {
-            key: sorted({0} | {int(a.args[1]) for a in atoms
-                               if (int(a.args[0]), a.args[2]) == key})
-            for key in self.keys}
-        self.arguments = [z for _, z in self.keys]
-
-    def swap(self, expr: sp.Expr) -> sp.Expr:
-        """The expression with spline evaluations replaced by the local names that hold them."""
-        table = {
-            spline_value(i, o, z): sp.Symbol(f"_e{n}_{o}", real=True)
-            for n, (i, z) in enumerate(self.keys) for o in self.orders[(i, z)]}
-        return expr.subs(table) if table else expr
-
-    def lines(self, n: int) -> list[str]:
-        """Lines that evaluate the n-th basis and its sums."""
-        i, z = self.keys[n]
-        spline = self.writer.model.splines[i]
-        d, first = spline.degree, self._offset(i)
-        out = [f"_z{n} = {printed(self.swap(z))}"]
-        for o in self.orders[(i, z)]:
-            out += [f"_b{n}_{o} = b[{n * 3 + o}, :{d + 1}]",
-                    f"_k{n} = {first} + spline_basis(KNOTS_{i}, {d}, _z{n}, {o}, _b{n}_{o})",
-                    f"_e{n}_{o} = 0.0",
-                    f"for r in range({d + 1}):",
-                    f"    _e{n}_{o} += _b{n}_{o}[r] * p[_k{n} + r]"]
-        return out
-
-    def coefficient_columns(
-        self, exprs: Sequence[sp.Expr]
-    ) -> tuple[list[tuple[str, sp.Expr]], list[str], list[str]]:
-        """∂e/∂c_k for the coefficients: needed derivatives, lines that clear and that add."""
-        targets: list[tuple[str, sp.Expr]] = []
-        clear: list[str] = []
-        lines: list[str] = []
-        for r, e in enumerate(exprs):
-            for i in {i for i, _ in self.keys}:
-                first, size = self._offset(i), self.writer.model.splines[i].size
-                if e.atoms(spline_value):
-                    clear.append(f"fp[{r}, {first}:{first + size}] = 0.0")
-            for n, (i, z) in enumerate(self.keys):
-                for o in self.orders[(i, z)]:
-                    handle = sp.Dummy(real=True)
-                    derivative = e.subs(spline_value(i, o, z), handle).diff(handle)
-                    if derivative == 0:
-                        continue
-                    derivative = derivative.subs(handle, spline_value(i, o, z))
-                    targets.append((f"_w{r}_{n}_{o}", derivative))
-                    d = self.writer.model.splines[i].degree
-                    lines += [f"for r in range({d + 1}):",
-                              f"    fp[{r}, _k{n} + r] += _w{r}_{n}_{o} * _b{n}_{o}[r]"]
-        return targets, clear, lines
-
-    def _offset(self, i: int) -> int:
-        first = self.writer.model.splines[i].coefficient_names[0]
-        return self.writer.model.parameter_names.index(first)
 
 
 def _function(name: str, arguments: str, body: Sequence[str]) -> str:
@@ -290,6 +239,6 @@ def _slopes(w: Writer, name: str, targets: Sequence[tuple[str, sp.Expr]], argume
             inline_switches: bool = False) -> str:
     own = w.own_switches(inline_switches and bool(targets))
     used = [*(e for _, e in targets), *own]
-    splines = Splines(w, used)
+    splines = Splines(w.model, used)
     body = w.unpack([*used, *splines.arguments]) + w.prelude(splines, own)
     return _function(name, arguments, body + w.block(targets, splines))

@@ -64,12 +64,15 @@ def generated(name: str, source: str) -> ModuleType:
 
 
 def _source(model: Model, method: Method) -> str:
-    from pikanid.simulation.codegen import generate
+    from pikanid.simulation.codegen import Writer, generate
+    from pikanid.simulation.smooth_step import step_functions
 
     _LOG.info("compiling %s, once", model.name)
     source, lowered = generate(model)
     kind = "hybrid" if lowered.n_dynamic else "smooth"
     step = "rk4" if method == "explicit" else "sdirk"
+    if (kind, step) == ("smooth", "rk4"):
+        source, step = source + step_functions(Writer(model, lowered)), "rk4_smooth"
     pieces = [f"field_{kind}", step, f"drive_{kind}", "integrate"]
     return source + "\n\n".join(kernel_text(p) for p in pieces)
 
@@ -83,8 +86,9 @@ def _name(model: Model, method: Method) -> str:
     """Of the source: from the formulas, the spline functions in them, and the generator."""
     splines = tuple((s.name, s.degree, s.knots) for s in model.splines)
     kernels = sorted(k for k in (_HERE / "kernels").glob("*.py") if not k.name.startswith("tape"))
-    generators = (_HERE / f"{n}.py" for n in
-                  ("compiled", "codegen", "printing", "lowering", "support", "layout"))
+    generators = (_HERE / f"{n}.py" for n in (
+        "compiled", "codegen", "smooth_step", "spline_lines", "printing", "lowering", "support",
+        "layout"))
     return named(
         "model", method, model.state_names, model.input_names, model.parameter_names,
         [to_text(e) for e in model.equations.values()],

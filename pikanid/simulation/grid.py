@@ -61,48 +61,55 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     wanted = [np.maximum(s.t - delay_out[s.output], t0) for s in experiment.samples]
     end = max([experiment.t1 if not wanted else t0, *(w[-1] for w in wanted if len(w))])
     pairs = list(zip(held, delay_in, strict=True))
-    breaks = [b[(b > t0) & (b < end)] for b in (h.switches + d for h, d in pairs)]
+    breaks = [b[(b > t0) & (b < end)]
+              for b in (h.switches + d for h, d in pairs if len(h.switches))]
     T = _merge(np.concatenate([[t0, end], *breaks, *wanted]), 1e-11 * max(end - t0, 1e-300))
     if len(T) < 2:
         T = np.array([t0, t0 + 1e-9])
-    middle = 0.5 * (T[1:] + T[:-1])
-    V = _columns([h.slope(middle, d) for h, d in pairs], len(middle))
-    U = _columns([h.at(middle, d) for h, d in pairs], len(middle)) - V * (middle - T[:-1])[:, None]
+    middle, gaps = 0.5 * (T[1:] + T[:-1]), np.diff(T)
     # nothing is integrated beyond the last stop, but an output may show the inputs there
-    U = np.vstack([U, _columns([h.at(T[-1:], d) for h, d in pairs], 1)])
-    V = np.vstack([V, V[-1:]])
-    ends = U[:-1] + V[:-1] * np.diff(T)[:, None]
-    jumps = np.ones(len(T), bool)
-    jumps[1:] = _differ(U[1:], ends, U) | _differ(V[1:], V[:-1], V)
+    U, V = np.empty((len(T), len(pairs))), np.zeros((len(T), len(pairs)))
+    jumps = np.zeros(len(T), bool)
+    jumps[0] = True
+    # column by column: reductions along rows as short as these take longer
+    for j, (h, d) in enumerate(pairs):
+        u, v = U[:, j], V[:, j]
+        if h.flat and not len(h.switches):  # one value for ever
+            u[:] = h.values[0]
+            continue
+        u[:-1], u[-1:] = h.at(middle, d), h.at(T[-1:], d)
+        ends = u[:-1]
+        if not h.flat:
+            v[:-1] = h.slope(middle, d)
+            v[-1] = v[-2]
+            u[:-1] -= v[:-1] * (middle - T[:-1])
+            ends = u[:-1] + v[:-1] * gaps
+            jumps[1:] |= _differ(v[1:], v[:-1], v)
+        jumps[1:] |= _differ(u[1:], ends, u)
     return Grid(T, U, V, jumps, _seen(T, experiment, wanted), sum(map(len, wanted)))
 
 
 def _differ(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Rows (L,) in which a and b (L, m) differ by more than rounding."""
-    found = np.zeros(len(a), bool)
-    # column by column: reductions along rows as short as these take longer
-    for j in range(a.shape[1]):
-        found |= np.abs(a[:, j] - b[:, j]) > 1e-9 * np.abs(scale[:, j]).max(initial=0.0)
-    return found
-
-
-def _columns(columns: list[np.ndarray], count: int) -> np.ndarray:
-    return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+    """Where a and b (L,) differ by more than rounding."""
+    return np.asarray(np.abs(a - b) > 1e-9 * np.abs(scale).max(initial=0.0))
 
 
 def _merge(times: np.ndarray, gap: float) -> np.ndarray:
     """Sorted times; those closer than `gap`, which differ by rounding only, become one."""
     times = np.sort(times)
-    return times[np.concatenate([[True], np.diff(times) > gap])]
+    apart = np.ones(len(times), bool)
+    np.greater(np.diff(times), gap, out=apart[1:])
+    return times[apart]
 
 
 def _seen(T: np.ndarray, experiment: Experiment, wanted: list[np.ndarray]) -> Seen:
     outputs = [np.full(len(w), s.output) for s, w in zip(experiment.samples, wanted, strict=True)]
     times = np.concatenate([np.empty(0), *wanted])
-    stop = np.clip(np.searchsorted(T, times), 1, len(T) - 1)
+    stop = np.searchsorted(T, times).clip(1, len(T) - 1)
     stop -= (times - T[stop - 1]) < (T[stop] - times)
     order = np.argsort(stop, kind="stable")
-    first = np.searchsorted(stop[order], np.arange(len(T) + 1))
-    output = np.concatenate([np.empty(0, np.int64), *outputs]).astype(np.int64)
-    return Seen(first.astype(np.int64), output[order], order.astype(np.int64),
+    first = np.zeros(len(T) + 1, np.int64)
+    np.cumsum(np.bincount(stop, minlength=len(T)), out=first[1:])
+    output = np.concatenate([np.empty(0, np.int64), *outputs]).astype(np.int64, copy=False)
+    return Seen(first, output[order], order.astype(np.int64, copy=False),
                 times[order] > experiment.t0)

@@ -156,10 +156,8 @@ class Simulator:
 
     def _moved(self, p: np.ndarray, active: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """∂delay/∂θ of inputs and outputs (channels, A), and whether any is not zero."""
-        if self._undelayed or not np.any(self._delayed_by[active]):
-            A = len(active)
-            return (np.zeros((len(self.acting.inputs), A)), np.zeros((len(self.model.outputs), A)),
-                    False)
+        if self._undelayed or not self._delayed_by[active].any():
+            return (*_zeros(len(self.acting.inputs), len(self.model.outputs), len(active)), False)
         both = (delay_jacobian(c, self.model, p)[:, active]
                 for c in (self.acting.inputs, self.model.outputs))
         dtau_in, dtau_out = map(np.ascontiguousarray, both)
@@ -253,6 +251,12 @@ class Simulator:
         finite = response.finished and bool(np.isfinite(response.states).all())
         return Response(response.states.ravel(), response.sensitivity, response.t,
                         response.states, finite, response.stopped_at, response.status)
+
+
+@functools.lru_cache(maxsize=64)
+def _zeros(inputs: int, outputs: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of delays that no parameter moves: kernels only read them, so that one pair serves all."""
+    return np.zeros((inputs, columns)), np.zeros((outputs, columns))
 
 
 def _largest(y: np.ndarray, unit: np.ndarray | float) -> float:

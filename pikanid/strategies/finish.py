@@ -16,11 +16,7 @@ from pikanid.optimise.box import met
 from pikanid.optimise.propagation import propagated
 from pikanid.problem.problem import Problem
 from pikanid.storage.version import __version__
-from pikanid.uncertainty.information import (
-    covariance,
-    identifiability_warnings,
-    undetermined_warnings,
-)
+from pikanid.uncertainty.information import Directions, undetermined_warnings
 from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 
 
@@ -36,9 +32,8 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         r = shooting.residual(theta)
         scale = float(r @ r) / adequacy.dof
     at_bound = met(theta, problem.lower, problem.upper)
-    # all that follows takes JᵀJ alone, which R of J = QR holds in as few rows as there are columns
-    root: np.ndarray = np.asarray(np.linalg.qr(jacobian, mode="r"))
-    cov = covariance(root, ~at_bound) * scale
+    shown = Directions.of(jacobian, ~at_bound)
+    cov = shown.covariance * scale
     fits, trajectories = evaluate(problem, shooting, theta, cov)
     notes = [*warnings]
     if not converged:
@@ -51,7 +46,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         notes.append("The model, simulated at these estimates, does not explain the recording: "
                      "they are biased or make up for missing physics, and standard errors mean "
                      "little.")
-    notes += identifiability_warnings(root, problem.free, ~at_bound, uncertainty)
+    notes += shown.warnings(problem.free, uncertainty)
     notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
     for e in problem.experiments:
         if e.unused:

@@ -12,50 +12,81 @@ from pikanid.problem.problem import FreeParameter
 from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 
 
+@dataclass(frozen=True)
+class Directions:
+    """What a Jacobian of standardised residuals shows of n parameters, k of them estimated.
+
+    Attributes:
+        n: Columns of the Jacobian.
+        inside: (k,) which of them are estimated, and not held at a bound.
+        norms: (k,) norms of these columns.
+        seen: (k,) which of these are not zero.
+        sizes, axes: (s,) and (s, seen) singular values, falling, and right singular vectors of the
+            columns that are seen, scaled to norm 1.
+    """
+
+    n: int
+    inside: np.ndarray
+    norms: np.ndarray
+    seen: np.ndarray
+    sizes: np.ndarray
+    axes: np.ndarray
+
+    @staticmethod
+    def of(jacobian: np.ndarray, estimated: np.ndarray) -> Directions:
+        """Those of a Jacobian (rows, n) and the parameters that are `estimated` (n,)."""
+        inside = np.flatnonzero(estimated)
+        # R of J = QR has the same, in as few rows as there are columns
+        J: np.ndarray = np.asarray(np.linalg.qr(jacobian[:, inside], mode="r"))
+        norms = np.sqrt((J * J).sum(axis=0))
+        seen = norms > 0
+        s, vt = np.empty(0), np.empty((0, 0))
+        if seen.any():
+            _, s, vt = np.linalg.svd(J[:, seen] / norms[seen], full_matrices=False)
+        return Directions(jacobian.shape[1], inside, norms, seen, s, vt)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(JᵀJ)⁻¹ (n, n), see `covariance`."""
+        s, norms = self.sizes, self.norms[self.seen]
+        block = np.zeros((len(self.inside), len(self.inside)))
+        if len(s):
+            inner = (self.axes.T / np.maximum(s, s[0] * 1e-12) ** 2) @ self.axes
+            block[np.ix_(self.seen, self.seen)] = inner / (norms[:, None] * norms)
+        block[~self.seen, ~self.seen] = np.inf
+        result = np.full((self.n, self.n), np.nan)
+        result[self.inside[:, None], self.inside] = block
+        return result
+
+    def warnings(self, free: Sequence[FreeParameter], settings: UncertaintySettings) -> list[str]:
+        """Sentences about what the data do not determine, see `identifiability_warnings`."""
+        names = [free[k].label for k in self.inside]
+        pairs = list(zip(names, self.seen, strict=True))
+        notes = [errors.no_influence(n) for n, seen in pairs if not seen]
+        s, last = self.sizes, self.axes[-1:].ravel()
+        if len(s) > 1 and s[-1] < s[0] / settings.condition:
+            visible = [n for n, seen in pairs if seen]
+            weights = last / np.max(np.abs(last))
+            parts = [f"{w:+.2g}·{n}"
+                     for w, n in zip(weights, visible, strict=True) if abs(w) > 0.1]
+            notes.append(errors.unidentifiable(" ".join(parts), s[0] / max(s[-1], 1e-300)))
+        return notes
+
+
 def covariance(jacobian: np.ndarray, estimated: np.ndarray) -> np.ndarray:
     """(JᵀJ)⁻¹ (n, n) of standardised residuals, by singular values of the scaled Jacobian.
 
     Directions that the data do not see get an infinite variance; parameters that are not
     `estimated` (n,) (held at a bound) get NaN.
     """
-    n = jacobian.shape[1]
-    result = np.full((n, n), np.nan)
-    inside = np.flatnonzero(estimated)
-    J: np.ndarray = np.asarray(np.linalg.qr(jacobian[:, inside], mode="r"))
-    norms = np.linalg.norm(J, axis=0) if len(inside) else np.empty(0)
-    seen = norms > 0
-    block = np.zeros((len(inside), len(inside)))
-    if seen.any():
-        _, s, vt = np.linalg.svd(J[:, seen] / norms[seen], full_matrices=False)
-        good = s > s[0] * 1e-12
-        inner = (vt[good].T / s[good] ** 2) @ vt[good] if good.all() else (
-            (vt.T / np.where(good, s, s[0] * 1e-12) ** 2) @ vt)
-        block[np.ix_(seen, seen)] = inner / np.outer(norms[seen], norms[seen])
-    block[~seen, ~seen] = np.inf
-    result[np.ix_(inside, inside)] = block
-    return result
+    return Directions.of(jacobian, estimated).covariance
 
 
 def identifiability_warnings(jacobian: np.ndarray, free: Sequence[FreeParameter],
                              estimated: np.ndarray, settings: UncertaintySettings = USUAL
                              ) -> list[str]:
     """Sentences about parameters, or combinations of them, that the data do not determine."""
-    names = [f.label for f, e in zip(free, estimated, strict=True) if e]
-    if not names:
-        return []
-    J: np.ndarray = np.asarray(np.linalg.qr(jacobian[:, estimated], mode="r"))
-    norms = np.linalg.norm(J, axis=0)
-    notes = [errors.no_influence(n) for n, size in zip(names, norms, strict=True) if size == 0]
-    seen = norms > 0
-    if seen.sum() < 2:
-        return notes
-    _, s, vt = np.linalg.svd(J[:, seen] / norms[seen], full_matrices=False)
-    if s[-1] < s[0] / settings.condition:
-        visible = [n for n, k in zip(names, seen, strict=True) if k]
-        weights = vt[-1] / np.max(np.abs(vt[-1]))
-        parts = [f"{w:+.2g}·{n}" for w, n in zip(weights, visible, strict=True) if abs(w) > 0.1]
-        notes.append(errors.unidentifiable(" ".join(parts), s[0] / max(s[-1], 1e-300)))
-    return notes
+    return Directions.of(jacobian, estimated).warnings(free, settings)
 
 
 def undetermined_warnings(free: Sequence[FreeParameter], theta: np.ndarray,
