@@ -41,8 +41,8 @@ COUNTED = ("right", "wrong", "wrong_but_knowable", "false_alarm", "missed", "sur
            "parameters_within_3_std", "held_out_within_1.1_noise")
 INTRODUCTION = f"""# Diagnoses of other rigs
 
-Effects concealed by `pikanid conceal --model` in {len(RIGS)} rigs (benchmarks/rigs.py), simulated
-by SciPy, {CASES} cases at each noise: nothing, one effect, two, or a law of no catalogue. What the
+Effects concealed by `pikanid conceal --model` in other rigs (benchmarks/rigs.py), simulated by
+SciPy, {CASES} cases at each noise: nothing, one effect, two, or a law of no catalogue. What the
 words in the tables mean is said in [diagnosis.md](diagnosis.md); *place* is the equation, or the
 channel, of right answers. Intervals are Wilson's at 95 %."""
 
@@ -86,7 +86,8 @@ def page(found: Mapping[str, Any]) -> str:
     sets = {(name, one["noise"]): [_trial(row) for row in one["trials"]]
             for name, rig in found.items() for one in rig["sets"]}
     every = [one for some in sets.values() for one in some]
-    parts = [INTRODUCTION, "## Together", _shares(every).to_markdown(),
+    rest = ", ".join(name for name in RIGS if name not in found)
+    parts = [INTRODUCTION, *([f"Not run so far: {rest}."] if rest else []), "## Together", _shares(every).to_markdown(),
              _each(sets).to_markdown(), "## Wrong answers", _wrong(sets)]
     for name, rig in found.items():
         parts.append(f"## {name}\n\n{rig['made']}.")
