@@ -87,8 +87,9 @@ def page(found: Mapping[str, Any]) -> str:
             for name, rig in found.items() for one in rig["sets"]}
     every = [one for some in sets.values() for one in some]
     rest = ", ".join(name for name in RIGS if name not in found)
-    parts = [INTRODUCTION, *([f"Not run so far: {rest}."] if rest else []), "## Together", _shares(every).to_markdown(),
-             _each(sets).to_markdown(), "## Wrong answers", _wrong(sets)]
+    parts = [INTRODUCTION, *([f"Not run so far: {rest}."] if rest else []), "## Together",
+             _shares(every).to_markdown(), _each(sets).to_markdown(), "## Wrong answers",
+             _wrong(sets)]
     for name, rig in found.items():
         parts.append(f"## {name}\n\n{rig['made']}.")
         for one in rig["sets"]:
