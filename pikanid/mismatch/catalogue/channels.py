@@ -15,6 +15,7 @@ from pikanid.problem.held import PIECES, HeldInput, acting
 
 INF = float("inf")
 # of a limit: on both sides alike, or on one; what it is called
+VISITS = 2  # limit: of a level, from which on a limit on one side is one
 SIDES = {"": "saturation of the", "above": "an upper limit of the", "below": "a lower limit of the"}
 
 
@@ -100,7 +101,8 @@ def _clipped(x: str, limit: str, side: str) -> str:
 
 def _cut(x: np.ndarray, side: str, shares: Sequence[float]) -> list[tuple[float, np.ndarray]]:
     """Levels of a limit, and a channel (L,) cut off there: by shares of its amplitude, or on one
-    side of its range; none where it rests.
+    side of its range; none where it rests.  On one side it has to go there and come back twice: what
+    happens once, or where a motion begins or ends, could be anything.
     """
     low, high = float(x.min(initial=0.0)), float(x.max(initial=0.0))
     if not side:
@@ -109,8 +111,20 @@ def _cut(x: np.ndarray, side: str, shares: Sequence[float]) -> list[tuple[float,
             top) else []
     sign = 1.0 if side == "above" else -1.0
     top, span = float((sign * x).max(initial=-INF)), float(np.ptp(x)) if len(x) else 0.0
-    return [(top - s * span, sign * np.minimum(sign * x, top - s * span)) for s in shares] if (
-        span) else []
+    levels = [top - s * span for s in shares] if span else []
+    return [(level, sign * np.minimum(sign * x, level)) for level in levels
+            if _visits(sign * x > level) >= VISITS]
+
+
+def _visits(there: np.ndarray) -> int:
+    """Stretches of a truth (L,) that begin and end inside.
+
+    >>> _visits(np.array([1, 0, 1, 1, 0, 0, 1, 0, 1], bool))
+    2
+    """
+    turns = np.diff(there.astype(int))
+    left, entered = np.flatnonzero(turns < 0), np.flatnonzero(turns > 0)
+    return int(np.sum(left > entered[0])) if len(entered) else 0
 
 
 def delay(site: Site) -> list[Candidate]:
