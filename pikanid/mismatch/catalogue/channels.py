@@ -15,7 +15,6 @@ from pikanid.problem.held import PIECES, HeldInput, acting
 
 INF = float("inf")
 # of a limit: on both sides alike, or on one; what it is called
-VISITS = 2  # limit: of a level, from which on a limit on one side is one
 SIDES = {"": "saturation of the", "above": "an upper limit of the", "below": "a lower limit of the"}
 
 
@@ -101,8 +100,8 @@ def _clipped(x: str, limit: str, side: str) -> str:
 
 def _cut(x: np.ndarray, side: str, shares: Sequence[float]) -> list[tuple[float, np.ndarray]]:
     """Levels of a limit, and a channel (L,) cut off there: by shares of its amplitude, or on one
-    side of its range; none where it rests.  On one side it has to go there and come back twice: what
-    happens once, or where a motion begins or ends, could be anything.
+    side of its range; none where it rests.  On one side it has to go there and come back: what
+    happens where a motion begins or ends could be anything.
     """
     low, high = float(x.min(initial=0.0)), float(x.max(initial=0.0))
     if not side:
@@ -113,18 +112,18 @@ def _cut(x: np.ndarray, side: str, shares: Sequence[float]) -> list[tuple[float,
     top, span = float((sign * x).max(initial=-INF)), float(np.ptp(x)) if len(x) else 0.0
     levels = [top - s * span for s in shares] if span else []
     return [(level, sign * np.minimum(sign * x, level)) for level in levels
-            if _visits(sign * x > level) >= VISITS]
+            if _returns(sign * x > level)]
 
 
-def _visits(there: np.ndarray) -> int:
-    """Stretches of a truth (L,) that begin and end inside.
+def _returns(there: np.ndarray) -> bool:
+    """Whether some stretch of a truth (L,) begins and ends inside.
 
-    >>> _visits(np.array([1, 0, 1, 1, 0, 0, 1, 0, 1], bool))
-    2
+    >>> _returns(np.array([True, False, True, False])), _returns(np.array([True, False, True]))
+    (True, False)
     """
     turns = np.diff(there.astype(int))
     left, entered = np.flatnonzero(turns < 0), np.flatnonzero(turns > 0)
-    return int(np.sum(left > entered[0])) if len(entered) else 0
+    return len(entered) > 0 and bool(np.any(left > entered[0]))
 
 
 def delay(site: Site) -> list[Candidate]:
