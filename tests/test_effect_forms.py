@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ def around(model: pk.Model, channels: dict[str, str] | None = None) -> Surroundi
     sizes = {**dict.fromkeys(model.input_names, 2.0), **dict.fromkeys(channels, 5.0)}
     ranges = dict.fromkeys(model.state_names, (1.0, 3.0))
     seen = dict.fromkeys(model.output_names, (0.0, 2.0))
-    return Surroundings(model, model.state_names, ranges, seen, sizes, channels, 100.0)
+    return Surroundings(model, model.state_names, ranges, seen, sizes, channels, 100.0, 1.0)
 
 
 def form(content: dict[str, Any], key: str = "own") -> EffectForm:
@@ -58,9 +59,20 @@ def test_every_pair_of_states_is_bound(tanks: pk.Model) -> None:
                                 "x1": "k_x2_x1*max(x2 - h_x2_x1, 0)"}
     k, h = first.parameters
     assert (k.name, k.value, k.bounds) == ("k_x1_x2", 0.1, (0.0, float("inf")))
+
     assert (h.value, h.unit, h.bounds) == (pytest.approx(2.4), "cm", (1.0, 3.0))
     assert tanks.with_effect(first).with_effect(second).parameter_names[-4:] == (
         "k_x1_x2", "h_x1_x2", "k_x2_x1", "h_x2_x1")
+
+
+def test_a_tank_runs_over_no_faster_than_samples_can_tell(tanks: pk.Model) -> None:
+    """Stiffer rims make explicit steps, and with them the derivatives that fits follow, explode."""
+    rims = [e for e in read_effects("hydraulics") if e.key.startswith("overflow")]
+    assert len(rims) == 2
+    for rim in rims:
+        assert isinstance(rim, EffectForm)
+        for effect in bound(rim, replace(around(tanks), interval=4.0)):
+            assert effect.size.bounds == (0.0, 0.25)
 
 
 def test_states_of_forms_begin_where_theirs_do(tanks: pk.Model) -> None:

@@ -31,6 +31,7 @@ class Surroundings:
         sizes: Largest size of each input and channel.
         channels: Recorded, and not used by the model; with units.
         duration: Of the recordings [s].
+        interval: Between samples of an output, the usual one [s].
         taken: Names that parameters and states of effects must not have.
     """
 
@@ -41,6 +42,7 @@ class Surroundings:
     sizes: Mapping[str, float]
     channels: Mapping[str, str]
     duration: float
+    interval: float
     taken: frozenset[str] = frozenset()
 
     def choices(self, kind: str, bound: Mapping[str, str]) -> list[str]:
@@ -93,7 +95,7 @@ def bound(form: EffectForm, around: Surroundings) -> Iterator[Effect]:
 
 def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,
           alone: bool) -> Effect:
-    values = {"duration": around.duration}
+    values = {"duration": around.duration, "interval": around.interval}
     for name, wanted in binding.items():
         low, high = around.range_of(wanted, form.places[name])
         values |= {f"{name}_low": low, f"{name}_high": high,

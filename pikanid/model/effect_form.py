@@ -3,15 +3,16 @@
     [effects.overflow]
     name = "overflow of {x}"
     for = { x = "state" }
-    parameters.k = { unit = "1/s", guess = "10/duration", bounds = [0, inf] }
+    parameters.k = { unit = "1/s", guess = "10/duration", bounds = [0, "1/interval"] }
     parameters.h = { unit = "{x}", guess = "0.3*x_low + 0.7*x_high", bounds = ["x_low", "x_high"] }
     add = { x = "-k*max(x - h, 0)" }
     null = { k = 0 }
 
 Texts in braces become the unit of what a placeholder stands for, in names its name.  Guesses and
 bounds may be formulas of the range that a state or an output covers (``x_low``, ``x_high``), of the
-largest size of an input or a channel (``u_size``), of a parameter's value (``p_value``) and of the
-recordings' duration [s].  A coordinate is a state whose rate is another state: ``"its rate"``, the
+largest size of an input or a channel (``u_size``), of a parameter's value (``p_value``), of the
+recordings' duration [s] and of the usual interval between samples [s]: what is gone within one is
+as good as gone at once.  A coordinate is a state whose rate is another state: ``"its rate"``, the
 place after it, is that one.  A parameter is one of the equation of the first place.
 """
 

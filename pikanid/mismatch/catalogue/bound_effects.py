@@ -41,7 +41,8 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
         site.model, tuple(dict.fromkeys(s.v for s in sites)), ranges(),
         {n: _range(first, n) for n in site.model.output_names if n in first},
         {n: float(np.abs(first[n].values).max(initial=0.0)) for n in names},
-        {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings))
+        {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
+        site.interval)
     for form in forms:
         around = replace(around, taken=frozenset(n for e in own for n in e.names))
         own += [e for e in bound(form, around) if _fits(site.model, e)]

@@ -93,7 +93,8 @@ class Rig:
             {n: (float(y.min()), float(y.max())) for n, y in seen.items()},
             {n: float(np.abs(self.train[n].values).max()) for n in (*inputs, *extra)
              if np.ptp(self.train[n].values) > 0},
-            {n: self.train[n].unit for n in extra}, self.train.stop - self.train.start)
+            {n: self.train[n].unit for n in extra}, self.train.stop - self.train.start,
+            self.train[self.train.names[0]].interval)
         return laws(nominal, around, (*self.model.effects, *self.own))
 
 
