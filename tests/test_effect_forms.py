@@ -59,7 +59,6 @@ def test_every_pair_of_states_is_bound(tanks: pk.Model) -> None:
                                 "x1": "k_x2_x1*max(x2 - h_x2_x1, 0)"}
     k, h = first.parameters
     assert (k.name, k.value, k.bounds) == ("k_x1_x2", 0.1, (0.0, float("inf")))
-
     assert (h.value, h.unit, h.bounds) == (pytest.approx(2.4), "cm", (1.0, 3.0))
     assert tanks.with_effect(first).with_effect(second).parameter_names[-4:] == (
         "k_x1_x2", "h_x1_x2", "k_x2_x1", "h_x2_x1")
