@@ -37,6 +37,8 @@ from pikanid.strategies.settings import RELAXATION, RelaxationSettings
 
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
 RELATIVE = 1e-6  # numerical: without noise no standard error says what is near
+# Of one datum's share of the cost: θ is then within a hundredth of a standard error.
+UNDER_WAY = 1e-4  # numerical: where a fit at a λ on the way counts as converged
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,12 +219,12 @@ def follow(system: BandedSystem, point: Point,
     if plan.warmup:
         at = gauss_newton(system, point, lam, point.theta, point.theta, iterations=plan.warmup).at
     while lam is not None:
-        outcomes = [*outcomes[-1:], gauss_newton(system, at, lam, system.lower, system.upper,
-                                                 iterations=MAX_ITERATIONS)]
-        at = outcomes[-1].at
-        stages.append(_stage(system, lam, outcomes[-1]))
-        if plan.locked(stages) and follows_physics(system, at, lam):
+        outcome = gauss_newton(system, at, lam, system.lower, system.upper,
+                               iterations=MAX_ITERATIONS, tolerance=UNDER_WAY)
+        stages.append(_stage(system, lam, outcome))
+        if plan.locked(stages) and follows_physics(system, outcome.at, lam):
             stages[-1] = replace(stages[-1], free=True)
+        outcomes, at = [*outcomes[-1:], outcome], outcome.at
         lam = plan.next(stages)
         if lam is None and len(stages) > 1:
             # Against a bound of its errors the estimate had settled: also against themselves?
@@ -231,7 +233,14 @@ def follow(system: BandedSystem, point: Point,
     kept = plan.keep(stages)
     notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
         stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
-    return stages[:kept + 1], outcomes[kept - len(stages)], notes
+    found, stage = outcomes[kept - len(stages)], stages[kept]
+    if found.converged:  # so far as is enough on the way
+        found = gauss_newton(system, found.at, stage.lam, system.lower, system.upper,
+                             iterations=MAX_ITERATIONS)
+        if found.iterations:
+            found = replace(found, iterations=stage.iterations + found.iterations)
+            stages[kept] = replace(_stage(system, stage.lam, found), free=stage.free)
+    return stages[:kept + 1], found, notes
 
 
 def _stage(system: BandedSystem, lam: float, outcome: Outcome, std: Array | None = None) -> Stage:
