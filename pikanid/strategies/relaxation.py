@@ -15,6 +15,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.objective.functional import Functional, bind
+from pikanid.objective.shooting import Shooting
 from pikanid.optimise.covariance import effective_parameters, error_bound, respond, theta_covariance
 from pikanid.optimise.gauss_newton import (
     MAX_ITERATIONS,
@@ -34,6 +35,7 @@ from pikanid.strategies.first_points import from_simulation, through_greville, t
 from pikanid.strategies.grids import Discretisation, Grid
 from pikanid.strategies.locks import follows_physics
 from pikanid.strategies.settings import RELAXATION, RelaxationSettings
+from pikanid.strategies.simulated import at_optimum
 
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
 RELATIVE = 1e-6  # numerical: without noise no standard error says what is near
@@ -64,6 +66,7 @@ class RelaxedFit:
     effective: float
     converged: bool
     warnings: tuple[str, ...] = ()
+    shooting: Shooting | None = field(default=None, repr=False)  # with steps chosen at θ, if it was
 
     @property
     def std(self) -> Array:
@@ -141,6 +144,7 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
           refine: bool) -> RelaxedFit:
     """Fit Eq. (2): smooth, warm up, follow the λ-schedule, refine the grid until it has settled.
 
+    It has where the model's simulation has its optimum there as well, or no halving moves θ.
     `plans` is called with the noise level of the data rows (1 where they are divided by σ); the
     schedules after the first are tried only until one explains the data.
 
@@ -151,6 +155,11 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
     if setup.field.switches:
         notes.append(errors.relaxation_smears())
         refine = False  # no grid settles while a kink wanders through it
+    if refine and outcome.converged and not notes:
+        fit = conclude(setup, grid, system, outcome, stages, notes)
+        shooting = Shooting(setup.problem)
+        if at_optimum(shooting, fit.theta, fit.std, RELATIVE):
+            return replace(fit, shooting=shooting)
     gap, settings = 0.0, setup.settings
     for _ in range(settings.refinements if refine else 0):
         grid, before, lam = grid.refined(), outcome.at.point, stages[-1].lam

@@ -67,7 +67,7 @@ def relaxed_estimate(strategy: str, fit: RelaxedFit, settings: Mapping[str, Any]
          **{f.label: float(v) for f, v in zip(fit.problem.free, s.theta, strict=True)}}
         for s in fit.stages]
     return assemble(strategy, fit, used, history, begun,
-                    trajectories(fit) if curves is None else curves)
+                    trajectories(fit) if curves is None else curves, fit.shooting)
 
 
 class Relaxed(Protocol):
@@ -103,11 +103,16 @@ class Relaxed(Protocol):
 
 
 def assemble(strategy: str, fit: Relaxed, settings: Mapping[str, Any],
-             history: list[dict[str, float]], begun: float, curves: Curves) -> Estimate:
-    """The `Estimate`: the model simulated at θ, judged, and the curves beside it."""
-    shooting = Shooting(fit.problem)
+             history: list[dict[str, float]], begun: float, curves: Curves,
+             shooting: Shooting | None = None) -> Estimate:
+    """The `Estimate`: the model simulated at θ, judged, and the curves beside it.
+
+    A `shooting` has its steps chosen at θ already.
+    """
+    chosen, shooting = shooting is not None, shooting or Shooting(fit.problem)
     try:
-        shooting.choose_steps(fit.theta, "fine")
+        if not chosen:
+            shooting.choose_steps(fit.theta, "fine")
         finished = all(r.finished for r in shooting.responses(fit.theta))
     except errors.SimulationFailed:
         finished = False
