@@ -43,6 +43,13 @@ class Schedule(Protocol):
     def warmup(self) -> int:
         """Iterations at the first λ in which only the trajectory moves, θ staying at its guess."""
 
+    @property
+    def tolerance(self) -> float:
+        """At which a fit at a λ on the way counts as converged, in one datum's share of the cost.
+
+        θ is then within its root of a standard error.
+        """
+
     def next(self, past: Sequence[Stage]) -> float | None:
         """The next λ, or None to stop."""
 
@@ -63,6 +70,7 @@ class Fixed:
 
     lam: float
     warmup: int = 15
+    tolerance: float = 1e-6
 
     def next(self, past: Sequence[Stage]) -> float | None:
         """λ once."""
@@ -99,6 +107,11 @@ class Continuation:
     relative: float = 1e-6
     limit: float = 1e12
     warmup: int = 0
+
+    @property
+    def tolerance(self) -> float:
+        """Finer than the moves that decide whether λ rises: 0.05 of a standard error, or more."""
+        return 1e-4 if self.lockable else 1e-2
 
     def next(self, past: Sequence[Stage]) -> float | None:
         """The next λ, or None where the estimate has settled, locked, or got no further."""

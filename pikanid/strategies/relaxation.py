@@ -39,8 +39,7 @@ from pikanid.strategies.simulated import at_optimum
 
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
 RELATIVE = 1e-6  # numerical: without noise no standard error says what is near
-# Of one datum's share of the cost: θ is then within a hundredth of a standard error.
-UNDER_WAY = 1e-4  # numerical: where a fit at a λ on the way counts as converged
+FEW_PROBES = 4  # numerical: of the trace that decides how smooth a first point is
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ def first_point(system: BandedSystem) -> tuple[Point, Smoothed | None]:
     """Splines smoothed through the data, θ at its guess; flat ones where data say too little."""
     functional, theta = system.functional, system.functional.problem.guess
     flat = tuple(functional.resting(r, theta) for r in range(len(functional.parts)))
-    smoothed = smooth(system.over(functional.smoothing()), Point(flat, theta))
+    smoothed = smooth(system.over(functional.smoothing()), Point(flat, theta), probes=FEW_PROBES)
     return (Point(flat, theta), None) if smoothed is None else (smoothed.point, smoothed)
 
 
@@ -229,7 +228,7 @@ def follow(system: BandedSystem, point: Point,
         at = gauss_newton(system, point, lam, point.theta, point.theta, iterations=plan.warmup).at
     while lam is not None:
         outcome = gauss_newton(system, at, lam, system.lower, system.upper,
-                               iterations=MAX_ITERATIONS, tolerance=UNDER_WAY)
+                               iterations=MAX_ITERATIONS, tolerance=plan.tolerance)
         stages.append(_stage(system, lam, outcome))
         if plan.locked(stages) and follows_physics(system, outcome.at, lam):
             stages[-1] = replace(stages[-1], free=True)
