@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -226,6 +227,7 @@ def test_continuation_settles() -> None:
     past = [stage(1.0, 1.0, 80, 1), stage(1e4, 1.3, 90, 2)]
     assert plan.next([]) == 1.0
     assert plan.next(past) == pytest.approx(1e8)
+    assert plan.next([past[0], replace(past[1], iterations=30)]) == pytest.approx(1e6)
     past.append(stage(1e8, 1.301, 95, 0.1))  # a twentieth of the bias: a 19th of 0.01 is left
     assert plan.next(past) is None and plan.keep(past) == 2
     past[-1] = stage(1e8, 1.304, 95, 0.1)

@@ -14,6 +14,7 @@ import numpy as np
 from pikanid.approximators import Array
 
 NOTHING = 1e-8  # numerical: of the noise's cost: a physics cost without any influence
+QUICK = 6  # numerical: iterations from a bad guess, where λ leads nowhere else
 LOCKABLE_BIAS = 0.05 / 9  # numerical: [standard errors] where λ rises tenfold: a move of 0.05
 
 
@@ -43,13 +44,6 @@ class Schedule(Protocol):
     def warmup(self) -> int:
         """Iterations at the first λ in which only the trajectory moves, θ staying at its guess."""
 
-    @property
-    def tolerance(self) -> float:
-        """At which a fit at a λ on the way counts as converged, in one datum's share of the cost.
-
-        θ is then within its root of a standard error.
-        """
-
     def next(self, past: Sequence[Stage]) -> float | None:
         """The next λ, or None to stop."""
 
@@ -70,7 +64,6 @@ class Fixed:
 
     lam: float
     warmup: int = 15
-    tolerance: float = 1e-6
 
     def next(self, past: Sequence[Stage]) -> float | None:
         """λ once."""
@@ -91,12 +84,13 @@ class Continuation:
 
     Where the splines can meet the physics for any θ, the bias and the physics' cost λ·P fall as 1/λ
     in the end: where λ·P fell to its f-th part, a move of Δ leaves no more than Δ/(f - 1).
-    Beyond the third stage λ rises by the root of the factor.  `lockable` splines cannot (smoother
-    than the equation, they have fewer coefficients than there are physics conditions): their λ·P
-    has a floor that rises as λ, so that f is taken to be the factor, and a larger λ locks the fit
-    (1/l -> 0 minimises the physics alone).  The stage before that is then the result.  `noise_cost`
-    is the data cost that noise alone explains; below half of it the splines still follow the noise,
-    and a rise means nothing.
+    Beyond the third stage, or after a slow one, λ rises by the root of the factor.
+
+    `lockable` splines cannot (smoother than the equation, they have fewer coefficients than there
+    are physics conditions): their λ·P has a floor that rises as λ, so that f is taken to be the
+    factor, and a larger λ locks the fit (1/l -> 0 minimises the physics alone).  The stage before
+    that is then the result.  `noise_cost` is the data cost that noise alone explains; below half of
+    it the splines still follow the noise, and a rise means nothing.
     """
 
     noise_cost: float
@@ -107,11 +101,6 @@ class Continuation:
     relative: float = 1e-6
     limit: float = 1e12
     warmup: int = 0
-
-    @property
-    def tolerance(self) -> float:
-        """Finer than the moves that decide whether λ rises: 0.05 of a standard error, or more."""
-        return 1e-4 if self.lockable else 1e-2
 
     def next(self, past: Sequence[Stage]) -> float | None:
         """The next λ, or None where the estimate has settled, locked, or got no further."""
@@ -125,7 +114,8 @@ class Continuation:
                 past[-2].theta, last.theta, past[-2].std, self.relative
                 ) <= self.bias * (self._fall(past[-2], last) - 1.0):
             return None
-        return last.lam * (self.factor if len(past) < 3 or self.lockable else self.factor**0.5)
+        far = self.lockable or (len(past) < 3 and last.iterations <= QUICK)
+        return last.lam * (self.factor if far else self.factor**0.5)
 
     def keep(self, past: Sequence[Stage]) -> int:
         """The last stage before a lock or a failure to converge."""

@@ -35,10 +35,16 @@ from pikanid.strategies.first_points import from_simulation, through_greville, t
 from pikanid.strategies.grids import Discretisation, Grid
 from pikanid.strategies.locks import follows_physics
 from pikanid.strategies.settings import RELAXATION, RelaxationSettings
-from pikanid.strategies.simulated import at_optimum
+from pikanid.strategies.simulated import step_left
 
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
 RELATIVE = 1e-6  # numerical: without noise no standard error says what is near
+# Of one datum's share of the cost: θ is then within a hundredth of a standard error.  A misfit's
+# share is large, and what ends its stages sooner leads it astray.
+UNDER_WAY = 1e-4  # numerical: where a fit at a λ on the way counts as converged
+# Of the move that a grid may make: usually 0.01 of a standard error, which is also what "fine"
+# steps of integration may move an estimate by.
+AGREES = 0.2  # numerical: share of what counts as settled, that a simulated fit may still move by
 FEW_PROBES = 4  # numerical: of the trace that decides how smooth a first point is
 
 
@@ -157,7 +163,7 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
     if refine and outcome.converged and not notes:
         fit = conclude(setup, grid, system, outcome, stages, notes)
         shooting = Shooting(setup.problem)
-        if at_optimum(shooting, fit.theta, fit.std, RELATIVE):
+        if step_left(shooting, fit.theta, fit.std, RELATIVE) <= AGREES * setup.settings.settled:
             return replace(fit, shooting=shooting)
     gap, settings = 0.0, setup.settings
     for _ in range(settings.refinements if refine else 0):
@@ -228,7 +234,7 @@ def follow(system: BandedSystem, point: Point,
         at = gauss_newton(system, point, lam, point.theta, point.theta, iterations=plan.warmup).at
     while lam is not None:
         outcome = gauss_newton(system, at, lam, system.lower, system.upper,
-                               iterations=MAX_ITERATIONS, tolerance=plan.tolerance)
+                               iterations=MAX_ITERATIONS, tolerance=UNDER_WAY)
         stages.append(_stage(system, lam, outcome))
         if plan.locked(stages) and follows_physics(system, outcome.at, lam):
             stages[-1] = replace(stages[-1], free=True)

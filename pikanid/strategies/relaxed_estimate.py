@@ -28,6 +28,7 @@ from pikanid.problem.chains import Chains
 from pikanid.problem.problem import Problem
 from pikanid.strategies.finish import evaluate, finish
 from pikanid.strategies.relaxation import RelaxedFit
+from pikanid.strategies.simulated import choose_steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,7 @@ def assemble(strategy: str, fit: Relaxed, settings: Mapping[str, Any],
     chosen, shooting = shooting is not None, shooting or Shooting(fit.problem)
     try:
         if not chosen:
-            shooting.choose_steps(fit.theta, "fine")
+            choose_steps(shooting, fit.theta)
         finished = all(r.finished for r in shooting.responses(fit.theta))
     except errors.SimulationFailed:
         finished = False
