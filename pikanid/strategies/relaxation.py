@@ -45,7 +45,7 @@ UNDER_WAY = 1e-4  # numerical: where a fit at a λ on the way counts as converge
 # Of the move that a grid may make: usually 0.01 of a standard error, which is also what "fine"
 # steps of integration may move an estimate by.
 AGREES = 0.2  # numerical: share of what counts as settled, that a simulated fit may still move by
-FEW_PROBES = 4  # numerical: of the trace that decides how smooth a first point is
+FEW_PROBES = 4  # numerical: where the limit of λ is the same whatever its unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +115,14 @@ def start_is_estimated(problem: Problem) -> bool:
                for state in problem.model.states)
 
 
-def first_point(system: BandedSystem) -> tuple[Point, Smoothed | None]:
-    """Splines smoothed through the data, θ at its guess; flat ones where data say too little."""
+def first_point(system: BandedSystem, probes: int = 16) -> tuple[Point, Smoothed | None]:
+    """Splines smoothed through the data, θ at its guess; flat ones where data say too little.
+
+    How smooth they are is told by so many `probes`.
+    """
     functional, theta = system.functional, system.functional.problem.guess
     flat = tuple(functional.resting(r, theta) for r in range(len(functional.parts)))
-    smoothed = smooth(system.over(functional.smoothing()), Point(flat, theta), probes=FEW_PROBES)
+    smoothed = smooth(system.over(functional.smoothing()), Point(flat, theta), probes=probes)
     return (Point(flat, theta), None) if smoothed is None else (smoothed.point, smoothed)
 
 
@@ -192,7 +195,7 @@ def _from_data(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Sched
     """The whole way on one grid: smooth the data, scale the physics, follow λ."""
     functional = setup.functional(grid)
     system = BandedSystem(functional)
-    point, smoothed = first_point(system)
+    point, smoothed = first_point(system, FEW_PROBES)
     noise = noise_level(functional, smoothed)
     if setup.nondimensional:
         system = system.over(functional.with_scale(physics_scale(functional, point, noise)))
