@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -223,12 +224,19 @@ def stage(lam: float, value: float, data: float, physics: float, converged: bool
 
 def test_continuation_settles() -> None:
     plan = Continuation(100.0)
-    past = [stage(1.0, 1.0, 80, 1), stage(1e2, 1.3, 90, 2)]
+    past = [stage(1.0, 1.0, 80, 1), stage(1e4, 1.3, 90, 2)]
     assert plan.next([]) == 1.0
-    assert plan.next(past) == pytest.approx(1e4)
-    past.append(stage(1e4, 1.301, 95, 0.1))
+    assert plan.next(past) == pytest.approx(1e8)
+    assert plan.next([past[0], replace(past[1], iterations=30)]) == pytest.approx(1e6)
+    past.append(stage(1e8, 1.301, 95, 0.1))  # a twentieth of the bias: a 19th of 0.01 is left
     assert plan.next(past) is None and plan.keep(past) == 2
-    past[-1] = stage(1e4, 1.4, 95, 0.1, converged=False)
+    past[-1] = stage(1e8, 1.304, 95, 0.1)
+    assert plan.next(past) == pytest.approx(1e10)
+    past[-1] = stage(1e8, 1.304, 95, 0.02)
+    assert plan.next(past) is None
+    past[-1] = stage(1e8, 1.3, 95, 2.1)
+    assert plan.next(past) == pytest.approx(1e10)
+    past[-1] = stage(1e8, 1.4, 95, 0.1, converged=False)
     assert plan.next(past) is None and plan.keep(past) == 1
 
 
@@ -240,7 +248,7 @@ def test_continuation_steps_back_from_a_lock() -> None:
     assert plan.next(following_noise) == pytest.approx(100.0)
     broken = [stage(1.0, 1.0, 90, 5), stage(10.0, 9.0, 400, 4)]
     assert plan.next(broken) is None and plan.keep(broken) == 0
-    assert Continuation(100.0).next(broken) == pytest.approx(1e3)
+    assert Continuation(100.0).next(broken) == pytest.approx(1e5)
     assert Fixed(1e-4).next(past) is None and Fixed(1e-4).keep(past[:1]) == 0
 
 

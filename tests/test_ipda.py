@@ -210,9 +210,9 @@ def test_parameter_without_influence() -> None:
 def test_estimate_keeps_the_splines(tmp_path) -> None:  # type: ignore[no-untyped-def]
     est = IPDA().fit(guessed(), slosh(0.1))
     t = est.trajectories[0].t
-    assert np.allclose(est.approximator.states(t), est.trajectories[0].x, atol=1e-5)
+    assert np.allclose(est.approximator.states(t), est.trajectories[0].x, atol=4e-5)
     assert est.settings["naive_std"][0] == pytest.approx(est.std("l_theta"), rel=0.05)
-    assert [h["lam"] for h in est.history][:2] == [1.0, 100.0]
+    assert [h["lam"] for h in est.history][:2] == [1.0, 1e4]
     est.save(tmp_path / "estimate.json")
     back = pk.Estimate.load(tmp_path / "estimate.json")
     assert np.array_equal(back.theta, est.theta) and back.settings == est.settings

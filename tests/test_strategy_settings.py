@@ -23,7 +23,7 @@ RUN = pk.simulate(MODEL, pk.excitation.two_pulse(), sigma=0.1 * np.pi / 180, see
 def test_what_counts_as_settled_decides_how_far_a_grid_is_refined() -> None:
     usual = pk.IPDA().fit(MODEL, RUN)
     strict = pk.IPDA(settings=RelaxationSettings(settled=0.0, refinements=2)).fit(MODEL, RUN)
-    assert strict.settings["intervals"] == 2 * usual.settings["intervals"]
+    assert strict.settings["intervals"] == 4 * usual.settings["intervals"]
     assert "last halving" in strict.warnings[0] and not usual.warnings
     assert strict.settings["settings"] == {"settled": 0.0, "refinements": 2}
     assert "settings" not in usual.settings

@@ -84,3 +84,49 @@ def weigh_all(first: np.ndarray, local: np.ndarray, offset: np.ndarray, width: n
             for a in range(width[k]):
                 total += local[place + a] * c[at + a]
             out[k, m] = total
+
+
+@_compiled
+def spread(active: np.ndarray, rows: np.ndarray, place: np.ndarray, first: np.ndarray,
+           local: np.ndarray) -> None:
+    """local[m, place[active[m] + a] - first[m]] = rows[m, a]."""
+    for m in range(active.size):
+        for a in range(rows.shape[1]):
+            local[m, place[active[m] + a] - first[m]] = rows[m, a]
+
+
+@_compiled
+def join_kinks(t: np.ndarray, derivative: int, active: np.ndarray, rows: np.ndarray,
+               split: np.ndarray, beside: np.ndarray, times: np.ndarray, orders: np.ndarray,
+               scale: np.ndarray, place: np.ndarray, first: np.ndarray, local: np.ndarray) -> None:
+    """Fill local[m, place[j] - first[m]] with the derivative of kink j at t[m], over scale[j].
+
+    active (M,) and rows (M, k + 1) are the splines that live at t and that derivative of them;
+    kinks (J,) in the order of their times, their split and beside as in `KinkTable`.
+    """
+    k = rows.shape[1] - 1
+    for m in range(t.size):
+        j = np.searchsorted(split, active[m], side="right")
+        while j < split.size and split[j] <= active[m] + k:
+            value, left = 0.0, orders[j] - derivative
+            if left >= 0 and t[m] >= times[j]:
+                value = 1.0
+                for i in range(left):
+                    value *= (t[m] - times[j]) / (i + 1)
+            for a in range(k + 1):
+                value -= rows[m, a] * beside[j, active[m] - split[j] + k + a]
+            local[m, place[j] - first[m]] = value / scale[j]
+            j += 1
+
+
+@_compiled
+def project(first: np.ndarray, local: np.ndarray, y: np.ndarray, band: np.ndarray,
+            right: np.ndarray) -> None:
+    """Add BᵀB to the band (n, width), row j its column j from the diagonal down, and Bᵀy to right
+    (n, 1), B having the rows local (M, width) from columns first (M,) on.
+    """
+    for m in range(first.size):
+        for a in range(local.shape[1]):
+            right[first[m] + a, 0] += local[m, a] * y[m]
+            for b in range(local.shape[1] - a):
+                band[first[m] + a, b] += local[m, a] * local[m, a + b]

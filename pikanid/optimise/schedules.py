@@ -14,6 +14,8 @@ import numpy as np
 from pikanid.approximators import Array
 
 NOTHING = 1e-8  # numerical: of the noise's cost: a physics cost without any influence
+QUICK = 6  # numerical: iterations from a bad guess, where λ leads nowhere else
+LOCKABLE_BIAS = 0.05 / 9  # numerical: [standard errors] where λ rises tenfold: a move of 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,24 +80,27 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Continuation:
-    """λ up by `factor` until no parameter moves by more than `settled` standard errors.
+    """λ up by `factor` until a finite λ biases no parameter by more than `bias` standard errors.
 
-    Where the splines can meet the physics for any θ, what a finite λ biases falls as 1/λ: after a
-    move of Δ no more than Δ/(factor - 1) is left.  `lockable` splines cannot (smoother than the
-    equation, they have fewer coefficients than there are physics conditions): their physics cost
-    λ·P has a floor that rises as λ, and a larger λ locks the fit (1/l -> 0 minimises the physics
-    alone).  The stage before that is then the result.  `noise_cost` is the data cost that noise
-    alone explains; below half of it the splines still follow the noise, and a rise means nothing.
+    Where the splines can meet the physics for any θ, the bias and the physics' cost λ·P fall as 1/λ
+    in the end: where λ·P fell to its f-th part, a move of Δ leaves no more than Δ/(f - 1).
+    Beyond the third stage, or after a slow one, λ rises by the root of the factor.
+
+    `lockable` splines cannot (smoother than the equation, they have fewer coefficients than there
+    are physics conditions): their λ·P has a floor that rises as λ, so that f is taken to be the
+    factor, and a larger λ locks the fit (1/l -> 0 minimises the physics alone).  The stage before
+    that is then the result.  `noise_cost` is the data cost that noise alone explains; below half of
+    it the splines still follow the noise, and a rise means nothing.
     """
 
     noise_cost: float
     lockable: bool = False
     start: float = 1.0
-    factor: float = 100.0
-    settled: float = 0.05
+    factor: float = 1e4
+    bias: float = 1e-3
     relative: float = 1e-6
     limit: float = 1e12
-    warmup: int = 3
+    warmup: int = 0
 
     def next(self, past: Sequence[Stage]) -> float | None:
         """The next λ, or None where the estimate has settled, locked, or got no further."""
@@ -105,9 +110,12 @@ class Continuation:
         if self.locked(past) or last.lam >= self.limit or (
                 len(past) > 1 and not last.converged):
             return None
-        settled = len(past) >= 3 and self._eased(past[-2], last) and (
-            moved(past[-2].theta, last.theta, past[-2].std, self.relative) <= self.settled)
-        return None if settled else last.lam * self.factor
+        if len(past) >= 3 and self._eased(past[-2], last) and moved(
+                past[-2].theta, last.theta, past[-2].std, self.relative
+                ) <= self.bias * (self._fall(past[-2], last) - 1.0):
+            return None
+        far = self.lockable or (len(past) < 3 and last.iterations <= QUICK)
+        return last.lam * (self.factor if far else self.factor**0.5)
 
     def keep(self, past: Sequence[Stage]) -> int:
         """The last stage before a lock or a failure to converge."""
@@ -121,6 +129,12 @@ class Continuation:
         regression on the smoothed data gives, and of a model that misfits that is another θ.
         """
         return last.physics_cost <= max(before.physics_cost, NOTHING * self.noise_cost)
+
+    def _fall(self, before: Stage, last: Stage) -> float:
+        """How many times as small as before the bias is."""
+        if self.lockable or last.physics_cost <= NOTHING * self.noise_cost:
+            return last.lam / before.lam
+        return before.physics_cost / last.physics_cost
 
     def locked(self, past: Sequence[Stage]) -> bool:
         """Whether a cost rose as it does in a lock, and the splines were not seen to be free."""

@@ -18,7 +18,7 @@ from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, ga
 
 # The splines use all that they can of the data once a decade adds less than this share to it.
 FLAT = 1e-4  # numerical: of the effective parameters, whose trace is estimated
-
+LINEAR = 1e-6  # numerical: of the data's cost that was foretold of one step, a rise that is none
 
 class Score(NamedTuple):
     """What cross-validation says of a ρ."""
@@ -39,10 +39,11 @@ class Smoothed:
     rho: float
 
 
-def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoothed | None:
+def smooth(system: BandedSystem, point: Point, rho: float | None = None, probes: int = 16
+           ) -> Smoothed | None:
     """Smooth the data of all recordings with one ρ; None where they do not determine the splines.
 
-    Without a given ρ, cross-validation chooses it.
+    Without a given ρ, cross-validation chooses it, edf estimated from no more than `probes` probes.
 
     `system` is built on `functional.smoothing()`; θ stays.
     """
@@ -53,28 +54,37 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None) -> Smoo
     if mass <= 0.0 or rough <= 0.0:
         return None
     count = system.functional.n_data
-    pencil, ridge = Pencil(data, both, count), mass / rough
+    pencil, ridge = Pencil(data, both, count, probes), mass / rough
     # Least squares proper (ρ = 0) keeps a trace of roughness, for knots without data.
     chosen = pencil.search(ridge) if rho is None else pencil.at(max(rho, 1e-14 * ridge), most=1.0)
     if chosen is None:
         return None
     rho, _, residual, effective = chosen
     try:
-        found = gauss_newton(system, both, rho, point.theta, point.theta, iterations=10)
+        step = system.step(system.linearise(both, rho), point.theta, point.theta)
+        found = system.moved(point, step)
+        if not _data_cost(system, found) <= (1.0 + LINEAR) * residual:  # outputs are not linear
+            found = gauss_newton(system, found, rho, point.theta, point.theta,
+                                 iterations=10).at.point
     except LinAlgError:
         return None
     sigma = float(np.sqrt(max(residual, 0.0) / max(count - effective, 1.0)))
-    return Smoothed(found.at.point, sigma, effective, rho)
+    return Smoothed(found, sigma, effective, rho)
+
+
+def _data_cost(system: BandedSystem, point: Point) -> float:
+    return sum(float(np.sum(rows.residual**2)) for r, c in enumerate(point.coefficients)
+               for rows in system.functional.data_rows(r, c, point.theta))
 
 
 class Pencil:
     """The normal equations of `count` data, and how they change with ρ, at one point."""
 
-    def __init__(self, data: Linearisation, both: Linearisation, count: int):
+    def __init__(self, data: Linearisation, both: Linearisation, count: int, probes: int):
         self.cost, self.count = data.data_cost, count
         self.blocks = []
         sizes = [block.slope.size for block in data.blocks]
-        number = min(max(4000 // max(1, sum(sizes)), 1), 16)
+        number = min(max(4000 // max(1, sum(sizes)), 1), probes)
         generator = np.random.default_rng(0)
         for size, only, all_ in zip(sizes, data.blocks, both.blocks, strict=True):
             probe = generator.choice([-1.0, 1.0], size=(size, number))

@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.model import Model
-from pikanid.optimise.schedules import Continuation, Fixed, Schedule
+from pikanid.optimise.schedules import LOCKABLE_BIAS, Continuation, Fixed, Schedule
 from pikanid.problem.chains import Form, find_chains
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
@@ -55,7 +55,8 @@ class IPDA:
             or "sum" (over the samples, Eq. 5).
         lam: A fixed λ, as in Eq. (2) under "paper", else dimensionless: at 1 a physics residual as
             large as the physics itself costs as much as every sample being off by its σ.
-        warmup: Iterations at the first λ in which only the splines move.
+        warmup: Iterations at the first λ in which only the splines move; by default none, under
+            "paper" 15.
         settings: When grid and λ count as settled.
 
     >>> import numpy as np, pikanid as pk
@@ -125,12 +126,13 @@ def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
             warmup = PAPER_WARMUP if settings.warmup is None else settings.warmup
             return [Fixed(settings.lam or _paper_lambda(problem), warmup)]
         gentle = Continuation(noise**2 * problem.n_samples, grid.locks,
-                              warmup=3 if settings.warmup is None else settings.warmup)
+                              warmup=settings.warmup or 0)
         if grid.locks:
-            return [replace(gentle, factor=10.0)]
+            return [replace(gentle, factor=10.0, bias=LOCKABLE_BIAS)]
         # Weak physics at first tolerates a bad guess; where that goes astray, strong physics keeps
         # to the guess, as shooting does.
-        return [gentle, *(replace(gentle, start=start, warmup=0) for start in STEADY_STARTS)]
+        steady = replace(gentle, factor=100.0, warmup=0)
+        return [gentle, *(replace(steady, start=start) for start in STEADY_STARTS)]
 
     return relax(setup, grid, plans, refine=settle)
 

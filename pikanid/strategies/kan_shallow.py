@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy import sparse
 from scipy.linalg import LinAlgError
-from scipy.sparse.linalg import spsolve
 
 from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.approximators.kan import ShallowKAN
 from pikanid.objective.functional import Functional
+from pikanid.optimise.cholesky import factor_band, solve_band
 from pikanid.optimise.gauss_newton import BandedSystem, Outcome, Point
-from pikanid.optimise.schedules import Continuation, Fixed, Stage, moved
+from pikanid.optimise.schedules import LOCKABLE_BIAS, Continuation, Fixed, Stage, moved
 from pikanid.strategies.data_noise import noise_level, standard_errors
 from pikanid.strategies.first_points import transfer
 from pikanid.strategies.grids import fastest_rate
@@ -32,6 +31,7 @@ from pikanid.strategies.relaxation import (
 # Of the fastest linearised motion.
 RADIANS = 1.0  # numerical: at most, in a cell of the first grid that counts
 FACTOR, LARGEST = 10.0, 1e8  # numerical: of the λ-continuation
+RIDGE = 1e-12  # numerical: where the finer space holds a function twice
 Tell = Callable[[int, Sequence[Stage]], None]
 
 
@@ -59,7 +59,7 @@ def shallow_fit(setup: Setup, grid: KanGrid, *, cells: float | None, max_grid: i
         system = BandedSystem(functional)
         plan = Fixed(lam, 15) if lam else Continuation(
             noise**2 * setup.problem.n_samples, True, start=start, factor=FACTOR, limit=LARGEST,
-            warmup=0 if stages else 3)
+            bias=LOCKABLE_BIAS)
         try:
             found, outcome, remarks = follow(system, point, plan)
         except LinAlgError:
@@ -110,7 +110,11 @@ def _by_least_squares(fine: ShallowKAN, coarse: ShallowKAN, own: Array) -> Array
 
     The finer space holds the coarser one up to kinks that a knot replaces.
     """
+    from pikanid.approximators.local_basis import project
+
     t = np.linspace(fine.start, fine.stop, 6 * fine.n_basis)
-    basis = fine.basis(t)
-    normal = basis.T @ basis + 1e-12 * sparse.eye_array(fine.n_basis)
-    return np.asarray(spsolve(normal.tocsc(), basis.T @ (coarse.basis(t) @ own)))
+    first, local = fine.local(t)
+    band, right = np.zeros((fine.n_basis, local.shape[1])), np.zeros((fine.n_basis, 1))
+    project(first, local, coarse.values(t, own), band, right)
+    band[:, 0] += RIDGE
+    return solve_band(factor_band(band.T), right)[:, 0]

@@ -9,6 +9,7 @@ STIFF, STIFFEST = 1e10, 1e16  # numerical: λ that makes a trajectory solve its 
 # promises decreases for ever, ten more of them gain a few thousandths of the cost.
 ITERATIONS = 10  # limit: at a time
 TIMES = 5  # limit: so often at one λ
+RESISTS = 0.9  # numerical: of λ·P, that a stiff λ leaves where splines cannot follow
 GAIN = 0.01  # numerical: of the cost, that so many iterations gain where they lead somewhere
 
 
@@ -17,13 +18,16 @@ def follows_physics(system: BandedSystem, at: Linearisation, lam: float) -> bool
 
     With θ held, a larger and larger λ moves the trajectory alone, until what is left of the physics
     is the splines' own; below one datum's share of what is then left of the data, it locks nothing.
+    Splines that can follow leave little at the first such λ already, as P falls with its square.
     """
-    stiff = max(lam, STIFF)
+    stiff, resisting = max(lam, STIFF), RESISTS * at.physics_cost
     while stiff <= STIFFEST:
         at = _held(system, at, stiff)
         left = at.physics_cost * lam / stiff
         if left <= at.data_cost / system.functional.n_data:
             return True
+        if left > resisting:
+            return False
         stiff *= 100.0
     return False
 

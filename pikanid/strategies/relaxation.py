@@ -15,6 +15,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.approximators import Array
 from pikanid.objective.functional import Functional, bind
+from pikanid.objective.shooting import Shooting
 from pikanid.optimise.covariance import effective_parameters, error_bound, respond, theta_covariance
 from pikanid.optimise.gauss_newton import (
     MAX_ITERATIONS,
@@ -34,9 +35,17 @@ from pikanid.strategies.first_points import from_simulation, through_greville, t
 from pikanid.strategies.grids import Discretisation, Grid
 from pikanid.strategies.locks import follows_physics
 from pikanid.strategies.settings import RELAXATION, RelaxationSettings
+from pikanid.strategies.simulated import step_left
 
 # Moves below this share of the parameter itself count as none (clean data: no standard error).
 RELATIVE = 1e-6  # numerical: without noise no standard error says what is near
+# Of one datum's share of the cost: θ is then within a hundredth of a standard error.  A misfit's
+# share is large, and what ends its stages sooner leads it astray.
+UNDER_WAY = 1e-4  # numerical: where a fit at a λ on the way counts as converged
+# Of the move that a grid may make: usually 0.01 of a standard error, which is also what "fine"
+# steps of integration may move an estimate by.
+AGREES = 0.2  # numerical: share of what counts as settled, that a simulated fit may still move by
+FEW_PROBES = 4  # numerical: where the limit of λ is the same whatever its unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +71,7 @@ class RelaxedFit:
     effective: float
     converged: bool
     warnings: tuple[str, ...] = ()
+    shooting: Shooting | None = field(default=None, repr=False)  # with steps chosen at θ, if it was
 
     @property
     def std(self) -> Array:
@@ -105,11 +115,14 @@ def start_is_estimated(problem: Problem) -> bool:
                for state in problem.model.states)
 
 
-def first_point(system: BandedSystem) -> tuple[Point, Smoothed | None]:
-    """Splines smoothed through the data, θ at its guess; flat ones where data say too little."""
+def first_point(system: BandedSystem, probes: int = 16) -> tuple[Point, Smoothed | None]:
+    """Splines smoothed through the data, θ at its guess; flat ones where data say too little.
+
+    How smooth they are is told by so many `probes`.
+    """
     functional, theta = system.functional, system.functional.problem.guess
     flat = tuple(functional.resting(r, theta) for r in range(len(functional.parts)))
-    smoothed = smooth(system.over(functional.smoothing()), Point(flat, theta))
+    smoothed = smooth(system.over(functional.smoothing()), Point(flat, theta), probes=probes)
     return (Point(flat, theta), None) if smoothed is None else (smoothed.point, smoothed)
 
 
@@ -139,6 +152,7 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
           refine: bool) -> RelaxedFit:
     """Fit Eq. (2): smooth, warm up, follow the λ-schedule, refine the grid until it has settled.
 
+    It has where the model's simulation has its optimum there as well, or no halving moves θ.
     `plans` is called with the noise level of the data rows (1 where they are divided by σ); the
     schedules after the first are tried only until one explains the data.
 
@@ -149,6 +163,11 @@ def relax(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Schedule]]
     if setup.field.switches:
         notes.append(errors.relaxation_smears())
         refine = False  # no grid settles while a kink wanders through it
+    if refine and outcome.converged and not notes:
+        fit = conclude(setup, grid, system, outcome, stages, notes)
+        shooting = Shooting(setup.problem)
+        if step_left(shooting, fit.theta, fit.std, RELATIVE) <= AGREES * setup.settings.settled:
+            return replace(fit, shooting=shooting)
     gap, settings = 0.0, setup.settings
     for _ in range(settings.refinements if refine else 0):
         grid, before, lam = grid.refined(), outcome.at.point, stages[-1].lam
@@ -176,7 +195,7 @@ def _from_data(setup: Setup, grid: Grid, plans: Callable[[float], Sequence[Sched
     """The whole way on one grid: smooth the data, scale the physics, follow λ."""
     functional = setup.functional(grid)
     system = BandedSystem(functional)
-    point, smoothed = first_point(system)
+    point, smoothed = first_point(system, FEW_PROBES)
     noise = noise_level(functional, smoothed)
     if setup.nondimensional:
         system = system.over(functional.with_scale(physics_scale(functional, point, noise)))
@@ -217,12 +236,12 @@ def follow(system: BandedSystem, point: Point,
     if plan.warmup:
         at = gauss_newton(system, point, lam, point.theta, point.theta, iterations=plan.warmup).at
     while lam is not None:
-        outcomes = [*outcomes[-1:], gauss_newton(system, at, lam, system.lower, system.upper,
-                                                 iterations=MAX_ITERATIONS)]
-        at = outcomes[-1].at
-        stages.append(_stage(system, lam, outcomes[-1]))
-        if plan.locked(stages) and follows_physics(system, at, lam):
+        outcome = gauss_newton(system, at, lam, system.lower, system.upper,
+                               iterations=MAX_ITERATIONS, tolerance=UNDER_WAY)
+        stages.append(_stage(system, lam, outcome))
+        if plan.locked(stages) and follows_physics(system, outcome.at, lam):
             stages[-1] = replace(stages[-1], free=True)
+        outcomes, at = [*outcomes[-1:], outcome], outcome.at
         lam = plan.next(stages)
         if lam is None and len(stages) > 1:
             # Against a bound of its errors the estimate had settled: also against themselves?
@@ -231,7 +250,14 @@ def follow(system: BandedSystem, point: Point,
     kept = plan.keep(stages)
     notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
         stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
-    return stages[:kept + 1], outcomes[kept - len(stages)], notes
+    found, stage = outcomes[kept - len(stages)], stages[kept]
+    if found.converged:  # so far as is enough on the way
+        found = gauss_newton(system, found.at, stage.lam, system.lower, system.upper,
+                             iterations=MAX_ITERATIONS)
+        if found.iterations:
+            found = replace(found, iterations=stage.iterations + found.iterations)
+            stages[kept] = replace(_stage(system, stage.lam, found), free=stage.free)
+    return stages[:kept + 1], found, notes
 
 
 def _stage(system: BandedSystem, lam: float, outcome: Outcome, std: Array | None = None) -> Stage:

@@ -28,6 +28,7 @@ from pikanid.problem.chains import Chains
 from pikanid.problem.problem import Problem
 from pikanid.strategies.finish import evaluate, finish
 from pikanid.strategies.relaxation import RelaxedFit
+from pikanid.strategies.simulated import choose_steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ def relaxed_estimate(strategy: str, fit: RelaxedFit, settings: Mapping[str, Any]
          **{f.label: float(v) for f, v in zip(fit.problem.free, s.theta, strict=True)}}
         for s in fit.stages]
     return assemble(strategy, fit, used, history, begun,
-                    trajectories(fit) if curves is None else curves)
+                    trajectories(fit) if curves is None else curves, fit.shooting)
 
 
 class Relaxed(Protocol):
@@ -103,11 +104,16 @@ class Relaxed(Protocol):
 
 
 def assemble(strategy: str, fit: Relaxed, settings: Mapping[str, Any],
-             history: list[dict[str, float]], begun: float, curves: Curves) -> Estimate:
-    """The `Estimate`: the model simulated at θ, judged, and the curves beside it."""
-    shooting = Shooting(fit.problem)
+             history: list[dict[str, float]], begun: float, curves: Curves,
+             shooting: Shooting | None = None) -> Estimate:
+    """The `Estimate`: the model simulated at θ, judged, and the curves beside it.
+
+    A `shooting` has its steps chosen at θ already.
+    """
+    chosen, shooting = shooting is not None, shooting or Shooting(fit.problem)
     try:
-        shooting.choose_steps(fit.theta, "fine")
+        if not chosen:
+            choose_steps(shooting, fit.theta)
         finished = all(r.finished for r in shooting.responses(fit.theta))
     except errors.SimulationFailed:
         finished = False

@@ -1,4 +1,4 @@
-"""Local spline bases on pykan's unclamped knots, kink functions, and the derivatives of SiLU."""
+"""Local spline bases on pykan's unclamped knots, powers in them, and the derivatives of SiLU."""
 
 from __future__ import annotations
 
@@ -48,19 +48,6 @@ def power_blossom(knots: Array, degree: int, centre: float, order: int) -> Array
         symmetric[1:] += symmetric[:-1] * (knots[step : step + n] - centre)
     ways = factorial(degree) / factorial(degree - order)  # order! times the number of subsets
     return symmetric[order] / ways
-
-
-def truncated_power(t: Array, centre: float | Array, order: int, derivative: int = 0) -> Array:
-    """(t - centre)^order_+ / order! or a derivative, from the right at ``centre``.
-
-    >>> truncated_power(np.array([0.0, 1.0, 3.0]), 1.0, 2, derivative=2)
-    array([0., 1., 1.])
-    """
-    left = order - derivative
-    if left < 0:
-        return np.zeros_like(t)
-    reached = t >= centre
-    return np.where(reached, np.where(reached, t - centre, 0.0) ** left / factorial(left), 0.0)
 
 
 def silu(t: Array, derivative: int = 0) -> Array:

@@ -14,13 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from pikanid.approximators.kan.bases import (
-    Array,
-    Index,
-    power_blossom,
-    spline_rows,
-    truncated_power,
-)
+from pikanid.approximators.kan.bases import Array, Index, power_blossom, spline_rows
 
 
 class KinkTable:
@@ -44,26 +38,16 @@ class KinkTable:
             near = knots[right : end + k + 1]
             self.beside[number, k : k + end - right] = power_blossom(near, k, time, order)
 
-    def entries(self, t: Array, first: Index, rows: Array,
-                derivative: int) -> tuple[Index, Index, Array]:
-        """Where kinks are not zero: time (P,), kink (P,) and value (P,).
+    def join(self, t: Array, derivative: int, first: Index, rows: Array, scale: Array,
+             place: Index, begin: Index, local: Array) -> None:
+        """Write kink j at time m, over scale[j], to local[m, place[j] - begin[m]].
 
         ``first`` and ``rows`` are the active splines' (M,) and (M, k + 1) of `spline_rows`.
         """
-        k = self.degree
-        order = np.argsort(first, kind="stable")
-        begin = np.searchsorted(first[order], self.split - k)
-        count = np.searchsorted(first[order], self.split) - begin
-        kink = np.repeat(np.arange(self.split.size), count)
-        before = np.repeat(np.cumsum(count) - count, count)
-        at = order[np.repeat(begin, count) + np.arange(kink.size) - before]
-        columns = (first[at] - self.split[kink] + k)[:, None] + np.arange(k + 1)
-        spline = np.sum(rows[at] * self.beside[kink[:, None], columns], axis=1)
-        power = np.empty(kink.size)
-        for o in np.unique(self.orders):
-            own = self.orders[kink] == o
-            power[own] = truncated_power(t[at[own]], self.times[kink[own]], int(o), derivative)
-        return at, kink, power - spline
+        from pikanid.approximators.local_basis import join_kinks
+
+        join_kinks(t, derivative, first, rows, self.split, self.beside, self.times, self.orders,
+                   scale, place, begin, local)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +71,9 @@ class Kink:
 
     def __call__(self, t: Array, derivative: int = 0) -> Array:
         """Its part of the curve at ``t`` (M,), shape (M, outputs)."""
-        t = np.asarray(t, float)
+        t = np.array(t, float)
         table = KinkTable([(self.time, self.order)], self.knots, self.degree)
         first, rows = spline_rows(t, self.knots, self.degree, derivative)
-        at, _, values = table.entries(t, first, rows, derivative)
-        found = np.zeros(t.size)
-        found[at] = values
-        return found[:, None] * self.jump
+        found, zeros = np.zeros((t.size, 1)), np.zeros(t.size, np.int64)
+        table.join(t, derivative, first, rows, np.ones(1), zeros[:1], zeros, found)
+        return found * self.jump

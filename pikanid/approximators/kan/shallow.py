@@ -18,7 +18,8 @@ from scipy import sparse
 
 from pikanid import errors
 from pikanid.approximators import local_matrix
-from pikanid.approximators.kan.bases import Index, power_blossom, silu, spline_rows
+from pikanid.approximators.bspline import BSpline
+from pikanid.approximators.kan.bases import Index, power_blossom, silu
 from pikanid.approximators.kan.blank import plan_of
 from pikanid.approximators.kan.kinks import Kink, KinkTable
 from pikanid.approximators.kan.plan import Array, PlannedKan
@@ -130,15 +131,13 @@ class ShallowKAN:
         Raises:
             BadSetting: If a time leaves the grid.
         """
+        from pikanid.approximators.local_basis import spread
+
         t = self._inside(t)
-        active, values = spline_rows(t, self.knots, self.degree, derivative)
-        rows = np.arange(t.size)[:, None]
-        columns = active[:, None] + np.arange(self.degree + 1)
-        first = self._row_start[active]
-        local = np.zeros((t.size, self._row_width))
-        local[rows, self._spline_at[columns] - first[:, None]] = values
-        at, kink, heights = self._table.entries(t, active, values, derivative)
-        local[at, self._kink_at[kink] - first[at]] = heights / self._scale[kink]
+        active, values = self._splines.local(t, derivative)
+        first, local = self._row_start[active], np.zeros((t.size, self._row_width))
+        spread(active, values, self._spline_at, first, local)
+        self._table.join(t, derivative, active, values, self._scale, self._kink_at, first, local)
         if self.has_base:
             local[:, -1] = silu(t, derivative)
         return first, local
@@ -252,6 +251,7 @@ class ShallowKAN:
 
     def _place_kinks(self) -> None:
         n, k = self.n_splines, self.degree
+        self._splines = BSpline(k, self.knots)
         self._table = KinkTable(self._kinks, self.knots, k)
         self._scale = self._spacing ** self._table.orders.astype(float)
         before = np.searchsorted(self._table.split, np.arange(n), side="right")
