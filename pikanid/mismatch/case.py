@@ -113,7 +113,8 @@ class Case:
         prediction = None if best.far else self.predicted(best)
         if self.later is None or prediction is None:
             return
-        self.later, count = without_lone(self.later, prediction.residuals)
+        self.later, count = without_lone(self.later, prediction.residuals,
+                                         self.model.input_names)
         if count:
             note_outliers(count, "the held-out recording", self.notes)
             self.predictions.clear()
