@@ -128,6 +128,14 @@ class Case:
         found = self.test(self.base)
         return found if self.repeats is None else replace(found, p_value=self.repeats.p_value)
 
+    def refuted(self) -> Detection | None:
+        """What held-out recordings alone show of the nominal model, far beyond chance; None where
+        they do not, or where repeats tell.
+        """
+        seen = self.predicted(self.base) if self.proves and self.repeats is None else None
+        found = seen and seen.detection
+        return found if found and smaller(found.p_value, self.settings.refuted) else None
+
     def test(self, h: Hypothesis) -> Detection:
         """What is left in the train recordings."""
         if h.fit not in self.tests:
