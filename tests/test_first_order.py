@@ -165,3 +165,21 @@ def test_a_parameter_drifts_in_every_equation_that_it_stands_in() -> None:
     extended = k.applied(motor)
     for state in ("i", "omega"):
         assert extended.equations[state].has(symbol(k.parameters[0].name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("course", ["exp(-((t - 1.5)/0.11)**2)",
+                                    "exp(-max(t - 1.5, 0)/0.15 - max(1.5 - t, 0)/0.02)"])
+def test_what_happens_once_may_take_any_course(course: str) -> None:
+    """A raised cosine leaves 10 sigma of such a Gaussian, two of them fit and are none."""
+    motor = pk.systems.dc_motor()
+    truth = motor.with_term("omega", f"A*{course}", [pk.Parameter("A", 6000.0, "rad/s^2")])
+
+    def run(model: pk.Model, seed: int) -> pk.Recording:
+        u = np.repeat(np.random.default_rng(seed).uniform(-6.0, 6.0, 32), 25)
+        drive = pk.Recording.from_arrays(0.005 * np.arange(800), {"u": u}, {"u": "V"})
+        return pk.simulate(model, drive, sigma=2.0, seed=seed)
+
+    dx = pk.diagnose(motor, run(truth, 1), run(motor, 2), workers=1)
+    assert dx.verdict in ("named", "set")
+    assert all([e.ids for e in h.effects] == [("disturbance",)] for h in dx.hypotheses)

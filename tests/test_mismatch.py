@@ -175,8 +175,9 @@ def test_a_model_that_fails_on_the_held_out_recording_only_is_not_passed_over(
     moves = excitation.planar_moves(4, 8.0, channels=("u_x", "u_y"), seed=9)
     truth = systems.sloshing().with_term("theta_dot", "-300*theta**3")
     dx = diagnose(systems.sloshing(), recording, simulate(truth, moves, sigma=SIGMA, seed=4))
-    assert dx.verdict == "none"
+    assert dx.verdict == "unnamed" and dx.mismatch and dx.p_value < 1e-6
     assert any("does not predict the held-out one" in note for note in dx.notes)
+    assert dx.to_dict()["verdict"] == "unnamed" and "missing" in dx.sentence()
 
 
 @pytest.mark.slow

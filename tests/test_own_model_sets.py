@@ -14,9 +14,9 @@ from pikanid.cli import main
 from pikanid.model import Effect
 from pikanid.model.parts import Parameter
 from pikanid.validation.concealed.score import judge
-from pikanid.validation.own_model.case import Order, make
+from pikanid.validation.own_model.case import Order, acting, make
 from pikanid.validation.own_model.generate import OwnSet, generate
-from pikanid.validation.own_model.hidden import Workbench
+from pikanid.validation.own_model.hidden import Hidden, Workbench
 from pikanid.validation.own_model.law import Law
 from pikanid.validation.own_model.plant import Plant
 from pikanid.validation.own_model.rig import Rig
@@ -135,6 +135,12 @@ def test_noise_is_what_was_asked_for(motor_rig: Rig, tmp_path: Path) -> None:
     assert sigma == pytest.approx(0.005 * np.ptp(clean), rel=1e-3)
     assert np.std(seen["omega"].values - clean) == pytest.approx(sigma, rel=0.2)
     assert seen["omega"].unit == "rad/s"
+
+
+def test_what_happens_once_is_in_one_recording(motor_rig: Rig) -> None:
+    once, lasting = (Hidden(law(motor_rig, key), {}) for key in ("disturbance", "coulomb_friction"))
+    assert acting([once, lasting], "train") == [once, lasting]
+    assert acting([once, lasting], "held_out") == [lasting]
 
 
 def test_a_set_of_ones_own(motor_rig: Rig, tmp_path: Path) -> None:

@@ -113,7 +113,8 @@ class Case:
         prediction = None if best.far else self.predicted(best)
         if self.later is None or prediction is None:
             return
-        self.later, count = without_lone(self.later, prediction.residuals)
+        self.later, count = without_lone(self.later, prediction.residuals,
+                                         self.model.input_names)
         if count:
             note_outliers(count, "the held-out recording", self.notes)
             self.predictions.clear()
@@ -126,6 +127,14 @@ class Case:
         """Whether the nominal model leaves anything; between repeats, what they differ by tells."""
         found = self.test(self.base)
         return found if self.repeats is None else replace(found, p_value=self.repeats.p_value)
+
+    def refuted(self) -> Detection | None:
+        """What held-out recordings alone show of the nominal model, far beyond chance; None where
+        they do not, or where repeats tell.
+        """
+        seen = self.predicted(self.base) if self.proves and self.repeats is None else None
+        found = seen and seen.detection
+        return found if found and smaller(found.p_value, self.settings.refuted) else None
 
     def test(self, h: Hypothesis) -> Detection:
         """What is left in the train recordings."""

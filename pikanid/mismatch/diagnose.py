@@ -97,7 +97,9 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
     tell("detection")
     detection = case.detected()
     if not smaller(detection.p_value, settings.alpha):
-        return reported(case, detection, Answer("none", (), ()), case.sites[0], None)
+        refuted = case.refuted()
+        nothing = Answer("unnamed" if refuted else "none", (), ())
+        return reported(case, refuted or detection, nothing, case.sites[0], None)
     ranked = with_noise_of_the_rest(case, searched(case, tell), quiet, tell)
     tell("confirmation")
     answer, site, shape = _beyond(case, confirmed(case, ranked), tell)

@@ -161,7 +161,11 @@ class Candidate:
     probes: tuple[Mapping[str, float], ...] = ()
 
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
-        """Whether it is an explanation of its own beside these."""
+        """Whether it is an explanation of its own beside these.  Of two that act once each may be
+        what the shape of the other lacks.
+        """
+        if self.absent and any(e.absent and e.key != self.key for e in others):
+            return False
         return not self.beside or any(i in self.beside for e in others for i in e.ids)
 
     @property

@@ -15,6 +15,9 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 INF = float("inf")
+SKEWEST = 0.95  # numerical: of the width, that one side of what acts once may take
+NEXT_TO_NONE = 1e-9  # numerical: square of a distance from a peak, in quarters of its width
+USUAL_PEAK = 2.5  # numerical: exponent of a hump, from about which fits of a course begin
 NEAREST = 0.1  # definition: of the half range, at which a wall may stand
 SIDE, BOTH = "negative side", "both sides"
 SIDES = {"": (1,), SIDE: (-1,), BOTH: (1, -1)}  # definition: of the walls of each variant
@@ -147,7 +150,11 @@ def wall_force(site: Site, distance: str, stiffness: str, variant: str, power: i
 
 
 def disturbance(site: Site) -> list[Candidate]:
-    """A force that acts once, for a short time."""
+    """A force that acts once, for a short time: a hump, or one whose course is left open,
+
+    a exp(-ln 2 (4 |t - t₀| / w (1 ± s))ⁿ), with w/2 wide at half its height: with n from a cusp to
+    a stretch of constant force, and with s it rises as much faster than it falls.
+    """
     a = Parameter(site.name("peak"), 0.0, site.force_unit)
     first, last = site.span
     # what nothing follows that it set in motion cannot be told from a few bad samples
@@ -175,9 +182,18 @@ def disturbance(site: Site) -> list[Candidate]:
                       for centre, hump in zip(centres, humps, strict=True)]
         return found
 
-    return [Candidate(("disturbance",), "a force local in time", text, "dynamics", site, (a, at, w),
-                      lambda m: m.with_term(site.v, text), directions, per_recording=True,
-                      absent=True)]
+    hump = Candidate(("disturbance",), "a force local in time", text, "dynamics", site, (a, at, w),
+                     lambda m: m.with_term(site.v, text), directions, per_recording=True,
+                     absent=True)
+    s = Parameter(site.name("skew"), 0.0, "", (-SKEWEST, SKEWEST))
+    n = Parameter(site.name("n_peak"), USUAL_PEAK, "", (1.0, 20.0))
+    sides = (f"max(t - {at.name}, 0)/(1 + {s.name}) + max({at.name} - t, 0)/(1 - {s.name})")
+    # the logarithm of no distance at all has no value, which a derivative by n asks for
+    course = f"{a.name}*exp(-log(2)*((4/{w.name}*({sides}))**2 + {NEXT_TO_NONE})**({n.name}/2))"
+    return [hump, replace(
+        hump, name="a force local in time, its course open", expression=course, variant="open",
+        parameters=(a, at, w, s, n), extend=lambda m: m.with_term(site.v, course),
+        directions=lambda view: [], covers={hump.key: {}})]
 
 
 def _humps(t: np.ndarray, centres: np.ndarray, width: float) -> np.ndarray:

@@ -1,13 +1,18 @@
-"""Samples that are no part of a motion: gross errors, alone among their neighbours."""
+"""Samples that are no part of a motion: gross errors, alone among their neighbours.
+
+What follows a step of an input is alone as well where a rig is as fast as its sampling: what the
+inputs' past explains is taken away first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.data.inputs_past import explained
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
@@ -18,8 +23,8 @@ CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0  # numerical: through two ne
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
-def without_outliers(recording: Recording, output: str, settings: Settings
-                     ) -> tuple[Recording, int]:
+def without_outliers(recording: Recording, output: str, settings: Settings,
+                     inputs: Sequence[str] = ()) -> tuple[Recording, int]:
     """The recording without samples that leave the cubic through their neighbours, and how many.
 
     The worst goes first: beside a spike its neighbours look bad as well.
@@ -36,6 +41,7 @@ def without_outliers(recording: Recording, output: str, settings: Settings
     # where σ is known sample by sample, an uncertain one is no outlier
     given = channel.sigma[seen] if isinstance(channel.sigma, np.ndarray) else 0.0
     own = np.maximum(sigma, given) * np.ones(len(y))
+    y -= from_inputs(recording, channel.time[seen], y, inputs, settings)
     gap = np.zeros(len(y))
     gap[2:-2] = y[2:-2] - np.convolve(y, CUBIC, "valid")
     bad: list[int] = []
@@ -52,6 +58,15 @@ def without_outliers(recording: Recording, output: str, settings: Settings
     values = channel.values.copy()
     values[seen[bad]] = np.nan
     return recording.with_channels(replace(channel, values=values)), len(bad)
+
+
+def from_inputs(recording: Recording, t: np.ndarray, y: np.ndarray, inputs: Sequence[str],
+                settings: Settings) -> np.ndarray:
+    """The part (N,) of a signal or a residual y (N,) at times t that these inputs' past explains
+    beyond chance.
+    """
+    return explained(t, y, [recording[u] for u in inputs if u in recording],
+                     settings.detection.lags, settings.noise.by_chance)
 
 
 def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
@@ -85,16 +100,18 @@ def with_humps(residual: np.ndarray, kept: np.ndarray, together: int) -> np.ndar
     return np.union1d(kept, np.concatenate([run for run in runs if len(run) >= together] or [kept]))
 
 
-def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np.ndarray]]
-                 ) -> tuple[Records, int]:
+def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np.ndarray]],
+                 inputs: Sequence[str] = ()) -> tuple[Records, int]:
     """Records without the samples that are alone in residuals, and how many.
 
     Args:
         records: Any.
         seen: Number of the recording, output, times (N,) and residual (N,) there.
+        inputs: Of the model.
     """
     recordings, count, noise = list(records.recordings), 0, records.settings.noise
-    for r, name, t, residual in seen:
+    for r, name, t, left in seen:
+        residual = left - from_inputs(recordings[r], t, left, inputs, records.settings)
         kept = np.arange(len(t))
         # two that are neighbours hide each other: the second shows when the first has gone
         while (bad := lone(residual[kept], noise)).any() and (

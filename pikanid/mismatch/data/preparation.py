@@ -10,7 +10,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.mismatch.data.noise_level import first_level, refined
-from pikanid.mismatch.data.outliers import without_lone, without_outliers
+from pikanid.mismatch.data.outliers import from_inputs, without_lone, without_outliers
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.budget import Budget
 from pikanid.mismatch.settings.noise import NoiseSettings
@@ -39,7 +39,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
         for output in model.outputs:
             channel = recording.as_output(output.name, output.unit or None)
             recording, count = without_outliers(
-                recording.with_channels(channel), output.name, settings)
+                recording.with_channels(channel), output.name, settings, model.input_names)
             if count:
                 notes.append(f"Recording '{recording.name}': {count} outliers of "
                              f"'{output.name}' are left out.")
@@ -171,7 +171,9 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
     """
     outputs = [(r, name) for r, found in enumerate(records.levels) for name in found]
     fits = dict(zip(outputs, fit.fits, strict=True))
-    records, count = without_lone(records, [(*key, f.t, f.residual) for key, f in fits.items()])
+    inputs = fit.fitted_model.input_names
+    records, count = without_lone(records, [(*key, f.t, f.residual) for key, f in fits.items()],
+                                  inputs)
     levels = []
     for r, (recording, found) in enumerate(zip(records.recordings, records.levels, strict=True)):
         new = {}
@@ -180,6 +182,8 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
             kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
             # of samples whose σ differ, what is left is compared as if all had the common one
             left = f.residual * level.sigma / level.spreads(f.sigma, len(f.t))
+            # what still follows the inputs is misfit, however fast
+            left -= from_inputs(recording, f.t, left, inputs, records.settings)
             again = refined(level, recording[name], f.t[kept], left[kept], rate, quiet,
                             records.settings, explained)
             new[name] = loud_enough(again, recording[name])

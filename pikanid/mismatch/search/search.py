@@ -132,7 +132,7 @@ class Search:
         if not adequate(self.ranked()[0]):
             for h in neighbours.leading(self.ranked())[:budget.leading]:
                 self._fit_all([job for job in neighbours.with_wider(h, self.candidates)
-                               if all(e.known for e in job[0])], always=True)
+                               if all(e.known for e in job[0])], again=True, always=True)
         best = self.ranked()[0]
         if any(e.other_minima for e in best.effects) and not adequate(best):
             best = self._fit(best.effects, [best.point], again=True)  # hills left for later

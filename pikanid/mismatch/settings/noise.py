@@ -28,6 +28,8 @@ class NoiseSettings:
         lone: Median gaps by which it must once a fit is taken away: of white noise one sample in
             4000 does, counted.
         together: Neighbours that are alone together are none: a sensor may have been at its end.
+        by_chance: Rate at which noise counts as what the inputs' past explains: it is asked of
+            every output of every recording, several times.
         least_alone: Samples of which some can be alone: neighbours say nothing in fewer.
         most_outliers: Share of the samples: where more are alone, nothing is.
         freedom: Samples beyond the free parameters: σ² read off n of them has a relative standard
@@ -54,6 +56,7 @@ class NoiseSettings:
     spike: Amount = 5.0
     lone: Amount = 9.0
     together: Count = 3
+    by_chance: Rate = 1e-6
     least_alone: Annotated[int, Range(7, whole=True)] = 20
     most_outliers: Share = 0.1
     freedom: Count = 20

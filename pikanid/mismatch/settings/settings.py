@@ -37,6 +37,8 @@ class Settings:
         refusal: Rate at which a right hypothesis is refused for what it leaves in the recordings it
             was fitted to or in held-out ones, half of it in each.
         refusal_together: The same for what it leaves in all of them together.
+        refuted: Rate at which held-out recordings alone refute a right model: their noise may
+            differ a little from that of the others.
         needless: Rate at which a search goes on though nothing is left.
         noise_refusal: Rate at which repeats refuse the noise level that was found, if it is right.
         noise_excess: Probability that the noise is louder than what strong effects are asked
@@ -80,6 +82,7 @@ class Settings:
     power: Rate = 0.9
     refusal: Rate = 0.01
     refusal_together: Rate = 0.001
+    refuted: Rate = 1e-6
     needless: Rate = 0.05
     noise_refusal: Rate = 0.05
     noise_excess: Rate = 0.05

@@ -11,7 +11,7 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate, widened
-from pikanid.mismatch.fitting.decisions import below
+from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.verdict import Answer
@@ -41,7 +41,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
                                    case.settings, counts)
     proof = _proof(case, answer, best)
-    if answer.verdict == "none" and proof is not None and proof.p_value < alpha:
+    alone = not smaller(case.detected().p_value, alpha)
+    if alone and not answer.given and proof is not None and proof.p_value < alpha:
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")

@@ -56,7 +56,7 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     truth = bench.seen(hidden)
     recordings, noisy = {}, np.random.default_rng(rng.integers(2**63))
     for key, experiment in (("train", rig.train), ("held_out", rig.held_out)):
-        seen = bench.outputs(hidden, experiment)
+        seen = bench.outputs(acting(hidden, key), experiment)
         spoilt = {n: y + scene.sigma[n] * noisy.standard_normal(len(y)) for n, y in seen.items()}
         recordings[f"{order.name}_{key}.csv"] = _csv(experiment, rig, spoilt)
     nominal = bench.fitted(truth, []).distance if hidden else 0.0
@@ -74,6 +74,11 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
         "visibility": {"nominal": nominal, "effects": alone, "best_rival": list(rival[0]),
                        "best_rival_distance": _finite(distance)},
         "nameable": nameable(hidden, nominal, distance)})
+
+
+def acting(hidden: Sequence[Hidden], part: str) -> list[Hidden]:
+    """What acts in a part of a case, "train" or "held_out": what happens once does so in one."""
+    return [h for h in hidden if part == "train" or "once" not in h.law.families]
 
 
 def _chosen(kind: str, laws: Sequence[Law], rng: np.random.Generator) -> list[Law]:

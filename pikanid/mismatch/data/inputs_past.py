@@ -1,0 +1,88 @@
+"""What the recorded inputs' past explains of a signal beyond what its own past does.
+
+A rig that is as fast as its sampling answers a step of its input between two samples.  What follows
+the inputs like that is no noise, and no gross error, whatever the model says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import fdtrc
+
+from pikanid.noise.autoregressive import fit, innovations
+from pikanid.noise.projection import orthonormal
+from pikanid.problem.held import HeldInput
+from pikanid.recording.channel import Channel
+
+GAP = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0  # numerical: by which it is left
+CLIPPED = 3.0  # numerical: standard deviations beyond which a deviation counts as so much only
+ROUNDS = 10  # numerical: of a fit that gross errors must not lead
+ROWS = 10  # numerical: samples a column from which on those are told from noise
+NORMAL = 0.6745  # definition: median absolute value of a unit Gaussian
+
+
+def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[Channel], lags: int, chance: float
+              ) -> np.ndarray:
+    """The part (N,) of a signal y (N,) that is a weighted sum of the inputs some samples ago; zeros
+    where they tell no more of the next sample than its own past does (C. W. J. Granger,
+    Econometrica 37, 1969).
+
+    The weights are those that explain best how samples leave the cubic through their neighbours:
+    slow parts of the signal, whatever they are, do not lead them away.
+
+    Args:
+        t: (N,) [s].
+        y: (N,) there.
+        inputs: As recorded; one that is not held is so between its samples.
+        lags: Intervals up to which the past reaches.
+        chance: That noise alone is explained as well.
+
+    >>> t = np.arange(300.0)
+    >>> u = np.repeat(np.random.default_rng(0).normal(size=30), 10)
+    >>> y = 2 * np.concatenate([[u[0]], u[:-1]])
+    >>> part = explained(t, y, [Channel("u", t, u, "V")], 5, 1e-6)
+    >>> bool(np.ptp(part - y) < 1e-9)
+    True
+    """
+    X = _past(t, inputs, lags)
+    nothing = np.zeros(len(y))
+    if not X.shape[1] or len(y) < ROWS * X.shape[1]:
+        return nothing
+    own = fit(y - y.mean())
+    seen = np.stack([innovations(x, own) for x in (X - X.mean(axis=0)).T], axis=1)
+    _, p_value = _robust(innovations(y - y.mean(), own), seen)
+    if not p_value < chance:
+        return nothing
+    gaps = np.stack([np.convolve(x, GAP, "valid") for x in X.T], axis=1)
+    said, _ = _robust(np.convolve(y, GAP, "valid"), gaps)
+    return np.asarray(X @ np.linalg.lstsq(gaps, said, rcond=None)[0])
+
+
+def _robust(wanted: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
+    """What columns (N, k) explain of rows (N,), and how likely they do of white noise by chance;
+    gross errors count little (P. J. Huber, Ann. Math. Stat. 35, 1964).
+    """
+    q = orthonormal(columns)
+    said, most = q @ (q.T @ wanted), np.inf
+    for _ in range(ROUNDS):
+        rest = np.abs(wanted - said)
+        most = CLIPPED * float(np.median(rest)) / NORMAL
+        root = np.sqrt(most / np.maximum(rest, max(most, 1e-300)))
+        said = q @ np.linalg.lstsq(root[:, None] * q, root * wanted, rcond=None)[0]
+    k, freedom = q.shape[1], len(wanted) - q.shape[1] - 1
+    left = max(float(np.sum(np.minimum(np.abs(wanted - said), most) ** 2)), 1e-300)
+    return said, float(fdtrc(k, freedom, float(said @ said) / k * freedom / left)) if k else 1.0
+
+
+def _past(t: np.ndarray, inputs: Sequence[Channel], lags: int) -> np.ndarray:
+    """Columns (N, k): every input that moves, one interval ago and more.
+
+    At the same instant an input may know the output's noise, where a controller drives it.
+    """
+    step = float(np.median(np.diff(t)))
+    held = [HeldInput(u.name, u.time, u.values, "zero" if u.hold in (None, "zero") else "first")
+            for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0]
+    columns = [u.at(t, k * step) for u in held for k in range(1, lags + 1)]
+    return np.stack(columns, axis=1) if columns else np.empty((len(t), 0))

@@ -1,0 +1,121 @@
+"""What the inputs' past explains is neither noise nor an outlier."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pikanid.mismatch.data.inputs_past import explained
+from pikanid.mismatch.data.outliers import without_lone, without_outliers
+from pikanid.mismatch.data.preparation import with_refined_noise
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.model import Model, systems
+from pikanid.noise.level import NoiseModel
+from pikanid.recording import Recording
+from pikanid.recording.channel import Channel
+from pikanid.simulation import simulate
+from pikanid.strategies.nls import NLS
+
+STEP = 0.005
+SIGMA = 2.0  # rad/s
+
+
+def driven(seed: int, n: int = 800, hold: int = 25) -> Recording:
+    """A voltage of random levels, as the motor below is driven by."""
+    u = np.repeat(np.random.default_rng(seed).uniform(-6.0, 6.0, n // hold), hold)
+    return Recording.from_arrays(STEP * np.arange(n), {"u": u}, {"u": "V"})
+
+
+def motor(late: float = 0.0) -> Model:
+    """As fast as it is sampled, with its sensor late."""
+    model = systems.dc_motor()
+    return model.map_output("omega", delay=repr(late)) if late else model
+
+
+def recorded(seed: int, late: float = 0.0) -> Recording:
+    """Its speed."""
+    return simulate(motor(late), driven(seed), sigma=SIGMA, seed=seed)
+
+
+def test_a_fast_rig_has_no_outliers() -> None:
+    """What it does after a step of the voltage looks like one from the signal alone."""
+    run = recorded(1)
+    _, alone = without_outliers(run, "omega", DEFAULTS)
+    _, known = without_outliers(run, "omega", DEFAULTS, ("u",))
+    assert alone > 0 and known == 0
+
+
+def test_a_gross_error_of_a_fast_rig_is_one() -> None:
+    """Where the voltage does not explain it."""
+    run = recorded(2)
+    bad = [110, 360, 613]
+    values = run["omega"].values.copy()
+    values[bad] += np.array([60.0, -60.0, 60.0])
+    clean, count = without_outliers(
+        run.with_channels(replace(run["omega"], values=values)), "omega", DEFAULTS, ("u",))
+    assert count == 3 and np.flatnonzero(np.isnan(clean["omega"].values)).tolist() == bad
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_delay_is_no_noise(seed: int) -> None:
+    """A sensor that is late by a good part of a sample was read as noise of its own colour, three
+    times as loud, and its largest errors as outliers.
+    """
+    run = recorded(seed, 0.6 * STEP)
+    fit = NLS().fit(motor(), run.with_sigma({"omega": SIGMA}))
+    records = Records((run,), ({"omega": NoiseModel(SIGMA, 0.0, 0.3, STEP, "the start")},),
+                      DEFAULTS)
+    assert np.std(fit.fits[0].residual) > 2 * SIGMA
+    refined, count = with_refined_noise(records, fit, 0.0, None)
+    level = refined.levels[0]["omega"]
+    assert count <= 2, "but for where it starts, from before which no input is known"
+    assert level.rho == 0
+    # 750 ordinates: 4 standard errors
+    assert level.sigma == pytest.approx(SIGMA, rel=0.11)
+
+
+def test_noise_is_not_explained_by_chance() -> None:
+    """Coloured or white, by inputs that move at random or in steps; a signal without an input is
+    not either.
+    """
+    t = STEP * np.arange(600)
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        noise = rng.standard_normal(600)
+        if seed % 2:
+            for k in range(1, 600):
+                noise[k] += 0.8 * noise[k - 1]
+        moves = [Channel("a", t, rng.standard_normal(600), "V"), driven(seed, 600)["u"]]
+        assert not explained(t, noise, moves, 12, 1e-4).any()
+    assert not explained(t, noise, [], 12, 1e-4).any()
+
+
+def test_noise_that_a_controller_feeds_back_stays_noise() -> None:
+    """At the same instant its output knows the noise that the sensor gave it."""
+    rng = np.random.default_rng(3)
+    t, noise = STEP * np.arange(600), rng.standard_normal(600)
+    assert not explained(t, noise, [Channel("u", t, -2.0 * noise, "V")], 12, 1e-4).any()
+
+
+def test_gross_errors_do_not_hide_what_inputs_explain() -> None:
+    """They are a thousand times as large as the noise."""
+    t, u = STEP * np.arange(1000), driven(4, 1000)["u"]
+    answer = np.convolve(u.values, [0.0, 0.5, 0.3, 0.2])[:1000]
+    y = answer + 0.01 * np.random.default_rng(4).standard_normal(1000)
+    y[[77, 391, 708]] += 10.0
+    left = y - explained(t, y, [u], 12, 1e-6)
+    jumps = np.abs(np.diff(np.delete(left, [77, 391, 708])))[5:]
+    assert jumps.max() < 0.1
+
+
+def test_residuals_of_a_late_sensor_are_not_alone() -> None:
+    """Each of them follows a step of the voltage."""
+    run = recorded(5, 0.6 * STEP)
+    left = run["omega"].values - simulate(motor(), driven(5))["omega"].values
+    records = Records((run,), ({},), DEFAULTS)
+    seen = [(0, "omega", run["omega"].time, left)]
+    assert without_lone(records, seen)[1] > 0
+    assert without_lone(records, seen, ("u",))[1] == 0
