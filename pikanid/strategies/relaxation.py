@@ -247,16 +247,21 @@ def follow(system: BandedSystem, point: Point,
             # Against a bound of its errors the estimate had settled: also against themselves?
             stages[-2] = replace(stages[-2], std=standard_errors(system, outcomes[-2]))
             lam = plan.next(stages)
-    kept = plan.keep(stages)
-    notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
-        stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
-    found, stage = outcomes[kept - len(stages)], stages[kept]
-    if found.converged:  # so far as is enough on the way
+    while True:
+        kept = plan.keep(stages)
+        found, stage = outcomes[kept - len(stages)], stages[kept]
+        if not found.converged:
+            break
+        # so far as is enough on the way: what then goes no further is no stage to keep
         found = gauss_newton(system, found.at, stage.lam, system.lower, system.upper,
                              iterations=MAX_ITERATIONS)
         if found.iterations:
             found = replace(found, iterations=stage.iterations + found.iterations)
             stages[kept] = replace(_stage(system, stage.lam, found), free=stage.free)
+        if plan.keep(stages) == kept:
+            break
+    notes = [(errors.relaxation_locked if stage.converged else errors.relaxation_stuck)(
+        stage.lam, stages[kept].lam) for stage in stages[kept + 1:]]
     return stages[:kept + 1], found, notes
 
 
