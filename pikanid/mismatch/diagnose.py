@@ -100,7 +100,12 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
         refuted = case.refuted()
         nothing = Answer("unnamed" if refuted else "none", (), ())
         return reported(case, refuted or detection, nothing, case.sites[0], None)
-    ranked = with_noise_of_the_rest(case, searched(case, tell), quiet, tell)
+    first, ranked = case.base, searched(case, tell)
+    if case.base is not first and not smaller(
+            (detection := case.detected()).p_value, settings.alpha):
+        # the nominal model had been in a wrong minimum
+        return reported(case, detection, Answer("none", (), ()), case.sites[0], None)
+    ranked = with_noise_of_the_rest(case, ranked, quiet, tell)
     tell("confirmation")
     answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
     if answer.part is not None and case.adequate(late := answer.part.hypothesis) and all(

@@ -102,6 +102,13 @@ def with_parts(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
                     yield [*found.values()], [{**h.point, **start}]
 
 
+def reduced(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """Without an effect, or with less than it in its place."""
+    yield from without_one(h)
+    yield from with_simpler(h, candidates)
+    yield from with_parts(h, candidates)
+
+
 def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """With what small motions cannot tell from one of its effects in that one's place."""
     for effect in h.effects:
@@ -137,6 +144,12 @@ def wide(h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
     far = h.whitened.settings.fits.far
     simpler = (fits.get(h.key - {e.key} | {part}) for e in h.effects for part in e.covers)
     return any(o is not None and o.minimum.chi2 < far * h.minimum.chi2 for o in simpler)
+
+
+def to_extend(ranked: Sequence[Hypothesis], fits: Mapping[frozenset[str], Hypothesis]
+              ) -> list[Hypothesis]:
+    """Hypotheses that effects are added to, best first: the leading ones that are not wide."""
+    return [h for h in leading(ranked) if not wide(h, fits)] or [*ranked[:1]]
 
 
 def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:

@@ -38,8 +38,7 @@ class Search:
         records: To explain.
         candidates: Entries of the catalogue and decoys.
         tell: Called with what is being done.
-        predicts: Whether the second hypothesis is worth its effects beyond the first one, as far as
-            other recordings say.
+        predicts: Whether other recordings say that the second hypothesis is worth its effects.
         fits: The closest fit of each set of effects.
         begun: Where fits have begun.
         failed_searches: Effects that were looked for beyond all hills, and explained nothing.
@@ -84,11 +83,15 @@ class Search:
     def run(self, adequate: Adequate) -> list[Hypothesis]:
         """All hypotheses tried, best first; `adequate` says of one that nothing is left."""
         every, budget = [c for c in self.candidates if c.fits and c.suits()], self.settings.budget
-        screen = Screen(self.base(), every, self.guess)
         self.tell("single effects")
-        always = entry if self.base().far else law
-        self._fit_all([((c,), starts) for c, starts in screen.singles(
-            budget.singles, always=always)], always=True)
+        for count in range(budget.nominal_again):
+            screen = Screen(base := self.base(), every, self.guess)
+            self._fit_all([((c,), starts) for c, starts in screen.singles(
+                budget.singles, always=entry if base.far else law)], again=count > 0, always=True)
+            self._fit_all([((), [h.point]) for h in neighbours.leading(self.ranked())[
+                :budget.leading]], again=True, always=True)
+            if self.base() is base:
+                break  # else effects had led out of a minimum that only the nominal model was in
         if self.base().far and self.base().pinned:
             # at a bound the model explains as little as it can: effects show about the guess
             about = fitted(self.nominal, (), self.records, [self.guess], self.choices,
@@ -116,8 +119,7 @@ class Search:
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
             near = rows + settings.fits.far * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
-            simple = [h for h in neighbours.leading(self.ranked())
-                      if not neighbours.wide(h, self.fits)] or [best]
+            simple = neighbours.to_extend(self.ranked(), self.fits)
             for h in simple[: budget.leading if count == 1 else 1]:
                 if len(h.effects) < budget.effects and (h is simple[0] or h.minimum.chi2 < near):
                     self._extend(h, budget.beside_one if count == 1 else budget.beside_more,
@@ -164,19 +166,16 @@ class Search:
                 yield h
 
     def _simplify(self) -> None:
-        """Leave each effect of the best hypothesis out, or put a law that it contains in its place,
-        the fit going on where it stood: what led there may have been no more than a way out of a
-        local minimum.
+        """Leave each effect of the best hypothesis out, or put a law that it contains in its place:
+        what led there may have been no more than a way out of a local minimum.
         """
         if self.ranked()[0].far:
             for closest in neighbours.closest_of_each(self.fits.values()):
                 self._fit_all([*neighbours.without_one(closest)], again=True, always=True)
         for _ in range(self.settings.budget.effects):
             best = self.ranked()[0]
-            self._fit_all([*neighbours.without_one(best),
-                           *neighbours.with_simpler(best, self.candidates),
-                           *neighbours.with_parts(best, self.candidates)], again=True,
-                          always=True, settled=best.key if self.budget_exhausted else frozenset())
+            self._fit_all([*neighbours.reduced(best, self.candidates)], again=True, always=True,
+                          settled=best.key if self.budget_exhausted else frozenset())
             if self.ranked()[0] is best:
                 break
 
@@ -219,6 +218,7 @@ class Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
         new = replace(self, records=records, fits={}, begun=set(),
                       failed_searches=set(self.failed_searches))
+        new._fit_all([((), [self.base().point])], always=True)
         new.base()
         budget, ranked = self.settings.budget, self.ranked()
         near = self.settings.fits.far * (ranked[0].minimum.chi2 + ranked[0].whitened.rows)
@@ -258,7 +258,7 @@ class Search:
 
     def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False) -> Hypothesis:
         self._fit_all([(effects, starts)], again, always=True)
-        return self.fits.get(frozenset(e.key for e in effects), self.fits[frozenset()])
+        return self.fits.get(frozenset(e.key for e in effects), self.base())
 
     def _fit_all(self, jobs: Sequence[Job], again: bool = False, always: bool = False,
                  reach: float = 0.0, settled: frozenset[str] = frozenset()) -> None:

@@ -22,6 +22,7 @@ class Budget:
         modes: Of the residuals of repeats that are told apart.
         draws: Of the distribution of a test.
         singles: Refits of one effect.
+        nominal_again: Times that these begin, as long as they lead the nominal model to a lower χ².
         pairs: Refits of two effects at once.
         pairs_weighed: Pairs of signs that are gone through for these.
         names_a_decoy: Effects with a name that are fitted for each one without.
@@ -77,6 +78,7 @@ class Budget:
     modes: Count = 800
     draws: Count = 4000
     singles: Count = 14
+    nominal_again: Count = 3
     pairs: Count = 8
     pairs_weighed: Count = 4000
     names_a_decoy: Count = 3

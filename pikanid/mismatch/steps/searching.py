@@ -12,6 +12,7 @@ def searched(case: Case, tell: Callable[[str], None]) -> list[Hypothesis]:
     """Hypotheses that explain the recordings best, the closest first."""
     search = case.begin_search()
     ranked = search.run(case.adequate)
+    case.base = search.base()
     if search.records is case.records:
         return ranked
     tell("whole recordings")
