@@ -47,8 +47,8 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None, probes:
 
     `system` is built on `functional.smoothing()`; θ stays.
     """
-    data = system.linearise(point, 0.0)
-    both = system.linearise(data, 1.0)
+    both = system.linearise(point, 1.0)
+    data = system.linearise(both, 0.0)
     mass = sum(float(b.band[0].sum()) for b in data.blocks)
     rough = sum(float(b.band[0].sum()) for b in both.blocks) - mass
     if mass <= 0.0 or rough <= 0.0:
