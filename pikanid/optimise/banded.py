@@ -105,11 +105,10 @@ class BandedAssembler:
     def normal(self, products: Products, lam: float) -> BandedNormal:
         """JᵀJ and Jᵀr of all families together, at any λ."""
         ratio, kd = 1.0 if lam == products.lam else lam / products.lam, self.bandwidth
-        (seen, whole, *rest), (own, corner, *others) = products.whole, products.corner
-        whole, corner = seen + ratio * whole, own + ratio * corner
-        for more, at_corner in zip(rest, others, strict=True):
-            whole += more
-            corner += at_corner
+        whole, corner = ratio * products.whole[1], ratio * products.corner[1]
+        for k in range(0, len(products.whole), 2):  # the data, and what holds the start
+            whole += products.whole[k]
+            corner += products.corner[k]
         costs = list(products.costs)
         costs[self.data] *= ratio
         return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs))
