@@ -86,9 +86,9 @@ class Pencil:
         self.blocks = []
         sizes = [block.slope.size for block in data.blocks]
         number = min(max(4000 // max(1, sum(sizes)), 1), probes)
-        probes = _probes(tuple(sizes), number)
-        for size, only, all_, probe in zip(sizes, data.blocks, both.blocks, probes, strict=True):
-            right = np.empty((size, number + 1))
+        drawn = _probes(tuple(sizes), number)
+        for only, all_, probe in zip(data.blocks, both.blocks, drawn, strict=True):
+            right = np.empty((len(probe), number + 1))
             right[:, :-1], right[:, -1] = multiply(only.band, probe), -only.slope
             self.blocks.append((np.ascontiguousarray(only.band.T),
                                 np.ascontiguousarray((all_.band - only.band).T), right,
@@ -133,7 +133,7 @@ class Pencil:
         return Score(rho, self.count * residual / left**2, residual, effective)
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=2)
 def _probes(sizes: tuple[int, ...], number: int) -> list[Array]:
     """Random signs (size, number) for every recording; callers only read them."""
     generator = np.random.default_rng(0)
