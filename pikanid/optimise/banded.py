@@ -53,6 +53,19 @@ class BandedNormal(NamedTuple):
     costs: tuple[float, ...]  # ‖r‖² of each family
 
 
+class Products(NamedTuple):
+    """Sums of products of one recording: of the data, of the physics, and of what holds its start.
+
+    Each as in `BandedNormal`, band and right-hand columns side by side: whole (G, n, kd + b + 2)
+    and corner (G, b + 1, b + 1), G = 2 where nothing need hold the start.
+    """
+
+    whole: Array
+    corner: Array
+    costs: tuple[float, ...]  # ‖r‖² of each family
+    lam: float  # at which those of the physics were taken
+
+
 class BandedAssembler:
     """Knows the sparsity of one recording's Jacobian; multiplies it out at every iterate.
 
@@ -61,7 +74,7 @@ class BandedAssembler:
     """
 
     def __init__(self, part: Part, families: list[Sites], b: int):
-        self.n, self.b = part.n_coefficients, b
+        self.n, self.b, self.data = part.n_coefficients, b, len(part.data)
         self.order = _interleave(part, self.n)
         position = np.empty(self.n, dtype=np.int64)
         position[self.order] = np.arange(self.n)
@@ -72,19 +85,37 @@ class BandedAssembler:
             int((own.columns.max(axis=1) - own.columns.min(axis=1)).max())
             for own in self.stretches])
 
-    def normal(self, rows: Sequence[Rows]) -> BandedNormal:
-        """Assemble JᵀJ and Jᵀr from the residual families, all of them or the first ones."""
+    def products(self, rows: Sequence[Rows], lam: float) -> Products:
+        """Multiply out all residual families, taken at λ."""
         from pikanid.optimise.banded_products import add_products
 
-        b, kd = self.b, self.bandwidth
-        whole, corner = np.zeros((self.n, kd + b + 2)), np.zeros((b + 1, b + 1))
-        costs = [
-            add_products(row.weight, row.factor, row.value, row.target, slopes(row.state_slopes),
-                         slopes(row.theta_slopes), row.topped, bases.local, bases.offset,
-                         bases.width, windows.at, own.starts, own.columns, whole, corner)
-            for own, bases, windows, row in zip(self.stretches, self.bases, self.windows, rows,
-                                                strict=False)]
+        b, groups = self.b, len(rows) - self.data + 1
+        whole = np.zeros((groups, self.n, self.bandwidth + b + 2))
+        corner = np.zeros((groups, b + 1, b + 1))
+        costs = []
+        for k, (own, bases, windows, row) in enumerate(zip(
+                self.stretches, self.bases, self.windows, rows, strict=True)):
+            group = max(k - self.data + 1, 0)
+            costs.append(add_products(
+                row.weight, row.factor, row.value, row.target, slopes(row.state_slopes),
+                slopes(row.theta_slopes), row.topped, bases.local, bases.offset, bases.width,
+                windows.at, own.starts, own.columns, whole[group], corner[group]))
+        return Products(whole, corner, tuple(costs), lam)
+
+    def normal(self, products: Products, lam: float) -> BandedNormal:
+        """JᵀJ and Jᵀr of all families together, at any λ."""
+        ratio, kd = 1.0 if lam == products.lam else lam / products.lam, self.bandwidth
+        whole, corner = ratio * products.whole[1], ratio * products.corner[1]
+        for k in range(0, len(products.whole), 2):  # the data, and what holds the start
+            whole += products.whole[k]
+            corner += products.corner[k]
+        costs = list(products.costs)
+        costs[self.data] *= ratio
         return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs))
+
+    def data_band(self, products: Products) -> Array:
+        """The data's share (kd + 1, n) of the band."""
+        return products.whole[0, :, :self.bandwidth + 1].T
 
 
 def slopes(given: Array | None) -> Array:

@@ -174,7 +174,7 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step,
     """
     total = 0.0
     for r, part in enumerate(system.functional.parts):
-        share = system.assemblers[r].normal(at.rows[r][:len(part.data)]).band[:, part.held.size:]
+        share = system.assemblers[r].data_band(at.products[r])[:, part.held.size:]
         total += _trace_of_quotient(share, at.blocks[r].band)
     square = np.zeros_like(step.schur)
     for jacobian in data:

@@ -23,7 +23,7 @@ from scipy.linalg import LinAlgError
 
 from pikanid.approximators import Array
 from pikanid.objective.functional import Functional, Rows
-from pikanid.optimise.banded import BandedAssembler, BandedNormal
+from pikanid.optimise.banded import BandedAssembler, BandedNormal, Products
 from pikanid.optimise.box import box_minimum
 
 
@@ -61,6 +61,7 @@ class Linearisation:
     point: Point
     lam: float
     rows: tuple[Sequence[Rows], ...]  # per recording, per family
+    products: tuple[Products, ...]  # per recording
     blocks: tuple[Eliminated, ...]
     data_costs: tuple[tuple[float, ...], ...]  # per recording, per data family
     data_cost: float  # their sum
@@ -104,21 +105,27 @@ class BandedSystem:
         """Residuals and normal equations at a point, or at another λ where they are known."""
         point = at if isinstance(at, Point) else at.point
         blocks, data, seen, physics, cost = [], [], 0.0, 0.0, 0.0
-        families = []
+        families, multiplied = [], []
         for r, (part, c) in enumerate(zip(self.functional.parts, point.coefficients, strict=True)):
-            rows = (self.functional.rows(r, c, point.theta, lam) if isinstance(at, Point) else
-                    self.functional.reweighed(r, at.rows[r], lam))
-            normal = self.assemblers[r].normal(rows)
+            assembler = self.assemblers[r]
+            if isinstance(at, Point):
+                rows = self.functional.rows(r, c, point.theta, lam)
+                products = assembler.products(rows, lam)
+            else:
+                rows = self.functional.reweighed(r, at.rows[r], lam)
+                products = at.products[r]
+            normal = assembler.normal(products, lam)
             held = self.functional.hold_jacobian(r, point.theta) if self.start_moves else None
             families.append(rows)
+            multiplied.append(products)
             blocks.append(_eliminate(normal, part.held.size, held))
             count = self.counts[r]
             data.append(normal.costs[:count])
             seen += sum(normal.costs[:count])
             physics += normal.costs[count]
             cost += sum(normal.costs)
-        return Linearisation(point, lam, tuple(families), tuple(blocks), tuple(data), seen, physics,
-                             cost)
+        return Linearisation(point, lam, tuple(families), tuple(multiplied), tuple(blocks),
+                             tuple(data), seen, physics, cost)
 
     def moved(self, point: Point, step: Step) -> Point:
         """The point after a step, held coefficients set from the initial state."""

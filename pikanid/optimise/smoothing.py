@@ -6,6 +6,7 @@ Math. 31, 1979); edf = tr((A_d + ρ A_q)⁻¹ A_d), estimated from a few fixed r
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -47,8 +48,8 @@ def smooth(system: BandedSystem, point: Point, rho: float | None = None, probes:
 
     `system` is built on `functional.smoothing()`; θ stays.
     """
-    data = system.linearise(point, 0.0)
-    both = system.linearise(data, 1.0)
+    both = system.linearise(point, 1.0)
+    data = system.linearise(both, 0.0)
     mass = sum(float(b.band[0].sum()) for b in data.blocks)
     rough = sum(float(b.band[0].sum()) for b in both.blocks) - mass
     if mass <= 0.0 or rough <= 0.0:
@@ -85,10 +86,9 @@ class Pencil:
         self.blocks = []
         sizes = [block.slope.size for block in data.blocks]
         number = min(max(4000 // max(1, sum(sizes)), 1), probes)
-        generator = np.random.default_rng(0)
-        for size, only, all_ in zip(sizes, data.blocks, both.blocks, strict=True):
-            probe = generator.choice([-1.0, 1.0], size=(size, number))
-            right = np.empty((size, number + 1))
+        drawn = _probes(tuple(sizes), number)
+        for only, all_, probe in zip(data.blocks, both.blocks, drawn, strict=True):
+            right = np.empty((len(probe), number + 1))
             right[:, :-1], right[:, -1] = multiply(only.band, probe), -only.slope
             self.blocks.append((np.ascontiguousarray(only.band.T),
                                 np.ascontiguousarray((all_.band - only.band).T), right,
@@ -131,6 +131,13 @@ class Pencil:
             return None
         left = max(self.count - effective, 1e-3)
         return Score(rho, self.count * residual / left**2, residual, effective)
+
+
+@functools.lru_cache(maxsize=2)
+def _probes(sizes: tuple[int, ...], number: int) -> list[Array]:
+    """Random signs (size, number) for every recording; callers only read them."""
+    generator = np.random.default_rng(0)
+    return [generator.choice([-1.0, 1.0], size=(size, number)) for size in sizes]
 
 
 def multiply(band: Array, columns: Array) -> Array:

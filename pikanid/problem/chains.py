@@ -7,6 +7,7 @@ physics residual; in the *state form*, as Eq. (2) is printed, every state has it
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,7 +28,7 @@ class Chains:
     order: tuple[int, ...]
     top: tuple[int, ...]
 
-    @property
+    @functools.cached_property
     def lengths(self) -> tuple[int, ...]:
         """Order m of the differential equation that each approximator obeys."""
         return tuple(self.order[state] + 1 for state in self.top)

@@ -33,20 +33,24 @@ class Grid:
     rows: int
 
     @functools.cached_property
+    def _gaps(self) -> np.ndarray:
+        return np.diff(self.T)
+
+    @functools.cached_property
     def spacings(self) -> tuple[float, float]:
         """Median interval between stops [s], and the length of intervals at half of the time.
 
         Steps as long as a lone gap cannot be judged by halving them: all other intervals would
         be crossed in one step either way.
         """
-        gaps = np.sort(np.diff(self.T))
+        gaps = np.sort(self._gaps)
         half = np.searchsorted(np.cumsum(gaps), 0.5 * gaps.sum())
         middle = len(gaps) // 2  # they are sorted: np.median would sort them again
         return 0.5 * float(gaps[middle] + gaps[~middle]), float(gaps[min(half, len(gaps) - 1)])
 
     def pieces(self, longest: float) -> np.ndarray:
         """Sub-steps of each interval (L-1,) so that none is longer than `longest` [s]."""
-        counts = np.ceil(np.diff(self.T) / longest - 1e-9)
+        counts = np.ceil(self._gaps / longest - 1e-9)
         return np.maximum(counts, 1).astype(np.int64)
 
 

@@ -23,7 +23,8 @@ from pikanid.storage.cache import kept, named, processor, sources
 
 FUNCTIONS = ("values_prelude", "tangents_prelude", "put", "put_tangents", "step", "step_tangents",
              "values_f", "tangents_f", "look_h", "values_h_rate", "look_g", "values_g",
-             "tangents_g", "values_g_rate", "tangents_g_rate", "signs_g_rate")
+             "tangents_g", "values_g_rate", "tangents_g_rate", "signs_g_rate", "values_h",
+             "tangents_h")
 _BINARY = {ops.ADD: "fadd", ops.MUL: "fmul", ops.DIV: "fdiv"}
 _CALLED = {ops.SIN: "sin", ops.COS: "cos", ops.TAN: "tan", ops.EXP: "exp", ops.TANH: "tanh",
            ops.SINH: "sinh", ops.COSH: "cosh", ops.ATAN: "atan"}

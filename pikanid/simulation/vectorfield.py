@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import sympy as sp
@@ -18,6 +18,10 @@ from pikanid.model import Model
 from pikanid.simulation.layout import STEEP
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
 from pikanid.simulation.structure import Structure
+from pikanid.simulation.tape import can_run, tape
+
+if TYPE_CHECKING:
+    from pikanid.simulation.native_field import NativeField
 
 # So many rows at a time: what a formula leaves on its way then stays in the processor's cache, and
 # takes no fresh memory.
@@ -131,13 +135,14 @@ class _Functions:
 
         return evaluate
 
-    def jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray, name: str
-                  ) -> tuple[np.ndarray, np.ndarray]:
+    def jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray,
+                  name: Literal["f", "h"]) -> tuple[np.ndarray, np.ndarray]:
         rows, free = range(len(self.exprs[name])), range(len(self.p))
         with np.errstate(all="ignore"):
             return self.linearised(name, tuple(rows), tuple(free))(t, x, u, p)[1:]
 
-    def linearised(self, name: str, rows: tuple[int, ...], free: tuple[int, ...]) -> Linearised:
+    def linearised(self, name: Literal["f", "h"], rows: tuple[int, ...], free: tuple[int, ...]
+                   ) -> Linearised:
         if (name, rows, free) not in self._plans:
             self._plans[name, rows, free] = Linearised(self, name, rows, free)
         return self._plans[name, rows, free]
@@ -167,11 +172,18 @@ class _Functions:
 class Linearised:
     """Some rows of f or h and their derivatives by the states and by some parameters.
 
-    NumPy's warnings are for the caller to silence: once for all that is evaluated.
+    Smooth models run from machine code.  NumPy's warnings are for the caller to silence: once for
+    all that is evaluated.
     """
 
-    def __init__(self, functions: _Functions, name: str, rows: tuple[int, ...],
+    def __init__(self, functions: _Functions, name: Literal["f", "h"], rows: tuple[int, ...],
                  free: tuple[int, ...]):
+        self._native: NativeField | None = None
+        if can_run(functions.model) and not functions.lowered.switches:
+            from pikanid.simulation.native_field import NativeField
+
+            self._native = NativeField(tape(Structure(functions.model)), name, rows, free)
+            return
         places, self._function, self._edges = functions.table(name)
         self._functions, self._rows = functions, rows
         self._row_at = {row: k for k, row in enumerate(rows)}
@@ -188,6 +200,8 @@ class Linearised:
     def __call__(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values (M, E), ∂/∂x (M, E, n) and ∂/∂p (M, E, b)."""
+        if self._native is not None:
+            return self._native(t, x, u, p)
         shape = (*t.shape, self._size)
         values = np.empty(shape)
         jx, jp = np.zeros((*shape, self._n)), np.zeros((*shape, self._b))

@@ -23,8 +23,9 @@ from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarray, *,
            converged: bool, history: Sequence[Mapping[str, float]], settings: Mapping[str, Any],
            seed: int | None, begun: float, warnings: Sequence[str] = (),
-           approximator: Any = None, uncertainty: UncertaintySettings = USUAL) -> Estimate:
-    """Assemble the `Estimate` at θ."""
+           approximator: Any = None, uncertainty: UncertaintySettings = USUAL,
+           covariance: np.ndarray | None = None) -> Estimate:
+    """Assemble the `Estimate` at θ; its `covariance`, unless given, is that of least squares."""
     jacobian = shooting.jacobian(theta)
     adequacy = shooting.adequacy(theta)
     scale = 1.0
@@ -34,7 +35,8 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     at_bound = met(theta, problem.lower, problem.upper)
     shown = Directions.of(jacobian, ~at_bound)
     cov = shown.covariance * scale
-    fits, trajectories = evaluate(problem, shooting, theta, cov)
+    covariance = cov if covariance is None else covariance
+    fits, trajectories = evaluate(problem, shooting, theta, covariance)
     notes = [*warnings]
     if not converged:
         notes.append("The optimiser stopped before it converged: raise max_evaluations or give "
@@ -57,7 +59,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
                          "position, pikanid.bootstrap(..., positions=...) counts them.")
     return Estimate(
         model=problem.model, strategy=strategy, free=problem.free, theta=np.array(theta),
-        covariance=cov, fits=fits, trajectories=trajectories, cost=total_cost(fits),
+        covariance=covariance, fits=fits, trajectories=trajectories, cost=total_cost(fits),
         adequacy=adequacy, converged=converged, settings=settings, history=tuple(history),
         warnings=tuple(notes), seconds=time.perf_counter() - begun, seed=seed,
         version=__version__, approximator=approximator)

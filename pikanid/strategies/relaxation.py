@@ -136,11 +136,9 @@ def physics_scale(functional: Functional, point: Point, sigma: float) -> Array:
     for r, part in enumerate(functional.parts):
         sites, c = part.physics, point.coefficients[r]
         weight = sites.weight**2
-        p = functional.problem.parameters(point.theta, r)
-        f = functional.vector_field.rhs(sites.t, functional.states(sites, c), sites.u, p)
-        f = np.nan_to_num(f[:, list(functional.chains.top)], posinf=0.0, neginf=0.0)
-        top = np.column_stack([table.values(c) for table in sites.tops])
-        tops = tops + (weight * top**2).sum(axis=0)
+        rows = functional.physics_rows(r, c, point.theta, 0.0)
+        f = np.nan_to_num(rows.value, posinf=0.0, neginf=0.0)
+        tops = tops + (weight * rows.target.T**2).sum(axis=0)
         rates = rates + (weight * f**2).sum(axis=0)
         total += weight[:, 0].sum()
     size = np.sqrt(np.maximum(tops, rates) / total)

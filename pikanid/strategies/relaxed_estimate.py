@@ -24,9 +24,10 @@ from pikanid.estimate.estimate import total_cost
 from pikanid.objective.adequacy import judge
 from pikanid.objective.functional import Functional
 from pikanid.objective.shooting import Shooting
+from pikanid.optimise.box import met
 from pikanid.problem.chains import Chains
 from pikanid.problem.problem import Problem
-from pikanid.strategies.finish import evaluate, finish
+from pikanid.strategies.finish import finish
 from pikanid.strategies.relaxation import RelaxedFit
 from pikanid.strategies.simulated import choose_steps
 
@@ -117,17 +118,17 @@ def assemble(strategy: str, fit: Relaxed, settings: Mapping[str, Any],
         finished = all(r.finished for r in shooting.responses(fit.theta))
     except errors.SimulationFailed:
         finished = False
+    covariance = fit.covariance.copy()
+    stuck = (met(fit.theta, fit.problem.lower, fit.problem.upper) if finished
+             else np.diag(covariance) == 0.0)
+    covariance[stuck] = covariance[:, stuck] = np.nan
     if finished:
         estimate = finish(strategy, fit.problem, shooting, fit.theta, converged=True,
                           history=history, settings=settings, seed=None, begun=begun,
-                          warnings=fit.warnings, approximator=curves)
+                          warnings=fit.warnings, approximator=curves, covariance=covariance)
     else:
         estimate = _unsimulated(strategy, fit, curves, history, settings)
-    covariance = fit.covariance.copy()
-    stuck = np.isnan(np.diag(estimate.covariance)) if finished else np.diag(covariance) == 0.0
-    covariance[stuck] = covariance[:, stuck] = np.nan
-    fits = evaluate(fit.problem, shooting, fit.theta, covariance)[0] if finished else estimate.fits
-    return replace(estimate, covariance=covariance, converged=fit.converged, fits=fits,
+    return replace(estimate, covariance=covariance, converged=fit.converged,
                    seconds=time.perf_counter() - begun)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.lapack import dgeqrf
 
 from pikanid import errors
 from pikanid.problem.problem import FreeParameter
@@ -36,8 +37,10 @@ class Directions:
     def of(jacobian: np.ndarray, estimated: np.ndarray) -> Directions:
         """Those of a Jacobian (rows, n) and the parameters that are `estimated` (n,)."""
         inside = np.flatnonzero(estimated)
-        # R of J = QR has the same, in as few rows as there are columns
-        J: np.ndarray = np.asarray(np.linalg.qr(jacobian[:, inside], mode="r"))
+        # R of J = QR has the same, in as few rows as there are columns; LAPACK directly, as NumPy's
+        # wrapper takes longer than the rest of this
+        own = jacobian[:, inside]
+        J = np.triu(dgeqrf(own)[0][:own.shape[1]]) if own.size else own
         norms = np.sqrt((J * J).sum(axis=0))
         seen = norms > 0
         s, vt = np.empty(0), np.empty((0, 0))
