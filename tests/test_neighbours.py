@@ -29,6 +29,7 @@ from pikanid.mismatch.search.screen import Screen, as_strong, drag, law, nothing
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
+from pikanid.optimise.levenberg_marquardt import Minimum
 
 
 @pytest.fixture(scope="module")
@@ -323,3 +324,21 @@ def test_what_was_looked_for_beyond_hills_in_vain_is_settled(
     search._fit_all([(job, [{}])], always=True, settled=settled)
     assert asked == [key if failed else settled]
     assert search.fits == before and len(search.begun) == 1
+
+
+def test_effects_lead_the_nominal_model_out_of_a_wrong_minimum() -> None:
+    """Nothing is missing; effects that begin where the nominal model was held explain everything,
+    and would be named if it stayed there.
+    """
+    model = pk.systems.sloshing()
+    train, later = (pk.simulate(model, pk.excitation.planar_moves(6, 10.0, seed=seed),
+                                sigma=0.002, seed=seed) for seed in (1, 2))
+    search = open_case(model, (train,), (later,), None, lambda text: None, DEFAULTS).search
+    right = search.base()
+    theta = right.minimum.theta * np.array([1.03, 1.5])
+    elsewhere = right.whitened.residual(theta)
+    assert elsewhere is not None
+    search.fits[frozenset()] = replace(right, minimum=Minimum(theta, *elsewhere, False))
+    assert search.base().minimum.chi2 > 100 * right.minimum.chi2
+    assert search.run(lambda h: not h.far)[0].effects == ()
+    assert search.base().minimum.chi2 == pytest.approx(right.minimum.chi2, abs=0.5)
