@@ -90,10 +90,15 @@ def _section(one: Mapping[str, Any]) -> str:
 def _together(every: Mapping[str, list[Score]], whole: Sequence[str]) -> str:
     """The sets taken together, and how true the stated probabilities are."""
     all_scores = list(itertools.chain(*every.values()))
-    mixed = [s for name in whole for s in every.get(name, ())]
+    rounds: dict[str, list[Score]] = {}
+    for name in whole:
+        kind, _, number = name.rpartition("_")
+        number = number if number.isdecimal() and kind in whole else "1"
+        rounds.setdefault(number, []).extend(every.get(name, ()))
     lines = [f"\n## All {len(all_scores)} cases together\n", "| sets | right | wrong | missed |",
              "| --- | --- | --- | --- |"]
-    lines += [_row("of all kinds", mixed)] if mixed else []
+    lines += [_row(f"round {number} of those of all kinds", found)
+              for number, found in rounds.items() if found]
     lines += [_row(name, found) for name, found in every.items()]
     lines += [_row("all", all_scores), "", "| probability stated | true |", "| --- | --- |"]
     lines += [f"| {p:.2f} | {share} |" for p, share in reliability(all_scores)]

@@ -39,6 +39,7 @@ from pikanid.validation.own_model.trial import answered
 
 DEGREE = math.pi / 180
 SECTIONS = ("decoys", "alarms", "thresholds", "real")
+MOST_ROUNDS = 9  # limit: that can be asked for by name
 LONGEST = 5  # diagnoses of a set that are timed again by themselves
 
 
@@ -95,16 +96,16 @@ def main() -> None:
                         default=[s.name for s in SETS], help="sets that those are taken from")
     parser.add_argument("--recordings", choices=list(diagnosis_real.RECORDINGS), nargs="*",
                         default=list(diagnosis_real.RECORDINGS), help="real ones to diagnose")
-    every = [s.name for s in rounds(SETS, 9)]
-    parser.add_argument("--only", choices=[*every, *SECTIONS], nargs="*",
+    every = rounds(SETS, MOST_ROUNDS)
+    parser.add_argument("--only", choices=[*(s.name for s in every), *SECTIONS], nargs="*",
                         help="sets and sections to run; by default all")
     given = parser.parse_args()
     chosen = rounds(SETS, given.rounds)
     asked = given.only if given.only is not None else [*(s.name for s in chosen), *SECTIONS]
     path = given.folder / "diagnosis.json"
     kept = json.loads(path.read_bytes()) if path.exists() else {"sets": {}, "sections": {}}
-    kinds = [s.name for s in rounds([s for s in SETS if s.mix is None], 9)
-             if s.name in kept["sets"] or s.name in asked]
+    kinds = [s.name for s in every
+             if s.mix is None and (s.name in kept["sets"] or s.name in asked)]
     others = [s.name for s in SETS if s.mix]
 
     def keep() -> None:
@@ -113,7 +114,7 @@ def main() -> None:
         together({path: json.dumps(kept, indent=1).encode(), path.with_suffix(".md"): page(
             kept, kinds, others, SECTIONS).encode()})
 
-    for one in rounds(SETS, 9):
+    for one in every:
         if one.name in asked:
             kept["sets"][one.name] = _kept_set(one, given.work, given.cases, given.workers)
             keep()

@@ -11,6 +11,7 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.problem.problem import Problem
 from pikanid.strategies.ipda import IPDA, fit_relaxed
+from pikanid.strategies.settings import RelaxationSettings
 
 NEIGHBOURS = [(0.06, 0.05), (0.048, 0.04), (0.072, 0.06), (0.072, 0.04)]
 
@@ -210,7 +211,11 @@ def test_parameter_without_influence() -> None:
 def test_estimate_keeps_the_splines(tmp_path) -> None:  # type: ignore[no-untyped-def]
     est = IPDA().fit(guessed(), slosh(0.1))
     t = est.trajectories[0].t
-    assert np.allclose(est.approximator.states(t), est.trajectories[0].x, atol=4e-5)
+    # a grid is kept once θ has settled, the rate's error is then an order larger than the angle's
+    gap = np.abs(est.approximator.states(t) - est.trajectories[0].x).max(axis=0)
+    assert gap[0] < 1e-6 and gap[1] < 4e-5
+    finer = IPDA(settings=RelaxationSettings(settled=0.0, refinements=1)).fit(guessed(), slosh(0.1))
+    assert np.allclose(finer.approximator.states(t), finer.trajectories[0].x, atol=1e-5)
     assert est.settings["naive_std"][0] == pytest.approx(est.std("l_theta"), rel=0.05)
     assert [h["lam"] for h in est.history][:2] == [1.0, 1e4]
     est.save(tmp_path / "estimate.json")

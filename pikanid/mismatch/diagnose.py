@@ -11,6 +11,7 @@ from pikanid.mismatch.beyond.force_shape import ForceShape, force_shape
 from pikanid.mismatch.beyond.patch import patch
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.parallel import blas_on_one_thread, threads
 from pikanid.mismatch.judge.verdict import Answer
@@ -97,14 +98,11 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
     tell("detection")
     detection = case.detected()
     if not smaller(detection.p_value, settings.alpha):
-        refuted = case.refuted()
-        nothing = Answer("unnamed" if refuted else "none", (), ())
-        return reported(case, refuted or detection, nothing, case.sites[0], None)
+        return _nothing_left(case, detection)
     first, ranked = case.base, searched(case, tell)
     if case.base is not first and not smaller(
             (detection := case.detected()).p_value, settings.alpha):
-        # the nominal model had been in a wrong minimum
-        return reported(case, detection, Answer("none", (), ()), case.sites[0], None)
+        return _nothing_left(case, detection)  # the nominal model had been in a wrong minimum
     ranked = with_noise_of_the_rest(case, ranked, quiet, tell)
     tell("confirmation")
     answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
@@ -118,6 +116,13 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
     if answer.verdict == "unnamed" and case.later is not None:
         mend = patch(case.base, case.model, shape, site, case.records, case.later, case.predicted)
     return replace(reported(case, detection, answer, site, shape), patch=mend)
+
+
+def _nothing_left(case: Case, detection: Detection) -> Diagnosis:
+    """Nothing is missing, unless the held-out recordings say so."""
+    refuted = case.refuted()
+    answer = Answer("unnamed" if refuted else "none", (), ())
+    return reported(case, refuted or detection, answer, case.sites[0], None)
 
 
 def _beyond(case: Case, answer: Answer, tell: Callable[[str], None]

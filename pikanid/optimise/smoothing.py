@@ -21,6 +21,7 @@ from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, ga
 FLAT = 1e-4  # numerical: of the effective parameters, whose trace is estimated
 LINEAR = 1e-6  # numerical: of the data's cost that was foretold of one step, a rise that is none
 
+
 class Score(NamedTuple):
     """What cross-validation says of a ρ."""
 
