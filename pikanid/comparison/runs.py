@@ -97,7 +97,7 @@ def free_run(contender: Contender, recording: Recording, first: int = 0, start: 
     active = np.array([names.index(n) for n in (*own, *contender.estimated)], np.int64)
     response = simulator.run(p, active, steps, states=True)
     if not response.finished:
-        response = replace(response, y=np.full(len(response.y), np.nan))
+        response = response._replace(y=np.full(len(response.y), np.nan))
     return Run(experiment, own, p, response, steps)
 
 

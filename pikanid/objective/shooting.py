@@ -55,13 +55,8 @@ class Shooting:
         old, self.steps = self.steps, []
         for r, simulator in enumerate(self.simulators):
             p = self.problem.parameters(theta, r)
-            samples = [s for s in self.problem.experiments[r].samples if len(s.t)]
-            fine = [_tolerance(s) for s in samples]
-            scale = np.concatenate([np.full(len(s.t), limit) for s, limit in zip(
-                samples, fine, strict=True)]) if samples else None
-            tolerance = 1.0 if samples else None
-            if samples and accuracy == "coarse":
-                tolerance = min(_coarser(s, limit) for s, limit in zip(samples, fine, strict=True))
+            scale, coarse = self._tolerances[r]
+            tolerance = None if scale is None else coarse if accuracy == "coarse" else 1.0
             known = old[r] if old and accuracy == "fine" else None
             method, finest = self.method, 0.0
             if self.limits:
@@ -72,6 +67,19 @@ class Shooting:
         self._at = b""
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
+
+    @functools.cached_property
+    def _tolerances(self) -> list[tuple[np.ndarray | None, float]]:
+        """For each recording the errors allowed to "fine" samples (rows,), and how many times as
+        much "coarse" ones may err.
+        """
+        found: list[tuple[np.ndarray | None, float]] = []
+        for e in self.problem.experiments:
+            samples = [s for s in e.samples if len(s.t)]
+            fine = [_tolerance(s) for s in samples]
+            found.append((np.repeat(fine, [len(s.t) for s in samples]),
+                          min(map(_coarser, samples, fine))) if samples else (None, 1.0))
+        return found
 
     def hurry(self, on: bool = True) -> None:
         """From now on refuse steps much shorter than the present ones, and other methods.
@@ -119,24 +127,19 @@ class Shooting:
         return self._kept
 
     def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        from pikanid.objective.standardised import standardise
+
         responses = self.responses(theta)
         if not all(r.finished for r in responses):
             return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
-        if len(responses) == 1:
-            predicted, jacobian = responses[0].y, responses[0].sensitivity
-        else:
-            predicted = np.concatenate([r.y for r in responses])
-            jacobian = np.zeros((self.rows, len(theta)))
-            row = 0
-            for r, (_, outside) in zip(responses, self.columns, strict=True):
-                jacobian[row:row + len(r.y), outside] = r.sensitivity
-                row += len(r.y)
-        residual = predicted - self.y
-        residual *= self.weights
-        # column by column, as MINPACK takes it
-        weighted = np.empty(jacobian.shape[::-1])
-        np.multiply(jacobian.T, self.weights, out=weighted)
-        return residual, weighted.T
+        residual, row = np.empty(self.rows), 0
+        # column by column, as optimisers take it; each recording fills those of its own parameters
+        columns = np.zeros((len(theta), self.rows))
+        for response, (_, own) in zip(responses, self.columns, strict=True):
+            standardise(response.y, response.sensitivity, row, own, self.y, self.weights, residual,
+                        columns)
+            row += len(response.y)
+        return residual, columns.T
 
     def adequacy(self, theta: np.ndarray) -> Adequacy:
         """The χ² verdict at θ."""

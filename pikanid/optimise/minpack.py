@@ -1,9 +1,9 @@
 """Bounded nonlinear least squares to the last digit: MINPACK inside the bounds, TRF at them.
 
-MINPACK knows no bounds: a step outside them is answered with huge residuals, which it takes as a
-reason to turn back, and only a start that ends beside a bound is finished by SciPy's "trf".  It
-stands beside `levenberg_marquardt` for its speed: a start of NLS takes 1.8 ms with this one, in 15
-simulations, and 3.8 ms with the other, in 20 (`benchmarks/test_bench_least_squares.py`).  The other
+MINPACK knows no bounds: a step outside them is refused, and only a start that ends beside a bound
+is finished by SciPy's "trf".  It stands beside `levenberg_marquardt` for its speed: a start of NLS
+takes 1.8 ms with this one, in 15 simulations, and 3.8 ms with the other, in 20
+(`benchmarks/test_bench_least_squares.py`).  The other
 stands beside this one for diagnoses: this one can neither hold a parameter nor give up what is out
 of reach, and two of the simulated rigs took 6.4 s and 5.9 s with it instead of 4.5 s and 4.6 s.
 """
@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 Vector = Callable[[np.ndarray], np.ndarray]
-REFUSED = 1e10  # numerical: a standardised residual that no step towards it survives
 
 
 @dataclass(frozen=True)
@@ -43,53 +42,43 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     >>> round(float(found.theta[0]), 6)
     2.0
     """
-    from scipy.optimize import least_squares, leastsq
-
-    inside = np.clip(start, lower, upper)
+    theta = np.clip(start, lower, upper)
+    r = residual(theta)
     if len(start) == 0:
-        r = residual(inside)
-        return Optimum(inside, 0.5 * float(r @ r), True, 1)
-    scale = np.where(inside != 0, np.abs(inside), 1.0)
-    rows = len(residual(inside))
-    box = list(zip(lower.tolist(), upper.tolist(), strict=True))
+        return Optimum(theta, 0.5 * float(r @ r), True, 1)
+    scale = np.where(theta != 0, np.abs(theta), 1.0)
+    best, evaluations, converged = np.inf, 0, False
+    if len(r) >= len(start):
+        from pikanid.optimise.lmder import CONVERGED, EVALUATE, LINEARISE, Descent
 
-    def scaled(z: np.ndarray) -> np.ndarray:
-        theta = z * scale
-        # plain numbers: for a few parameters NumPy's overhead is a third of the optimiser's
-        for q, (low, high) in zip(theta.tolist(), box, strict=True):
-            if not low <= q <= high:
-                return np.full(rows, REFUSED)
-        return residual(theta)
-
-    def slopes(z: np.ndarray) -> np.ndarray:
-        return jacobian(z * scale) * scale
-
-    def columns(z: np.ndarray) -> np.ndarray:
-        return np.multiply(jacobian(z * scale).T, scale[:, None], order="C")
-
-    def boxed(z: np.ndarray) -> np.ndarray:
-        return residual(np.clip(z * scale, lower, upper))
-
-    theta, best, evaluations, status = inside, np.inf, 0, 0
-    if rows >= len(start):
-        # MINPACK directly: least_squares(method="lm") wraps the same code and doubles its cost
-        z, _, info, _, code = leastsq(
-            scaled, inside / scale, Dfun=columns, col_deriv=True, full_output=True, ftol=tolerance,
-            xtol=tolerance, gtol=1e-15, maxfev=limit)
-        theta, best, evaluations = z * scale, 0.5 * float(info["fvec"] @ info["fvec"]), info["nfev"]
-        status = code if code in (1, 2, 3, 4) else 0
+        descent = Descent(theta, lower, upper, len(r), tolerance, limit)
+        told = descent.linearise(r, jacobian(theta))
+        while told == EVALUATE:
+            r = residual(descent.trial)
+            told = descent.judge(r)
+            if told == LINEARISE:
+                told = descent.linearise(r, jacobian(descent.theta))
+        theta, best, evaluations = descent.theta, descent.cost, descent.evaluations
+        converged = told == CONVERGED
     room = np.minimum(theta - lower, upper - theta)
-    if status == 0 or np.any(room < 1e-3 * np.maximum(np.abs(theta), 1e-12)):
+    if not converged or np.any(room < 1e-3 * np.maximum(np.abs(theta), 1e-12)):
+        from scipy.optimize import least_squares
+
+        def boxed(z: np.ndarray) -> np.ndarray:
+            return residual(np.clip(z * scale, lower, upper))
+
+        def slopes(z: np.ndarray) -> np.ndarray:
+            return jacobian(z * scale) * scale
+
         found = least_squares(
-            boxed,
-            _strictly_inside(theta, lower, upper) / scale, slopes,
+            boxed, _strictly_inside(theta, lower, upper) / scale, slopes,
             bounds=(lower / scale, upper / scale), x_scale="jac", ftol=tolerance, xtol=tolerance,
             gtol=1e-12, max_nfev=limit)
         evaluations += found.nfev
         if found.cost <= best:
             theta, best = np.clip(found.x * scale, lower, upper), float(found.cost)
-            status = found.status
-    return Optimum(theta, best, status > 0, evaluations)
+            converged = found.status > 0
+    return Optimum(theta, best, converged, evaluations)
 
 
 def _strictly_inside(theta: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

@@ -63,12 +63,13 @@ def _number(expr: sp.Expr, table: dict[str, float]) -> float:
 class InitialState:
     """The symbolic initial state as functions of p (P,) and the first inputs u0 (m,).
 
-    `driven` says whether u0 enters.
+    `driven` says whether u0 enters, `fixed` whether neither does.
     """
 
     value: Callable[[np.ndarray, np.ndarray], np.ndarray]
     jacobian: Callable[[np.ndarray, np.ndarray], np.ndarray]
     driven: bool
+    fixed: bool = False
 
 
 @functools.lru_cache(maxsize=64)
@@ -78,7 +79,7 @@ def initial_state(model: Model) -> InitialState:
     start = [s.initial for s in model.states]
     if all(e.is_number for e in start):
         x0, zero = np.array([float(e) for e in start]), np.zeros((n, len(p_symbols)))
-        return InitialState(lambda p, u: x0, lambda p, u: zero, False)
+        return InitialState(lambda p, u: x0, lambda p, u: zero, False, True)
     used = [k for k, q in enumerate(p_symbols) if any(e.has(q) for e in start)]
     value, slopes = _start_functions(tuple(start), tuple(p_symbols[k] for k in used),
                                      model.input_names)

@@ -99,6 +99,11 @@ class Experiment:
         """∂x0/∂p (n, P)."""
         return self._initial.jacobian(p, self._first_inputs)
 
+    @property
+    def starts_fixed(self) -> bool:
+        """Whether the initial state depends on no parameter."""
+        return self._initial.fixed
+
     @functools.cached_property
     def _initial(self) -> InitialState:
         return initial_state(self.model)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -35,8 +35,7 @@ class Steps:
     error: float = np.nan
 
 
-@dataclass(frozen=True)
-class Response:
+class Response(NamedTuple):
     """What a simulation gives: outputs y (rows,), their sensitivities (rows, A), states at `t`.
 
     `finished` is False where the trajectory left the finite numbers or switched without end near
@@ -53,6 +52,7 @@ class Response:
 
 
 Trial = Callable[[Steps, bool], Response]
+_Prepared = tuple[Grid, Callable[..., Any], tuple[Any, ...], np.ndarray | None]
 
 
 @dataclass(frozen=True)
@@ -140,19 +140,35 @@ class Simulator:
                 if (of.method, of.longest) == (steps.method, steps.longest) and np.array_equal(
                         at, p):
                     return found  # it was run when the steps were chosen
-        module = self.module(steps.method)
-        grid = self.grid(p)
+        grid, integrate, arguments, S0 = self._prepared(p, active, steps)
+        if S0 is None:
+            S0 = np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active])
         X = np.empty((len(grid.T) if states else 0, len(self.model.states)))
-        Y, J = np.empty(grid.rows), np.empty((grid.rows, len(active)))
-        status, stop = module.integrate(
-            grid.T, self._pieces(grid, steps.longest), grid.U, grid.V, grid.jumps,
-            *self._moved(p, active), self.experiment.initial(p),
-            np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active]), p, active,
-            *grid.seen, X, Y, J)
-        # sums of squares are finite only if everything in them is, and the cheapest of all to take;
+        both = np.empty(grid.rows * (1 + len(active)))
+        Y, J = both[:grid.rows], both[grid.rows:].reshape(grid.rows, len(active))
+        status, stop = integrate(
+            *arguments, self.experiment.initial(p), S0, p, active, *grid.seen, X, Y, J)
+        # a sum of squares is finite only if everything in it is, and the cheapest of all to take;
         # a trajectory whose squares overflow is as good as infinite
-        finite = status == 0 and math.isfinite(np.vdot(Y, Y)) and math.isfinite(np.vdot(J, J))
+        finite = status == 0 and math.isfinite(np.vdot(both, both))
         return Response(Y, J, grid.T, X, finite, float(grid.T[stop]), int(status))
+
+    def _prepared(self, p: np.ndarray, active: np.ndarray, steps: Steps) -> _Prepared:
+        """What a run at parameters p takes besides them; kept while the stops are the same."""
+        grid, key = self.grid(p), (steps.method, steps.longest, active.tobytes())
+        kept: dict[tuple[Method, float, bytes], _Prepared] = self._kept.get("prepared", {})
+        if key in kept and kept[key][0] is grid:
+            return kept[key]
+        moved = self._moved(p, active)
+        S0 = (np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active])
+              if self.experiment.starts_fixed else None)
+        made: _Prepared = (
+            grid, self.module(steps.method).integrate,
+            (grid.T, grid.pieces(steps.longest), grid.U, grid.V, grid.jumps, *moved), S0)
+        if not moved[-1]:
+            # the last few, between which accuracies alternate
+            self._kept["prepared"] = {**dict(list(kept.items())[-3:]), key: made}
+        return made
 
     def _moved(self, p: np.ndarray, active: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """∂delay/∂θ of inputs and outputs (channels, A), and whether any is not zero."""
@@ -162,16 +178,6 @@ class Simulator:
                 for c in (self.acting.inputs, self.model.outputs))
         dtau_in, dtau_out = map(np.ascontiguousarray, both)
         return dtau_in, dtau_out, True
-
-    def _pieces(self, grid: Grid, longest: float) -> np.ndarray:
-        """Sub-steps; those of the last two lengths are kept, between which accuracies alternate."""
-        kept = self._kept.get("pieces", ())
-        for of, length, pieces in kept:
-            if of is grid and length == longest:
-                return pieces
-        pieces = grid.pieces(longest)
-        self._kept["pieces"] = ((grid, longest, pieces), *kept[:1])
-        return pieces
 
     def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
                      method: MethodChoice = "auto", known: Steps | None = None,
