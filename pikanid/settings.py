@@ -141,12 +141,15 @@ def changed(settings: Any) -> dict[str, Any]:
     """The fields that differ from the defaults of their dataclass, by name as in `items`."""
     kind: Any = type(settings)
     usual = _usual(kind)
-    return {name: value for name, value in items(settings) if value != usual[name]}
+    if settings == usual:
+        return {}
+    known = dict(items(usual))
+    return {name: value for name, value in items(settings) if value != known[name]}
 
 
 @cache
-def _usual(kind: Callable[[], Any]) -> dict[str, Any]:
-    return dict(items(kind()))
+def _usual(kind: Callable[[], Any]) -> Any:
+    return kind()
 
 
 def told(settings: Any) -> str:

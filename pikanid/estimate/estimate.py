@@ -285,4 +285,4 @@ def _plain(value: Any) -> Any:
 
 def total_cost(fits: Sequence[Fit]) -> float:
     """Half the sum of squared residuals."""
-    return 0.5 * float(sum(np.sum(f.residual**2) for f in fits))
+    return 0.5 * float(sum(r @ r for r in (f.residual for f in fits)))

@@ -10,6 +10,7 @@ often than not, a model that is not refuted is not confirmed either.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
@@ -68,7 +69,8 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
         return Adequacy(np.nan, dof, np.nan, "unknown", "none")
     otherwise: Verdict = "fits" if decides(count - n_free, settings) else "unknown"
     if all(s is not None for s in sigmas):
-        value = float(sum(np.sum((r / s) ** 2) for r, s in zip(residuals, sigmas, strict=True)))
+        shares = (r / s for r, s in zip(residuals, sigmas, strict=True))
+        value = float(sum(z @ z for z in shares))
         p = float(chdtrc(dof, value))
         refuted = p < settings.alpha and count > n_free
         return Adequacy(value, dof, p, "misfit" if refuted else otherwise, "given")
@@ -87,6 +89,7 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
                     "differences")
 
 
+@functools.lru_cache(maxsize=256)
 def decides(dof: int, settings: AdequacySettings = USUAL) -> bool:
     """Whether a χ² test with so many degrees of freedom sees a residual of twice the noise at least
     every other time.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -127,8 +128,6 @@ class Shooting:
         return self._kept
 
     def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        from pikanid.objective.standardised import standardise
-
         responses = self.responses(theta)
         if not all(r.finished for r in responses):
             return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
@@ -136,10 +135,16 @@ class Shooting:
         # column by column, as optimisers take it; each recording fills those of its own parameters
         columns = np.zeros((len(theta), self.rows))
         for response, (_, own) in zip(responses, self.columns, strict=True):
-            standardise(response.y, response.sensitivity, row, own, self.y, self.weights, residual,
-                        columns)
+            self._standardise(response.y, response.sensitivity, row, own, self.y, self.weights,
+                              residual, columns)
             row += len(response.y)
         return residual, columns.T
+
+    @functools.cached_property
+    def _standardise(self) -> Callable[..., None]:
+        from pikanid.objective.standardised import standardise
+
+        return standardise
 
     def adequacy(self, theta: np.ndarray) -> Adequacy:
         """The χ² verdict at θ."""
@@ -164,7 +169,7 @@ def _spread(samples: Samples, several: bool) -> np.ndarray:
 
 def _tolerance(samples: Samples) -> float:
     if samples.sigma is not None:
-        return 0.01 * float(np.min(samples.sigma)) / np.sqrt(len(samples.t))
+        return 0.01 * float(samples.sigma.min()) / np.sqrt(len(samples.t))
     return 1e-10 * max(float(np.ptp(samples.y)), 1e-300)
 
 

@@ -67,11 +67,10 @@ def met(theta: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
     >>> met(np.array([1.0, 5.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([2.0, np.inf, 1.0]))
     array([ True, False,  True])
     """
-    return _at(theta, lower) | _at(theta, upper)
-
-
-def _at(theta: Array, bound: Array) -> NDArray[np.bool_]:
-    return np.asarray(np.isfinite(bound) & (np.abs(theta - bound) <= 1e-6 * np.abs(bound)))
+    # plain numbers: for a few parameters NumPy's overhead is all there is
+    found = [any(math.isfinite(b) and abs(q - b) <= 1e-6 * abs(b) for b in bounds)
+             for q, *bounds in zip(theta.tolist(), lower.tolist(), upper.tolist(), strict=True)]
+    return np.array(found, bool)
 
 
 def _minimum(matrix: Array, slope: Array, root: Array) -> Array:

@@ -16,8 +16,8 @@ def propagated(sensitivity: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     [1.0, 5.0]
     """
     C = finite(covariance)
-    return np.asarray(np.sqrt(np.maximum(
-        np.einsum("ij,ij->i", sensitivity @ C, sensitivity), 0.0)))
+    variance = np.einsum("ij,ij->i", sensitivity @ C, sensitivity)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0, out=variance), out=variance))
 
 
 def finite(covariance: np.ndarray) -> np.ndarray:
@@ -27,7 +27,8 @@ def finite(covariance: np.ndarray) -> np.ndarray:
     >>> finite(np.array([[np.inf, 0.5], [0.5, 2.0]])).tolist()
     [[0.0, 0.0], [0.0, 2.0]]
     """
-    unknown = ~np.isfinite(np.diag(covariance))
     C = np.array(covariance)
-    C[unknown] = C[:, unknown] = 0.0
+    unknown = ~np.isfinite(C.diagonal())
+    if unknown.any():
+        C[unknown] = C[:, unknown] = 0.0
     return C

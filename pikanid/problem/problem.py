@@ -207,8 +207,8 @@ class Problem:
         for r in range(len(self.experiments)):
             here = [(names.index(f.name), k) for k, f in enumerate(self.free)
                     if f.recording in (None, r)]
-            pairs = np.array(here, dtype=np.int64).reshape(-1, 2)
-            found.append((pairs[:, 0].copy(), pairs[:, 1].copy()))
+            found.append((np.array([inside for inside, _ in here], np.int64),
+                          np.array([outside for _, outside in here], np.int64)))
         return tuple(found)
 
     @functools.cached_property
@@ -249,12 +249,13 @@ def _held(recording: Recording, item: Input) -> HeldInput:
 
 def _samples(recording: Recording, output: Output, index: int) -> Samples:
     channel = recording.as_output(output.name, _unit(recording, output))
-    seen = np.isfinite(channel.values)
+    finite = np.isfinite(channel.values)
+    seen = slice(None) if finite.all() else finite
     sigma = output.sigma if channel.sigma is None else channel.sigma
-    t = channel.time[seen]
-    spread = (None if sigma is None else sigma[seen] if isinstance(sigma, np.ndarray)
+    t = np.array(channel.time[seen])
+    spread = (None if sigma is None else np.array(sigma[seen]) if isinstance(sigma, np.ndarray)
               else np.full(len(t), sigma))
-    return Samples(index, t, channel.values[seen], spread)
+    return Samples(index, t, np.array(channel.values[seen]), spread)
 
 
 def _unit(recording: Recording, item: Input | Output) -> str | None:

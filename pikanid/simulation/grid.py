@@ -34,7 +34,7 @@ class Grid:
 
     @functools.cached_property
     def _gaps(self) -> np.ndarray:
-        return np.diff(self.T)
+        return self.T[1:] - self.T[:-1]
 
     @functools.cached_property
     def spacings(self) -> tuple[float, float]:
@@ -67,10 +67,8 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     pairs = list(zip(held, delay_in, strict=True))
     breaks = [b[(b > t0) & (b < end)]
               for b in (h.switches + d for h, d in pairs if len(h.switches))]
-    T = _merge(np.concatenate([[t0, end], *breaks, *wanted]), 1e-11 * max(end - t0, 1e-300))
-    if len(T) < 2:
-        T = np.array([t0, t0 + 1e-9])
-    middle, gaps = 0.5 * (T[1:] + T[:-1]), np.diff(T)
+    T, seen = _stops(np.concatenate([[t0, end], *breaks, *wanted]), experiment, wanted)
+    middle, gaps = 0.5 * (T[1:] + T[:-1]), T[1:] - T[:-1]
     # nothing is integrated beyond the last stop, but an output may show the inputs there
     U, V = np.empty((len(T), len(pairs))), np.zeros((len(T), len(pairs)))
     jumps = np.zeros(len(T), bool)
@@ -81,7 +79,7 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
         if h.flat and not len(h.switches):  # one value for ever
             u[:] = h.values[0]
             continue
-        u[:-1], u[-1:] = h.at(middle, d), h.at(T[-1:], d)
+        u[:] = h.at(np.append(middle, T[-1]), d)
         ends = u[:-1]
         if not h.flat:
             v[:-1] = h.slope(middle, d)
@@ -90,7 +88,7 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
             ends = u[:-1] + v[:-1] * gaps
             jumps[1:] |= _differ(v[1:], v[:-1], v)
         jumps[1:] |= _differ(u[1:], ends, u)
-    return Grid(T, U, V, jumps, _seen(T, experiment, wanted), sum(map(len, wanted)))
+    return Grid(T, U, V, jumps, seen, len(seen.row))
 
 
 def _differ(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -98,22 +96,20 @@ def _differ(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(a - b) > 1e-9 * np.abs(scale).max(initial=0.0))
 
 
-def _merge(times: np.ndarray, gap: float) -> np.ndarray:
-    """Sorted times; those closer than `gap`, which differ by rounding only, become one."""
-    times = np.sort(times)
-    apart = np.ones(len(times), bool)
-    np.greater(np.diff(times), gap, out=apart[1:])
-    return times[apart]
+def _stops(times: np.ndarray, experiment: Experiment, wanted: Sequence[np.ndarray]
+           ) -> tuple[np.ndarray, Seen]:
+    """The stops for all times (K,) that are to be met, and the observations at each."""
+    from pikanid.simulation.stops import lay_out
 
-
-def _seen(T: np.ndarray, experiment: Experiment, wanted: list[np.ndarray]) -> Seen:
-    outputs = [np.full(len(w), s.output) for s, w in zip(experiment.samples, wanted, strict=True)]
-    times = np.concatenate([np.empty(0), *wanted])
-    stop = np.searchsorted(T, times).clip(1, len(T) - 1)
-    stop -= (times - T[stop - 1]) < (T[stop] - times)
-    order = np.argsort(stop, kind="stable")
-    first = np.zeros(len(T) + 1, np.int64)
-    np.cumsum(np.bincount(stop, minlength=len(T)), out=first[1:])
-    output = np.concatenate([np.empty(0, np.int64), *outputs]).astype(np.int64, copy=False)
-    return Seen(first, output[order], order.astype(np.int64, copy=False),
-                times[order] > experiment.t0)
+    times.sort()
+    seen = np.concatenate([np.empty(0), *wanted])
+    shown, at = np.empty(len(seen), np.int64), 0
+    for s, w in zip(experiment.samples, wanted, strict=True):
+        shown[at:at + len(w)] = s.output
+        at += len(w)
+    T, first = np.empty(len(times)), np.empty(len(times) + 1, np.int64)
+    stop, output, row = np.empty((3, len(seen)), np.int64)
+    inside = np.empty(len(seen), bool)
+    count = lay_out(times, 1e-11 * max(times[-1] - times[0], 1e-300), seen,
+                    shown, T, first, stop, output, row, inside)
+    return T[:count], Seen(first[:count + 1], output, row, inside)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dgeqrf
+from scipy.linalg import LinAlgError
+from scipy.linalg.lapack import dgeqrf, dgesdd
 
 from pikanid import errors
 from pikanid.problem.problem import FreeParameter
@@ -38,27 +40,33 @@ class Directions:
         """Those of a Jacobian (rows, n) and the parameters that are `estimated` (n,)."""
         inside = np.flatnonzero(estimated)
         # R of J = QR has the same, in as few rows as there are columns; LAPACK directly, as NumPy's
-        # wrapper takes longer than the rest of this
-        own = jacobian[:, inside]
-        J = np.triu(dgeqrf(own)[0][:own.shape[1]]) if own.size else own
+        # wrappers take longer than the rest of this
+        J = jacobian.T[inside].T
+        if J.size:
+            J = dgeqrf(J)[0][:len(inside)]
+            for j in range(J.shape[1]):
+                J[j + 1:, j] = 0.0
         norms = np.sqrt((J * J).sum(axis=0))
         seen = norms > 0
         s, vt = np.empty(0), np.empty((0, 0))
         if seen.any():
-            _, s, vt = np.linalg.svd(J[:, seen] / norms[seen], full_matrices=False)
+            _, s, vt, info = dgesdd(J[:, seen] / norms[seen], full_matrices=False)
+            if info:
+                raise LinAlgError(f"the singular values did not converge ({info})")
         return Directions(jacobian.shape[1], inside, norms, seen, s, vt)
 
     @property
     def covariance(self) -> np.ndarray:
         """(JᵀJ)⁻¹ (n, n), see `covariance`."""
         s, norms = self.sizes, self.norms[self.seen]
-        block = np.zeros((len(self.inside), len(self.inside)))
+        result = np.full((self.n, self.n), np.nan)
+        result[self.inside[:, None], self.inside] = 0.0
         if len(s):
             inner = (self.axes.T / np.maximum(s, s[0] * 1e-12) ** 2) @ self.axes
-            block[np.ix_(self.seen, self.seen)] = inner / (norms[:, None] * norms)
-        block[~self.seen, ~self.seen] = np.inf
-        result = np.full((self.n, self.n), np.nan)
-        result[self.inside[:, None], self.inside] = block
+            shown = self.inside[self.seen]
+            result[shown[:, None], shown] = inner / (norms[:, None] * norms)
+        hidden = self.inside[~self.seen]
+        result[hidden, hidden] = np.inf
         return result
 
     def warnings(self, free: Sequence[FreeParameter], settings: UncertaintySettings) -> list[str]:
@@ -100,14 +108,13 @@ def undetermined_warnings(free: Sequence[FreeParameter], theta: np.ndarray,
     Beside a value, and a guess, that are not zero ten times are far; beside an estimate near zero
     alone (an offset, an initial state), which has no size of its own, only hundreds are.
     """
-    with np.errstate(invalid="ignore"):
-        std = np.sqrt(np.diag(covariance))
     found = []
-    for f, value, error in zip(free, theta, std, strict=True):
+    for f, value, variance in zip(free, theta.tolist(), covariance.diagonal().tolist(),
+                                  strict=True):
         limit = (settings.far * max(abs(value), abs(f.guess)) if f.guess
                  else settings.far_from_zero * abs(value))
-        if np.isfinite(error) and error > limit > 0:
-            found.append(errors.undetermined(f.label, float(value), float(error)))
+        if 0.0 < variance < math.inf and math.sqrt(variance) > limit > 0:
+            found.append(errors.undetermined(f.label, value, math.sqrt(variance)))
     return found
 
 
