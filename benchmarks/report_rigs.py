@@ -3,8 +3,9 @@
 Usage: python benchmarks/report_rigs.py FOLDER [RIG ...]
 
 Makes and diagnoses the sets of the named rigs, of all if none is named, and keeps a row for every
-case in FOLDER/rigs.json, from which FOLDER/rigs.md is written; rows of other rigs stay.  Sets and
-answers lie in build/rigs until the code of the package changes; interrupted, it goes on there.
+case in FOLDER/rigs.json, from which FOLDER/rigs.md is written; rows of other rigs stay.  Sets lie
+in build/rigs until the code that makes them changes, answers until any code of the package does;
+interrupted, it goes on there.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ WORKERS = 2
 # One for each rig and noise, and never looked at before
 SEEDS = {(name, noise): 770_000 + 10 * k + i
          for k, name in enumerate(RIGS) for i, noise in enumerate(NOISES)}
+MAKERS = ("formula", "model", "recording", "validation")  # rooms: what makes the sets
 COUNTED = ("right", "wrong", "wrong_but_knowable", "false_alarm", "missed", "surely_in_part",
            "parameters_within_3_std", "held_out_within_1.1_noise")
 INTRODUCTION = f"""# Diagnoses of other rigs
@@ -62,21 +64,21 @@ def _set(name: str, noise: float) -> dict[str, Any]:
     bench, seed = RIGS[name], SEEDS[name, noise]
     own = tuple(e for known in bench.catalogue for e in read_effects(known))
     rig = Rig(bench.model(), bench.experiment(seed), bench.experiment(seed + 5), noise, own)
-    room = Path("build") / "rigs" / f"{name}-{seed}-{_code()}"
+    room = Path("build") / "rigs" / f"{name}-{seed}-{_code(*MAKERS)}"
     truth = room / "truth.json"
     room.mkdir(parents=True, exist_ok=True)
     if not truth.exists():
         generate(room / "set", truth, OwnSet(rig, CASES), seed, WORKERS, print)
-    answered = trials(room / "set", truth, rig.model.with_candidates(*own), room / "answers",
+    answered = trials(room / "set", truth, rig.model.with_candidates(*own), room / _code(""),
                       WORKERS, print)
     return {"noise": noise, "seed": seed,
             "trials": [asdict(one) for one in answered]}
 
 
-def _code() -> str:
-    """Changes when the package does."""
-    known = hashlib.sha256()
-    for path in sorted(Path(pikanid.__file__).parent.rglob("*.py")):
+def _code(*rooms: str) -> str:
+    """Changes when the code in these rooms of the package does."""
+    known, package = hashlib.sha256(), Path(pikanid.__file__).parent
+    for path in sorted(p for room in rooms for p in (package / room).rglob("*.py")):
         known.update(path.read_bytes())
     return known.hexdigest()[:12]
 

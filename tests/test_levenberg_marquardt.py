@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from pikanid.optimise.levenberg_marquardt import Rows, descend, minimise
+from pikanid.optimise.levenberg_marquardt import Minimum, Rows, descend, minimise
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -86,3 +86,14 @@ def test_a_fit_is_given_up_when_asked_to(patience: int | None, most: int) -> Non
     assert found is not None
     assert (found.chi2 < 1.0) == (patience is None)
     assert 7 <= calls <= most
+
+
+def test_what_a_bound_holds_takes_nothing_up() -> None:
+    r, J = np.array([1.0, 2.0]), np.array([[1.0, 1.0], [0.5, -2.0]])  # slopes 2 and -3
+    found = Minimum(np.array([0.0, 1.0]), r, J, True)
+    low, high = np.zeros(2), np.ones(2)
+    assert found.movable(low, high).tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    inside = Minimum(np.array([0.5, 1.0]), r, J, True)
+    assert inside.movable(low, high).tolist() == [[1.0, 0.0], [0.5, 0.0]]
+    pulled_off = Minimum(np.array([1.0, 0.0]), r, J, True)  # χ² falls inwards
+    assert pulled_off.movable(low, high).tolist() == J.tolist()

@@ -88,6 +88,10 @@ def test_a_law_stands_where_it_acts(motor_rig: Rig) -> None:
     assert ("input_saturation", "input", "u") in found
     assert ("sensor_lag", "sensor", "omega") in found
     assert ("parameter_drift", "dynamics", "omega") in found
+    drift = {one.effect.variant: one.places for one in motor_rig.laws(MOTOR.values)
+             if one.id == "parameter_drift"}
+    assert drift["i,k"] == drift["omega,k"] == ("i", "omega")  # torque and counter-voltage
+    assert drift["omega,J"] == ("omega",)
     assert law(motor_rig, "input_delay").twins == ("sensor_delay",)
     assert not [one for one in found if one[0] == "cubic_stiffness"]  # there is no coordinate
 

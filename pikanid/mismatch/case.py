@@ -105,7 +105,8 @@ class Case:
         found = minimise(whitened.residual, h.minimum.theta, problem.lower, problem.upper,
                          self.settings.budget.noise_refit)
         return found is not None and residual_tests(
-            whitened, found.theta, found.r, found.J, self.candidates, self.rate
+            whitened, found.theta, found.r, found.movable(problem.lower, problem.upper),
+            self.candidates, self.rate
         ).p_value > self.settings.adequate
 
     def clear_later(self, best: Hypothesis) -> None:
@@ -120,8 +121,14 @@ class Case:
             self.predictions.clear()
 
     def adequate(self, h: Hypothesis) -> bool:
-        """Whether nothing is left in the train recordings."""
-        return not h.far and self.test(h).p_value > self.settings.needless
+        """Whether nothing is left in the train recordings, nor anything in the held-out ones that
+        refutes it.
+        """
+        if h.far or self.test(h).p_value <= self.settings.needless:
+            return False
+        seen = self.predicted(h)
+        return self.later is None or (
+            seen is not None and not smaller(seen.detection.p_value, self.settings.adequate))
 
     def detected(self) -> Detection:
         """Whether the nominal model leaves anything; between repeats, what they differ by tells."""
@@ -140,7 +147,7 @@ class Case:
         """What is left in the train recordings."""
         if h.fit not in self.tests:
             self.tests[h.fit] = residual_tests(
-                h.whitened, h.minimum.theta, h.minimum.r, h.minimum.J, self.candidates, self.rate)
+                h.whitened, h.minimum.theta, h.minimum.r, h.movable, self.candidates, self.rate)
         return self.tests[h.fit]
 
     def predicted(self, h: Hypothesis) -> HeldOut | None:

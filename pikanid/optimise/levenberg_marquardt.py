@@ -58,6 +58,10 @@ class Minimum:
         """Sum of squares."""
         return float(self.r @ self.r)
 
+    def movable(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        """(rows, n) the Jacobian, with zeros for parameters that a bound (n,) holds."""
+        return np.where(held(self.theta, self.J.T @ self.r, lower, upper), 0.0, self.J)
+
 
 @dataclass(frozen=True, eq=False)
 class Rows:

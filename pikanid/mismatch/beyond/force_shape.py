@@ -85,7 +85,7 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
     edges = _Edges(base, site)
     whitened, fit, found = base.whitened, base.minimum, edges.found
     scaled, owner = edges.rest / edges.size, found.owner
-    target = project(fit.J, -fit.r)
+    target = project(base.movable, -fit.r)
     smooth = _Smoother(scaled, target, owner, edges.size)
     coefficients, covariance = smooth.coefficients(target), smooth.covariance
     everything = _explained(scaled, target)
@@ -108,8 +108,8 @@ def force_shape(base: Hypothesis, site: Site, candidates: tuple[Candidate, ...])
                           float(gain / max(everything[0], 1e-300)),
                           float(chi2.sf(gain, freedom)) if freedom > 0 else 1.0,
                           float(lone / max(everything[0], 1e-300)), curve))
-    left = residual_tests(whitened, fit.theta, fit.r, np.hstack([fit.J, edges.D]), candidates,
-                          site.rate)
+    taken = np.hstack([base.movable, edges.D])
+    left = residual_tests(whitened, fit.theta, fit.r, taken, candidates, site.rate)
     static: Literal[True] | None = True if left.p_value >= whitened.settings.refusal else None
     spare = max(whitened.rows - everything[1] - fit.J.shape[1], 1)
     return ForceShape(tuple(drawn), site.force_unit, static,
@@ -128,9 +128,9 @@ def with_law(shape: ForceShape, base: Hypothesis, site: Site, law: Hypothesis) -
     if len(parts) < len(change) or not np.isfinite(seen).all():
         return shape
     edges = _Edges(base, site)
-    smooth = _Smoother(edges.rest / edges.size, project(fit.J, -fit.r), edges.found.owner,
+    smooth = _Smoother(edges.rest / edges.size, project(base.movable, -fit.r), edges.found.owner,
                        edges.size)
-    coefficients = smooth.coefficients(project(fit.J, seen))
+    coefficients = smooth.coefficients(project(base.movable, seen))
     laws = {name: spline.drawn(coefficients[edges.found.owner == k], None, edges.without_line(k))[0]
             for k, name, spline in edges.shown()}
     return replace(shape, edges=tuple(replace(e, law=laws[e.argument]) for e in shape.edges))
@@ -152,7 +152,7 @@ class _Edges:
         self.D = np.vstack([D, np.zeros((len(fit.r) - len(D), D.shape[1]))])
         size = np.linalg.norm(self.D, axis=0)
         self.size = np.where(size > 0, size, np.inf)
-        self.rest = project(fit.J, self.D)
+        self.rest = project(base.movable, self.D)
         self._line = base.whitened.settings.beyond.line
 
     def shown(self) -> list[tuple[int, str, _Spline]]:

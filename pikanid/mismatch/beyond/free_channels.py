@@ -83,8 +83,8 @@ class _Left:
         fit = base.minimum
         padded = np.vstack([found.D, np.zeros((len(fit.r) - len(found.D), found.D.shape[1]))])
         size = np.linalg.norm(padded, axis=0)
-        self.rest = project(fit.J, padded) / np.where(size > 0, size, np.inf)
-        self.target = project(fit.J, -fit.r)
+        self.rest = project(base.movable, padded) / np.where(size > 0, size, np.inf)
+        self.target = project(base.movable, -fit.r)
         self.owner = found.owner
         self.channels = [acts_in(c) for c in found.candidates]
         self.forces = len(force)

@@ -144,33 +144,37 @@ def delay(site: Site) -> list[Candidate]:
                       lambda m: m.map_output(o, delay=tau.name), directions, twin="delay")]
 
 
-LAGS = (0.0015, 0.005, 0.015, 0.05)  # numerical: [s], from where fits begin
+LAGS = (0.075, 0.25, 0.75, 2.5)  # numerical: samples, from where fits begin
+SHORTEST, LONGEST = 0.01, 250.0  # numerical: lags [samples] that make a difference
 
 
 def lags(site: Site) -> list[Candidate]:
     """First-order lags of sensor and actuator."""
     o = site.output.name
-    tau = Parameter(site.name("tau_s"), 0.01, "s", (2e-4, 5.0))
+    step = site.interval
+    within = (SHORTEST * step, LONGEST * step)
+    tau = Parameter(site.name("tau_s"), 0.5 * step, "s", within)
 
     def seen(view: View) -> list[TangentDirection]:
         # a first guess of the right size matters: far shorter lags are stiff
         from pikanid.mismatch.catalogue.recurrences import lagged
 
-        return [TangentDirection({tau.name: s}, seen=lagged(view.t, view.y[o], s) - view.y[o],
-                                 one_sided=True, null=0.0) for s in LAGS]
+        return [TangentDirection(
+            {tau.name: float(s)}, seen=lagged(view.t, view.y[o], s) - view.y[o], one_sided=True,
+            null=0.0) for s in step * np.array(LAGS)]
 
     found = [Candidate(("sensor_lag",), "a lag of the sensor", f"{o} behind a lag {tau.name}",
                        "sensor", site, (tau,), lambda m: m.map_output(o, lag=tau.name), seen,
                        twin="lag")]
     for u in site.inputs:
-        t_u = Parameter(site.name("tau_a"), 0.01, "s", (2e-4, 5.0))
+        t_u = Parameter(site.name("tau_a"), 0.5 * step, "s", within)
 
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[TangentDirection]:
             from pikanid.mismatch.catalogue.recurrences import lagged
 
             return [TangentDirection(
-                {t_u.name: s}, push={u: lagged(view.t, view.u[u], s, True) - view.u[u]},
-                one_sided=True, null=0.0) for s in LAGS]
+                {t_u.name: float(s)}, push={u: lagged(view.t, view.u[u], s, True) - view.u[u]},
+                one_sided=True, null=0.0) for s in step * np.array(LAGS)]
 
         found.append(_input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),
                             f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name))

@@ -21,6 +21,8 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.problem.held import HeldInput, acting
 
+RISING = (0.025, 0.075, 0.25)  # numerical: of the usual speed, below which friction rises
+SLOWEST = 0.005  # numerical: of the usual speed, the least
 PARTS = 8  # numerical: of a step, at which a ramp within it is looked at
 Shape = Callable[[View], np.ndarray]
 
@@ -102,15 +104,18 @@ def stribeck_friction(site: Site) -> list[Candidate]:
     """Dry friction that is greater at low speed."""
     c = Parameter(site.name("c_s"), 0.0, site.force_unit, (0.0, INF))
     rise = Parameter(site.name("rise"), 0.5, "", (0.0, 20.0))
-    slow = Parameter(site.name("v_s"), 0.2, site.speed_unit, (0.01, INF))
+    usual = site.usual_speed or 1.0
+    slow = Parameter(site.name("v_s"), RISING[1] * usual, site.speed_unit,
+                     (SLOWEST * usual, INF))
     text = f"-{c.name}*(1 + {rise.name}*exp(-({site.v}/{slow.name})**2))*sign({site.v})"
 
     def directions(view: View) -> list[TangentDirection]:
         v = view.x[site.v]
-        return [TangentDirection({c.name: 1.0, rise.name: 1.0, slow.name: s},
+        speeds = float(np.abs(v).max(initial=0.0)) * np.array(RISING)
+        return [TangentDirection({c.name: 1.0, rise.name: 1.0, slow.name: float(s)},
                                  force=-sense(view, site.v) * (1 + np.exp(-(v / s) ** 2)),
                                  one_sided=True)
-                for s in (0.05, 0.15, 0.5)]
+                for s in speeds if s > 0]
 
     def resistance(speed: np.ndarray, rise: float, slow: float) -> np.ndarray:
         return np.asarray(1 + rise * np.exp(-(speed / slow) ** 2))

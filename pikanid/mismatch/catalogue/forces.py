@@ -18,6 +18,7 @@ INF = float("inf")
 SKEWEST = 0.95  # numerical: of the width, that one side of what acts once may take
 NEXT_TO_NONE = 1e-9  # numerical: square of a distance from a peak, in quarters of its width
 USUAL_PEAK = 2.5  # numerical: exponent of a hump, from about which fits of a course begin
+BRIEF, LASTING = 0.03, 0.25  # numerical: of a recording, how long what acts once is, and at most
 NEAREST = 0.1  # definition: of the half range, at which a wall may stand
 SIDE, BOTH = "negative side", "both sides"
 SIDES = {"": (1,), SIDE: (-1,), BOTH: (1, -1)}  # definition: of the walls of each variant
@@ -160,7 +161,8 @@ def disturbance(site: Site) -> list[Candidate]:
     # what nothing follows that it set in motion cannot be told from a few bad samples
     last -= min(0.5 * np.pi / site.rate, 0.5 * (last - first)) if site.rate else 0.0
     at = Parameter(site.name("t_peak"), (first + last) / 2, "s", (first, last))
-    w = Parameter(site.name("width"), 0.3, "s", (0.01, 10.0))
+    whole = site.span[1] - site.span[0]
+    w = Parameter(site.name("width"), BRIEF * whole, "s", (0.5 * site.interval, LASTING * whole))
     text = f"{a.name}/2*(1 + cos(2*pi*clip((t - {at.name})/{w.name}, -0.5, 0.5)))"
 
     def directions(view: View) -> list[TangentDirection]:

@@ -42,7 +42,7 @@ def coulomb_friction(site: Site) -> list[Candidate]:
                lambda w: -sense(w, site.v), one_sided=True, other_minima=STICKING, twin="coulomb")
     sharp = replace(law, static=True, resistance=np.ones_like, exponent=0.0, form="sign",
                     argument=site.v, powers=Powers(0, 0))
-    usual = site.half_range * (site.rate or 1.0)
+    usual = site.usual_speed
     width = Parameter(site.name("w_c"), max(ROUNDED * usual, 1e-6), site.speed_unit,
                       (max(SHARP * usual, 1e-9), INF))
     text = f"-{c.name}*tanh({site.v}/{width.name})"

@@ -67,6 +67,12 @@ class Site:
         return f"{self.unit}/s" if self.q else self.model.state(self.v).unit or "1"
 
     @property
+    def usual_speed(self) -> float:
+        """About the largest value of the rate, or of the state where that is seen; else 0."""
+        shown = self.q or self.output.expression == symbol(self.v)
+        return self.half_range * (self.rate or 1.0) if shown else 0.0
+
+    @property
     def force_unit(self) -> str:
         """Of what is added to v'."""
         return f"{self.unit}/s^2" if self.q else units.product((self.speed_unit, 1), ("s", -1))

@@ -176,10 +176,12 @@ def _begun(whitened: Whitened, start: Start | Mapping[str, float],
         if not closest.choose_steps(whitened, theta, misfit):
             continue
         size = whitened.chi2(theta)
-        if closest.ask(lambda chi2: misfit(chi2) < fits.gross) or (share < 1 and size > least):
-            return theta if best is None or size < least else best
+        if share < 1 and size > least:
+            break
         if size < least:
             best, least = theta, size
+        if least < whitened.chi2(home) and closest.ask(lambda chi2: misfit(chi2) < fits.gross):
+            break
     return best
 
 

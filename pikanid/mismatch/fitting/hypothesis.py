@@ -103,6 +103,14 @@ class Hypothesis:
         near = NEAR * np.maximum(np.abs(theta), 1e-12)
         return bool(np.any((theta - problem.lower < near) | (problem.upper - theta < near)))
 
+    @functools.cached_property
+    def movable(self) -> np.ndarray:
+        """(rows, n) derivatives of the residual to the parameters, zeros where a bound holds one:
+        that one takes up nothing of what else may be there.
+        """
+        problem = self.whitened.problem
+        return self.minimum.movable(problem.lower, problem.upper)
+
     @property
     def noise(self) -> float:
         """Standard deviation of what is left, in units of the noise that was assumed."""

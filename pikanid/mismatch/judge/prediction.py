@@ -18,7 +18,8 @@ from pikanid.mismatch.fitting.progressive_horizon import besides, progressive_ho
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit, room
 from pikanid.model import Model
-from pikanid.optimise.levenberg_marquardt import Minimum, held, minimise
+from pikanid.noise.projection import project
+from pikanid.optimise.levenberg_marquardt import Minimum, minimise
 
 Residual = tuple[int, str, np.ndarray, np.ndarray]  # recording, output, times, values
 
@@ -115,15 +116,13 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     found, prior = _moved(hypothesis, whitened, guess, shared, prior)
     if found is None or not np.isfinite(found.J).all():
         return None
-    tests = functools.partial(residual_tests, whitened, found.theta, found.r, found.J, candidates,
+    movable = found.movable(whitened.problem.lower, whitened.problem.upper)
+    tests = functools.partial(residual_tests, whitened, found.theta, found.r, movable, candidates,
                               rate)
     together = functools.partial(_tested_together, hypothesis, whitened, found, candidates, rate)
     predicted, gaps = _shown(whitened, guess)
     moved, closer = _shown(whitened, found.theta)
-    # where corners stop the fit, as of a wall hardly touched, the tests forgive a last linear step
-    pushed = held(found.theta, found.J.T @ found.r, whitened.problem.lower, whitened.problem.upper)
-    q, _ = np.linalg.qr(found.J[:, ~pushed])
-    left = found.r - q @ (q.T @ found.r)
+    left = project(movable, found.r)  # corners, as of a wall hardly touched, may have stopped it
     # nowhere does the first recording suit better than where it was fitted
     worse = max(float(np.sum(left[whitened.rows:] ** 2)) + prior.constant, 0.0)
     chi2 = float(np.sum(left[: whitened.rows] ** 2)) + worse
@@ -230,8 +229,11 @@ def _tested_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum,
 
     The fit begins where that of the held-out ones alone ended.
     """
-    both = _fitted_together(hypothesis, later, apart, apart.chi2)
-    return both and residual_tests(both[0], both[1].theta, both[1].r, both[1].J, candidates, rate)
+    if (both := _fitted_together(hypothesis, later, apart, apart.chi2)) is None:
+        return None
+    problem, found = both[0].problem, both[1]
+    movable = found.movable(problem.lower, problem.upper)
+    return residual_tests(both[0], found.theta, found.r, movable, candidates, rate)
 
 
 def _fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, left: float

@@ -38,7 +38,7 @@ def affected(base: Hypothesis, given: Sequence[Hypothesis], sites: Sequence[Site
     if len(sites) == 1:
         return sites[0]
     found = directions(base.whitened, base.minimum.theta, candidates)
-    units, _ = unit_columns(found.D, base.minimum.J)
+    units, _ = unit_columns(found.D, base.movable)
     z = -units.T @ base.minimum.r
     size = np.where(found.one_sided, z, np.abs(z))
     return found.candidates[found.owner[int(np.argmax(size))]].site if len(size) else sites[0]
@@ -159,7 +159,7 @@ def smallest(base: Hypothesis, candidates: Sequence[Candidate],
     Only of effects that grow from nothing in proportion to one parameter.
     """
     found = directions(base.whitened, base.minimum.theta, [c for c in candidates if c.known])
-    _, lengths = unit_columns(found.D, base.minimum.J)
+    _, lengths = unit_columns(found.D, base.movable)
     sizes: dict[str, Value] = {}
     visible = base.whitened.settings.visible * overdispersion**0.5
     for owner, sign, length in zip(found.owner, found.directions, lengths, strict=True):

@@ -106,16 +106,16 @@ class Screen:
         self.settings = about.whitened.settings
         self.faint = self.settings.search.faint
         self.found: Directions = directions(about.whitened, about.minimum.theta, candidates)
-        self.units, self.lengths = unit_columns(self.found.D, about.minimum.J)
+        self.units, self.lengths = unit_columns(self.found.D, about.movable)
         # r = ŷ - y: a sign that is present in y shows as its negative
         self.z = -(self.units.T @ about.minimum.r)
         good = self.lengths > 0
         allowed = good & ((self.z > 0) | ~self.found.one_sided)
         self.gain = np.where(allowed, self.z**2, 0.0)
         self.names = [f.label for f in about.whitened.problem.free]
-        norms = np.maximum(np.linalg.norm(about.minimum.J, axis=0), 1e-300)
+        norms = np.maximum(np.linalg.norm(about.movable, axis=0), 1e-300)
         # what the parameters take up of each sign, as far as they are told apart
-        scaled = np.linalg.lstsq(about.minimum.J / norms, self.found.D, SPANNED)[0]
+        scaled = np.linalg.lstsq(about.movable / norms, self.found.D, SPANNED)[0]
         self.taken = scaled / norms[:, None]
 
     def best(self, candidate: int, count: int = 1) -> list[int]:

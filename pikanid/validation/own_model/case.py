@@ -59,11 +59,12 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
         seen = bench.outputs(acting(hidden, key), experiment)
         spoilt = {n: y + scene.sigma[n] * noisy.standard_normal(len(y)) for n, y in seen.items()}
         recordings[f"{order.name}_{key}.csv"] = _csv(experiment, rig, spoilt)
-    nominal = bench.fitted(truth, []).distance if hidden else 0.0
-    alone = [bench.fitted(truth, [h for h in hidden if h is not one]).distance for one in hidden]
+    without = [bench.fitted(truth, [h for h in hidden if h is not one]) for one in hidden]
+    alone = [fit.distance for fit in without]
+    nominal = bench.fitted(truth, []).distance if len(hidden) > 1 else sum(alone)
     rival: tuple[tuple[str, ...], float] = ((), np.inf)
     if hidden and all(h.law.known for h in hidden):
-        rival = bench.nearest(truth, hidden, laws, rng)
+        rival = bench.nearest(truth, hidden, without, laws, rng)
     distance = min([rival[1], *alone]) if len(hidden) > 1 else rival[1]
     return Case(recordings, {
         "id": order.name, "class": order.kind,
@@ -98,7 +99,7 @@ def _entry(hidden: Hidden) -> dict[str, object]:
     law, units = hidden.law, {p.name: p.unit for p in hidden.law.effect.parameters}
     return {"id": law.id, "twins": list(law.twins), "near": "", "families": sorted(law.families),
             "variant": law.effect.variant, "expression": law.effect.expression,
-            "where": {"channel": law.channel, "place": law.where},
+            "where": {"channel": law.channel, "place": law.where, "places": [*law.places]},
             "parameters": {n: {"value": v, "unit": units[n]} for n, v in hidden.values.items()}}
 
 

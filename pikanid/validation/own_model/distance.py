@@ -16,6 +16,7 @@ from pikanid.validation.own_model.plant import Plant
 
 STEP = 1e-5  # numerical: relative, of a finite difference through the simulator
 MOST_FITS = 12  # numerical: evaluations of a refit, each with a Jacobian
+ENOUGH = 1e-3  # numerical: relative, of χ²: a step that changes it by less ends a refit
 FAR = 1e6  # numerical: [σ] in place of a residual of a motion that diverges
 
 
@@ -60,14 +61,17 @@ def sensitivities(plant: Plant, scene: Scene, values: Mapping[str, float], names
     return np.column_stack(columns)
 
 
-def beyond(change: Array, directions: Array) -> float:
-    """Length of what is left of a change [σ] when it is projected on directions (rows, n)."""
+def beyond(change: Array, directions: Array) -> tuple[float, Array]:
+    """Length of what is left of a change [σ] when it is projected on directions (rows, n), and how
+    far (n,) it goes along them.
+    """
     scale = np.linalg.norm(directions, axis=0)
-    kept = directions[:, scale > 0] / scale[scale > 0]
-    return float(np.linalg.norm(change - kept @ np.linalg.lstsq(kept, change, rcond=1e-9)[0]))
+    scale = np.where(scale > 0, scale, 1.0)
+    steps = np.linalg.lstsq(directions / scale, change, rcond=1e-9)[0] / scale
+    return float(np.linalg.norm(change - directions @ steps)), steps
 
 
-def refit(model: Model, scene: Scene, truth: Array, start: Mapping[str, float],
+def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str, float]],
           free: Sequence[str]) -> Fit:
     """The least-squares distance of a model from a truth (rows,) without noise.
 
@@ -75,26 +79,35 @@ def refit(model: Model, scene: Scene, truth: Array, start: Mapping[str, float],
         model: Whatever explains.
         scene: Experiment and noise.
         truth: Whitened.
-        start: Values of all parameters that are not the model's own.
+        starts: Values of all parameters that are not the model's own; the nearest one is taken.
         free: Names of those that are fitted, within their bounds.
     """
     plant = Plant(model)
     bounds = {p.name: p.bounds for p in model.parameters}
     low, high = (np.array([bounds[n][k] for n in free]) for k in (0, 1))
-    x = np.clip([start[n] for n in free], low, high)
-    scale = np.where(x != 0, np.abs(x), 1.0)
 
-    def residual(z: Array) -> Array:
-        values = {**start, **dict(zip(free, z * scale, strict=True))}
+    def residual(values: Mapping[str, float]) -> Array:
         try:
             return scene.whitened(plant.outputs(values, scene.experiment)) - truth
         except errors.SimulationFailed:
             return np.full(len(truth), FAR)
 
+    within = [{**s, **dict(zip(free, np.clip([s[n] for n in free], low, high), strict=True))}
+              for s in starts]
+    start = min(within, key=lambda s: float(np.linalg.norm(residual(s))))
+    x = np.array([start[n] for n in free])
+    scale = np.where(x != 0, np.abs(x), 1.0)
+
+    def at(z: Array) -> dict[str, float]:
+        return {**start, **dict(zip(free, (z * scale).tolist(), strict=True))}
+
+    def left(z: Array) -> Array:
+        return residual(at(z))
+
     inside = np.clip(x / scale, low / scale, high / scale)
     inside = np.where(inside == low / scale, inside + 1e-6, inside)
     inside = np.where(inside >= high / scale, high / scale - 1e-6, inside)
-    found = least_squares(residual, inside, bounds=(low / scale, high / scale),
-                          diff_step=np.full(len(free), STEP), max_nfev=MOST_FITS)
-    values = dict(zip(free, (found.x * scale).tolist(), strict=True))
-    return Fit(float(np.sqrt(2 * found.cost)), {**start, **values})
+    found = least_squares(left, inside, bounds=(low / scale, high / scale),
+                          diff_step=np.full(len(free), STEP), ftol=ENOUGH,
+                          max_nfev=MOST_FITS)
+    return Fit(float(np.sqrt(2 * found.cost)), at(found.x))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -22,7 +23,8 @@ SHARE = 0.15  # definition: RMS of what a law changes, at most, in ranges of the
 LADDER = np.geomspace(1e-4, 1e3, 15)  # numerical: times the guess of a size
 HALVINGS = 8  # numerical: of the logarithm between two rungs
 SHAPES = 2  # numerical: values of a rival's shape to first order
-FULL = 3  # numerical: rivals that are refitted
+NOWHERE: Mapping[str, float] = MappingProxyType({})
+FULL = 5  # numerical: rivals that are refitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,7 @@ class Workbench:
 
     def missed(self, hidden: Sequence[Hidden]) -> float:
         """Distance of the nominal model [σ], to first order in what it can absorb."""
-        return beyond(self.seen(hidden) - self.clean, self.directions)
+        return beyond(self.seen(hidden) - self.clean, self.directions)[0]
 
     def sized(self, law: Law, rng: np.random.Generator) -> Hidden:
         """A law at a size whose distance is drawn evenly in its logarithm.
@@ -123,40 +125,61 @@ class Workbench:
             low, high = (middle, high) if far(float(np.exp(middle))) < wanted else (low, middle)
         return at(float(np.exp(low)))
 
-    def nearest(self, truth: Array, hidden: Sequence[Hidden], laws: Sequence[Law],
-                rng: np.random.Generator) -> tuple[tuple[str, ...], float]:
+    def nearest(self, truth: Array, hidden: Sequence[Hidden], without: Sequence[Fit],
+                laws: Sequence[Law], rng: np.random.Generator) -> tuple[tuple[str, ...], float]:
         """Ids and distance [σ] of the best explanation that is not the truth: another known law in
         the place of one that hides, beside the others.
+
+        Args:
+            truth: Whitened outputs.
+            hidden: What hides.
+            without: The fits without each of them: rivals are weighed to first order from there.
+            laws: To choose rivals from.
+            rng: Of the rivals' shapes.
         """
-        change = truth - self.clean
-        ranked: list[tuple[float, list[Hidden]]] = []
-        ways = [[h for h in hidden if h is not out] for out in hidden]
-        for law in laws:
-            if not law.known or any(_same(law, h.law) for h in hidden):
-                continue
-            for _ in range(SHAPES if law.shapes else 1):
-                rival = Hidden(law, {**law.drawn(rng), law.size.name: law.effect.start})
+        rivals = [Hidden(law, {**law.drawn(rng), law.size.name: law.effect.start})
+                  for law in laws if law.known and not any(_same(law, h.law) for h in hidden)
+                  for _ in range(SHAPES if law.shapes else 1)]
+        ranked: list[tuple[float, list[Hidden], dict[str, float]]] = []
+        for out, fit in zip(hidden, without, strict=True):
+            beside = [h for h in hidden if h is not out]
+            free, plant = self._free(beside), Plant(self.extended(beside))
+            there = self.scene.whitened(plant.outputs(fit.values, self.scene.experiment))
+            directions = sensitivities(plant, self.scene, fit.values, free, there)
+            for rival in rivals:
+                size, start = rival.law.size.name, {**rival.values, **fit.values}
+                seen = Plant(self.extended([*beside, rival]))
                 try:
-                    moved = self.seen([rival]) - self.clean
+                    moved = self.scene.whitened(seen.outputs(start, self.scene.experiment)) - there
                 except errors.SimulationFailed:
                     continue
-                for way in ways:
-                    beside = [self.seen([h]) - self.clean for h in way]
-                    far = beyond(change, np.column_stack([self.directions, moved, *beside]))
-                    ranked.append((far, [*way, rival]))
-        ranked.sort(key=lambda pair: pair[0])
+                far, steps = beyond(truth - there, np.column_stack([directions, moved]))
+                start |= {n: fit.values[n] + float(d) * (abs(fit.values[n]) or 1.0)
+                          for n, d in zip(free, steps, strict=False)}
+                null = rival.law.effect.null[1]
+                start[size] = null + float(steps[-1]) * (rival.law.effect.start - null)
+                ranked.append((far, [*beside, rival], start))
+        ranked.sort(key=lambda found: found[0])
         best: tuple[tuple[str, ...], float] = ((), np.inf)
-        for _, explanation in ranked[:FULL]:
-            found = self.fitted(truth, explanation)
+        for _, explanation, start in ranked[:FULL]:
+            found = self.fitted(truth, explanation, start)
             if found.distance < best[1]:
                 best = tuple(h.law.id for h in explanation), found.distance
         return best
 
-    def fitted(self, truth: Array, hidden: Sequence[Hidden]) -> Fit:
-        """The model with these laws, all of them refitted to a truth."""
-        free = [*self.model.free_names, *(p.name for h in hidden for p in (
-            h.law.size, *h.law.shapes))]
-        return refit(self.extended(hidden), self.scene, truth, self.at(hidden), free)
+    def fitted(self, truth: Array, hidden: Sequence[Hidden],
+               start: Mapping[str, float] = NOWHERE) -> Fit:
+        """The model with these laws, all of them refitted to a truth, from their values or from a
+        `start`.
+        """
+        known = self.at(hidden)
+        return refit(self.extended(hidden), self.scene, truth, [known, {**known, **start}],
+                     self._free(hidden))
+
+    def _free(self, hidden: Sequence[Hidden]) -> list[str]:
+        """Names of what is fitted with these laws."""
+        return [*self.model.free_names,
+                *(p.name for h in hidden for p in (h.law.size, *h.law.shapes))]
 
 
 def _same(a: Law, b: Law) -> bool:

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from pikanid import errors
+from pikanid.formula.expressions import symbol
 from pikanid.model import Effect, EffectForm, Model
 from pikanid.model.binding import Surroundings, bound
 from pikanid.model.effects_file import read_effects
@@ -29,20 +30,26 @@ class Law:
         effect: As text.
         known: Whether a diagnosis can know it.
         channel: Through which it acts.
-        where: State, input or output.
+        places: State, input or output; of a parameter that changes, all states whose equations
+            hold it.
         twins: Ids that no experiment of this kind tells from it.
     """
 
     effect: Effect
     known: bool
     channel: Literal["dynamics", "input", "sensor"]
-    where: str
+    places: tuple[str, ...]
     twins: tuple[str, ...] = ()
 
     @property
     def id(self) -> str:
         """Of the effect, without what tells its variants apart."""
         return self.effect.key
+
+    @property
+    def where(self) -> str:
+        """The first of its places."""
+        return self.places[0]
 
     @property
     def families(self) -> set[str]:
@@ -98,10 +105,11 @@ def _law(effect: Effect, model: Model, known: bool, single: bool) -> Law | None:
         return None
     twins = (*effect.twins, *([TWINS[effect.key]] if single and effect.key in TWINS else []))
     if effect.inputs:
-        return Law(effect, known, "input", next(iter(effect.inputs)), twins)
+        return Law(effect, known, "input", (next(iter(effect.inputs)),), twins)
     if effect.outputs:
-        return Law(effect, known, "sensor", next(iter(effect.outputs)), twins)
-    places = (*effect.add, *effect.replace, *effect.initial)
-    state = next((n for n in places if n in model.state_names), "")
-    # a parameter that changes acts in the equation that its form was bound to first
-    return Law(effect, known, "dynamics", state or effect.variant.split(",")[0], twins)
+        return Law(effect, known, "sensor", (next(iter(effect.outputs)),), twins)
+    acts = (*effect.add, *effect.replace, *effect.initial)
+    states = [n for n in acts if n in model.state_names]
+    changed = {symbol(n) for n in acts if n in model.parameter_names}
+    return Law(effect, known, "dynamics", tuple(states[:1] or [
+        n for n in model.state_names if changed & model.equations[n].free_symbols]), twins)

@@ -106,11 +106,11 @@ def _trial(case: Mapping[str, Any], answer: Mapping[str, Any]) -> Trial:
 
 
 def _placed(case: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
-    places = {(e["where"]["channel"], e["where"]["place"]) for e in case["effects"]}
+    places = {(e["where"]["channel"], tuple(e["where"]["places"])) for e in case["effects"]}
     if len(places) != 1:
         return None
-    (channel, place), said = places.pop(), answer["where"]
+    (channel, equations), said = places.pop(), answer["where"]
     if len({*said["channels"]}) > 1 and channel in said["channels"]:
         return True  # which of them cannot be known: twins
     return bool(channel == said["channel"] and (
-        channel != "dynamics" or place == said["equation"]))
+        channel != "dynamics" or said["equation"] in equations))
