@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -48,6 +50,20 @@ def test_every_state_that_reaches_an_output_is_a_site() -> None:
     seen, behind = sites(tanks(), (STILL,))
     assert (seen.v, seen.inputs, seen.suffix) == ("x2", (), "_x2")
     assert (behind.v, behind.inputs, behind.output.name) == ("x1", ("u",), "y")
+
+
+def test_a_late_input_is_a_late_output_only_out_of_rest() -> None:
+    """What moves at first has been moved by an input whose delay no output would show."""
+    pushed = pk.Recording.from_arrays(np.arange(100) * 0.01, {"u": np.cos(np.arange(100))},
+                                      units={"u": "V"})
+    for recorded, still in (((STILL,), True), ((pushed,), False), ((STILL, pushed), False)):
+        [one] = sites(motor(), recorded)
+        assert one.still == still
+        late = {c.ids for c in candidates((one,)) if c.twin == "delay" and not c.beside}
+        assert late == ({("input_delay", "sensor_delay")} if still
+                        else {("sensor_delay",), ("input_delay",)})
+    free = motor().replace(states=(replace(motor().states[0], initial=symbol("b")),))
+    assert not sites(free, (STILL,))[0].still
 
 
 def test_what_nothing_shows_is_refused() -> None:
@@ -183,3 +199,33 @@ def test_what_happens_once_may_take_any_course(course: str) -> None:
     dx = pk.diagnose(motor, run(truth, 1), run(motor, 2), workers=1)
     assert dx.verdict in ("named", "set")
     assert all([e.ids for e in h.effects] == [("disturbance",)] for h in dx.hypotheses)
+
+
+@pytest.mark.slow
+def test_a_motor_that_its_voltage_reaches_late() -> None:
+    """It turns from the first instant on, as no sensor that is late would show."""
+    def recorded(seed: int) -> pk.Recording:
+        rng = np.random.default_rng(seed)
+        t, tau = np.arange(801) * 0.01, 0.034
+        u = np.repeat(rng.uniform(2.0, 6.0, 41), 20)[:801]
+
+        def rate(s: float, w: np.ndarray) -> np.ndarray:
+            return 8.0 * u[max(int(np.floor((s - tau) / 0.01 + 1e-9)), 0)] - 1.5 * w
+
+        switches = np.unique(np.round(np.r_[0.0, t + tau, 8.0], 9))
+        switches = switches[switches <= 8.0]
+        seen, at = np.zeros(len(t)), np.zeros(1)
+        for a, b in pairwise(switches):
+            inside = (t > a + 1e-9) & (t <= b + 1e-9)
+            found = solve_ivp(lambda s, w, a=a: rate(a + 1e-6, w), (a, b), at, "DOP853",
+                              dense_output=True, rtol=1e-9, atol=1e-9)
+            seen[inside], at = found.sol(t[inside])[0], found.y[:, -1]
+        noisy = seen + rng.normal(0, 0.2, len(t))
+        return pk.Recording.from_arrays(t, {"u": u, "w": noisy}, {"u": "V", "w": "rad/s"})
+
+    dx = pk.diagnose(motor(), recorded(1), recorded(2))
+    [best] = dx.hypotheses
+    assert dx.verdict == "named" and dx.where.channel == "input"
+    assert [e.ids for e in best.effects] == [("input_delay",)]
+    tau = next(iter(best.effects[0].parameters.values()))
+    assert tau.value == pytest.approx(0.034, abs=5 * tau.std)

@@ -20,6 +20,7 @@ from pikanid.validation.own_model.hidden import Hidden, Workbench
 from pikanid.validation.own_model.law import Law
 from pikanid.validation.own_model.plant import Plant
 from pikanid.validation.own_model.rig import Rig
+from pikanid.validation.own_model.trial import placed
 
 
 def inputs(model: pk.Model, n: int = 200, dt: float = 0.02, seed: int = 0) -> pk.Recording:
@@ -127,6 +128,24 @@ def test_a_case_is_a_function_of_its_order_and_its_truth_is_judged(motor_rig: Ri
     assert judge(dict(case.truth), answer).outcome == "right"
     answer["hypotheses"][0]["effects"][0]["ids"] = ["another"]  # type: ignore[index]
     assert judge(dict(case.truth), answer).outcome == "wrong"
+
+
+FORCE = {"id": "static_bias", "twins": [],
+         "where": {"channel": "dynamics", "places": ["omega"]}}
+
+
+@pytest.mark.parametrize(("given", "right"), [
+    ([("static_bias", "dynamics", "omega")], True),
+    ([("static_bias", "dynamics", "i")], False),
+    ([("sensor_offset", "sensor", "omega")], False),
+    ([("sensor_offset", "sensor", "omega"), ("static_bias", "dynamics", "omega")], True),
+    ([("sensor_offset/static_bias", "sensor", "omega")], True)])
+def test_the_place_of_the_answer_that_is_right_counts(given: list[tuple[str, str, str]],
+                                                      right: bool) -> None:
+    answer = {"hypotheses": [{"effects": [
+        {"ids": ids.split("/"), "channel": channel, "equation": equation}]}
+        for ids, channel, equation in given]}
+    assert placed({"effects": [FORCE]}, answer) == right
 
 
 def test_noise_is_what_was_asked_for(motor_rig: Rig, tmp_path: Path) -> None:

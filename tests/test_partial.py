@@ -19,6 +19,7 @@ from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.findings import Where, values_of
 from pikanid.mismatch.report.part import Remainder, Value
 from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps import surely
 from pikanid.mismatch.steps.surely import _without_scale
 from pikanid.reporting.diagnosis_page import page
 
@@ -102,6 +103,42 @@ def test_a_decoy_gives_no_name() -> None:
     found = examined(weighed((stribeck,), 1.0, 0.998), weighed((COULOMB,), 1.5, 0.001),
                      weighed((DRAG,), 9.0, 0.001))
     assert isinstance(found, Present) and found.names == ()
+
+
+def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last round of comparisons finds a better explanation, of which nothing was left out."""
+    first, better, without = (SimpleNamespace(effects=e, point={}) for e in (
+        (COULOMB,), (COULOMB, DRAG), (DRAG,)))
+    lead, tried = [first], []
+
+    def compared(search: Any, of: Any) -> bool:
+        lead[0] = better
+        return True
+
+    def refine(jobs: Any) -> bool:
+        effects = [tuple(e.key for e in own) for own, _ in jobs]
+        new = [e for e in effects if e not in tried]
+        tried.extend(new)
+        if ("quadratic_drag",) in effects:
+            lead[0] = without  # it does as well
+        return bool(new)
+
+    monkeypatch.setattr(surely, "explanations", lambda *_: SimpleNamespace(
+        lead=SimpleNamespace(hypothesis=lead[0])))
+    monkeypatch.setattr(surely, "surely_there", lambda found, *_: SimpleNamespace(
+        hypothesis=found.lead.hypothesis))
+    monkeypatch.setattr(surely, "_compared", compared)
+    monkeypatch.setattr(surely, "_one_more", lambda *_: None)
+    monkeypatch.setattr(surely, "lasting", lambda _: [first])
+    monkeypatch.setattr(surely, "_against_curves", lambda case, part, noise: part)
+    search = SimpleNamespace(refine=refine, ranked=list, scale=lambda: 1.0)
+    records = SimpleNamespace(levels=[{}])
+    case: Any = SimpleNamespace(search=search, settings=DEFAULTS, later=records, records=records,
+                                predicted=None, ahead=None)
+    _, part = surely._sure(case)
+    assert part is not None and part.hypothesis is without
+    assert tried == [("coulomb_friction",), ("quadratic_drag",), ()]
 
 
 @pytest.mark.parametrize("wider", [

@@ -59,3 +59,12 @@ def test_a_wall_that_no_first_step_leads_to_is_found(walled: Case) -> None:
     best = walled.search.ranked()[0]
     assert best.key == {"wall_impact"}
     assert best.values["wall"] == pytest.approx(0.08, rel=0.01)
+
+
+def test_a_parameter_that_moves_nothing_takes_nothing_up(walled: Case) -> None:
+    """As a limit that no motion reaches: its column is not zero, but below what divides."""
+    base, k = walled.base, 0
+    J = base.minimum.J.copy()
+    J[:, k] *= 1e-305 / np.linalg.norm(J[:, k])
+    screen = Screen(replace(base, minimum=replace(base.minimum, J=J)), walled.candidates)
+    assert not screen.taken[k].any() and np.isfinite(screen.taken).all()

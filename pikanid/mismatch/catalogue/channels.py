@@ -127,7 +127,7 @@ def _returns(there: np.ndarray) -> bool:
 
 
 def delay(site: Site) -> list[Candidate]:
-    """A shift in time: of all inputs or of the output, which are exact twins."""
+    """A shift in time: of all inputs or of the output, which are exact twins out of rest."""
     tau = Parameter(site.name("tau"), 0.0, "s", (0.0, INF))
     o = site.output.name
 
@@ -139,7 +139,7 @@ def delay(site: Site) -> list[Candidate]:
             found.append(TangentDirection({tau.name: shift}, seen=late - view.y[o], one_sided=True))
         return found
 
-    ids = ("input_delay", "sensor_delay") if site.inputs else ("sensor_delay",)
+    ids = ("input_delay", "sensor_delay") if site.inputs and site.still else ("sensor_delay",)
     return [Candidate(ids, "a delay", f"{o}(t - {tau.name})", "sensor", site, (tau,),
                       lambda m: m.map_output(o, delay=tau.name), directions, twin="delay")]
 

@@ -1,7 +1,7 @@
 """Catalogue: one of several inputs comes late.
 
 Alone, an input that comes late is a twin of an output that does.  Where another input acts as well,
-it is not.
+or something moves at first, it is not.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ SHIFTS = (0.3, 3.0, 8.0)  # numerical: samples, from where fits begin
 
 
 def input_delay(site: Site) -> list[Candidate]:
-    """A delay of each input by itself; of a lone one only beside a channel that acts as well."""
+    """A delay of each input by itself; of a lone one out of rest only beside a channel that acts as
+    well.
+    """
     found = []
     for u in site.inputs:
         tau = Parameter(site.name("tau_in"), 0.0, "s", (0.0, float("inf")))
@@ -33,5 +35,5 @@ def input_delay(site: Site) -> list[Candidate]:
             ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
             lambda m, u=u, tau=tau: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # defaults
             directions, variant=u, twin="delay",
-            beside=() if len(site.inputs) > 1 else ("cross_axis",)))
+            beside=() if len(site.inputs) > 1 or not site.still else ("cross_axis",)))
     return found

@@ -9,7 +9,7 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.formula import units
-from pikanid.formula.expressions import symbol
+from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
 from pikanid.model.parts import Output
 from pikanid.recording import Recording
@@ -28,6 +28,8 @@ class Site:
         extra: Recorded channels that the model does not use.
         rate: Natural frequency at the guesses [rad/s]; 0 without a restoring force.
         rest: Whether the model starts in equilibrium.
+        still: Whether it does under the first values of its inputs as well, in every recording:
+            only then is an input that comes late the same as an output that does.
         span: First and last time [s] of the first recording.
         half_range: Half the range of the output there, in its unit.
         interval: Between its samples, as a rule [s].
@@ -43,6 +45,7 @@ class Site:
     extra: tuple[str, ...]
     rate: float
     rest: bool
+    still: bool
     span: tuple[float, float]
     half_range: float
     interval: float
@@ -163,6 +166,7 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
     starts = [s.initial for s in model.states if s.name in (q, v)]
     return Site(model, q, v, output, inputs, extra, k**0.5 if k > 0 else 0.0,
                 sp.simplify(force) == 0 and all(e == 0 for e in starts),
+                all(_starts_still(model, r) for r in recordings),
                 (first.start, first.stop), _swing(first, output.name),
                 _interval(first, output.name), suffix)
 
@@ -184,6 +188,17 @@ def _swing(recording: Recording, name: str) -> float:
 def _moves(recording: Recording, name: str) -> bool:
     values = recording[name].values
     return bool(np.all(np.isfinite(values)) and np.ptp(values) > 0)
+
+
+def _starts_still(model: Model, recording: Recording) -> bool:
+    if any(q.name in model.parameter_names and model.parameter(q.name).free
+           for s in model.states for q in s.initial.free_symbols):
+        return False
+    at = {symbol(n): value for n, value in model.values.items()}
+    at |= {symbol(n): float(recording[n].values[0]) if n in recording else 0.0
+           for n in model.input_names}
+    at |= {symbol(s.name): s.initial.subs(at) for s in model.states}
+    return all(e.subs(at).subs(TIME, recording.start).doit() == 0 for e in model.equations.values())
 
 
 def _at_rest(model: Model, e: sp.Expr) -> sp.Expr:

@@ -70,6 +70,7 @@ class Diagnosis(DiagnosisData):
                       "parameters": {n: _entry(v) for n, v in self.where.parameters.items()}},
             "hypotheses": [{
                 "effects": [{"ids": list(e.ids), "name": e.name, "expression": e.expression,
+                             "channel": e.channel, "equation": e.equation,
                              "parameters": {n: _entry(v) for n, v in e.parameters.items()}}
                             for e in h.effects],
                 "probability": h.probability} for h in self.hypotheses],

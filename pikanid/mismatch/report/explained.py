@@ -42,7 +42,8 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         table = answer.twins.get(h.key, {})
         effects = tuple(NamedEffect(
             table.get(e.key, e.names), e.name, e.expression,
-            values_of(e.parameters, h.values, h.std, overdispersion), e.channel) for e in h.effects)
+            values_of(e.parameters, h.values, h.std, overdispersion), e.channel, e.site.v)
+            for e in h.effects)
         p = predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(
             {n: v for n, v in h.values.items()}), h.score(scale),

@@ -26,7 +26,8 @@ SHOWN = 6  # layout: windows of time that are listed
 @dataclass(frozen=True)
 class NamedEffect:
     """One effect of a hypothesis: its ids (several where twins cannot be told apart), its name for
-    people, what is added to the model, and its parameters.
+    people, what is added to the model, its parameters, its channel, and the state in whose equation
+    it acts or, of an input or a sensor, shows first.
     """
 
     ids: tuple[str, ...]
@@ -34,6 +35,7 @@ class NamedEffect:
     expression: str
     parameters: Mapping[str, Value]
     channel: str = "dynamics"
+    equation: str = ""
 
 
 @dataclass(frozen=True)

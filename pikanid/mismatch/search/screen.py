@@ -16,6 +16,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 
 MOSTLY = 0.8  # numerical: of a parameter, in whose place a fit with an effect begins
 ALIKE = 1e-4  # numerical: 1 - cos² of two signs below which they are one
+UNSEEN = 1e-100  # numerical: norm of a parameter's column below which it moves nothing
 SPANNED = 1e-8  # numerical: of the largest singular value, below which columns repeat each other
 NOWHERE: Mapping[str, float] = {}
 
@@ -113,8 +114,9 @@ class Screen:
         allowed = good & ((self.z > 0) | ~self.found.one_sided)
         self.gain = np.where(allowed, self.z**2, 0.0)
         self.names = [f.label for f in about.whitened.problem.free]
-        norms = np.maximum(np.linalg.norm(about.movable, axis=0), 1e-300)
-        # what the parameters take up of each sign, as far as they are told apart
+        norms = np.linalg.norm(about.movable, axis=0)
+        norms[norms < UNSEEN] = np.inf
+        # what the parameters take up of each sign, as far as they are seen and told apart
         scaled = np.linalg.lstsq(about.movable / norms, self.found.D, SPANNED)[0]
         self.taken = scaled / norms[:, None]
 

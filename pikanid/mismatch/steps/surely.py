@@ -31,7 +31,7 @@ from pikanid.mismatch.judge.partial import (
     surely_there,
 )
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.search.neighbours import beside, with_next_form, with_relatives
+from pikanid.mismatch.search.neighbours import Job, beside, with_next_form, with_relatives
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.search.search import Search
 from pikanid.model import Model
@@ -76,6 +76,10 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
         if not _compared(search, part.hypothesis if part else lasting(search.ranked())[0]):
             break
         explained, part = weighed()
+    # nothing of an explanation is sure that was not left out of it, of the last one found neither
+    while explained and explained.lead and search.refine(
+            _without_each_family(explained.lead.hypothesis)):
+        explained, part = weighed()
     return explained, None if part is None else _against_curves(case, part, noise)
 
 
@@ -91,13 +95,16 @@ def _compared(search: Search, lead: Hypothesis) -> bool:
     """Fit what an explanation is to be compared with: others of its effects' families, and what
     does best without each effect, or each family; whether that found anything.
     """
-    families = sorted({f for e in lead.effects for f in e.families})
-    without = [tuple(e for e in lead.effects if f not in e.families) for f in families]
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
-        *with_next_form(lead, search.candidates),
-        *((rest, [lead.point]) for rest in without)])
+        *with_next_form(lead, search.candidates), *_without_each_family(lead)])
     return search.closer([lead]) or found
+
+
+def _without_each_family(lead: Hypothesis) -> list[Job]:
+    families = sorted({f for e in lead.effects for f in e.families})
+    return [(tuple(e for e in lead.effects if f not in e.families), [lead.point])
+            for f in families]
 
 
 def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -> Part:

@@ -46,8 +46,8 @@ class Score:
         nominal: Distance of the refitted nominal model [σ].
         verdict: Of the diagnosis.
         mismatch: Whether it says that something is missing.
-        outcome: `right`; `long` (the truth among more than two hypotheses); `visible` (the part of
-            the truth that could be told among at most two hypotheses); `part` (all that is said
+        outcome: `right`; `visible` (the part of the truth that could be told, among at most two
+            hypotheses); `long` (either among more than two); `part` (all that is said
             to be surely there is); `wrong`; `formula` (a symbolic law of the kind that is hidden,
             where that is in no catalogue); `alarm` (something is missing, nothing named, where
             nothing hides); `silent`.

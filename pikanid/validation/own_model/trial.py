@@ -101,16 +101,21 @@ def _trial(case: Mapping[str, Any], answer: Mapping[str, Any]) -> Trial:
                           for h in answer["hypotheses"])
     hidden = " + ".join(f"{e['id']}[{e['variant'] or e['where']['place']}]"
                         for e in case["effects"])
-    return Trial(score, _placed(case, answer) if score.outcome == "right" else None,
+    return Trial(score, placed(case, answer) if score.outcome == "right" else None,
                  float(answer["cpu"]), said, hidden or "-")
 
 
-def _placed(case: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
+def placed(case: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
+    """Whether what is right in an answer acts in the channel, and of laws in the equation, of what
+    hides; None where several effects hide in different places.
+    """
     places = {(e["where"]["channel"], tuple(e["where"]["places"])) for e in case["effects"]}
     if len(places) != 1:
         return None
-    (channel, equations), said = places.pop(), answer["where"]
-    if len({*said["channels"]}) > 1 and channel in said["channels"]:
-        return True  # which of them cannot be known: twins
-    return bool(channel == said["channel"] and (
-        channel != "dynamics" or said["equation"] in equations))
+    (channel, equations), hidden = places.pop(), [{e["id"], *e["twins"]} for e in case["effects"]]
+    return any(
+        # one of twins in several channels: which of them cannot be known
+        len(e["ids"]) > 1 if e["channel"] != channel
+        else channel != "dynamics" or e["equation"] in equations
+        for h in answer["hypotheses"] for e in h["effects"]
+        if any(ids & {*e["ids"]} for ids in hidden))
