@@ -15,6 +15,7 @@ from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Step
 
 Accuracy = Literal["coarse", "fine"]
 HURRY = 16.0  # limit: how many times shorter steps another start may take
+REFUSED = 1e10  # numerical: residuals of a trajectory that cannot be finished
 
 
 class Shooting:
@@ -113,6 +114,13 @@ class Shooting:
             kept[key] = response
         return response
 
+    def keep(self, theta: np.ndarray, response: Response, residual: np.ndarray,
+             jacobian: np.ndarray) -> None:
+        """Take over what someone else has evaluated at θ, of the only recording."""
+        steps = self.steps[0]
+        self._at, self._kept = theta.tobytes(), (residual, jacobian)
+        self._tried = (self._at, {(0, steps.method, steps.longest): response})
+
     def residual(self, theta: np.ndarray) -> np.ndarray:
         """(ŷ - y)/σ (rows,)."""
         return self._evaluate(theta)[0]
@@ -130,7 +138,7 @@ class Shooting:
     def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         responses = self.responses(theta)
         if not all(r.finished for r in responses):
-            return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
+            return np.full(self.rows, REFUSED), np.zeros((self.rows, len(theta)))
         residual, row = np.empty(self.rows), 0
         # column by column, as optimisers take it; each recording fills those of its own parameters
         columns = np.zeros((len(theta), self.rows))

@@ -12,8 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from pikanid.optimise.lmder import Descent
 
 Vector = Callable[[np.ndarray], np.ndarray]
 
@@ -29,13 +33,16 @@ class Optimum:
 
 
 def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.ndarray,
-             upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100) -> Optimum:
+             upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100,
+             go_on: Callable[[Descent], int | None] = lambda _: None) -> Optimum:
     """Minimise ½|r(θ)|² within bounds from `start` (n,).
 
     Args:
         residual, jacobian: θ (n,) -> r (rows,) and ∂r/∂θ (rows, n).
         tolerance: Relative change of θ and of the cost at which to stop.
         limit: Evaluations allowed.
+        go_on: Brings a descent from its first trial point to its end, and says what that was; None
+            where that is left to `residual` and `jacobian`.
 
     >>> found = minimise(lambda q: np.array([q[0] - 3.0]), lambda q: np.ones((1, 1)),
     ...                  np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -53,6 +60,8 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
 
         descent = Descent(theta, lower, upper, len(r), tolerance, limit)
         told = descent.linearise(r, jacobian(theta))
+        if told == EVALUATE:
+            told = go_on(descent) or told
         while told == EVALUATE:
             r = residual(descent.trial)
             told = descent.judge(r)

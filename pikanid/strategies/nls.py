@@ -20,7 +20,8 @@ from pikanid.model import Model
 from pikanid.objective.settings import USUAL as ADEQUACY
 from pikanid.objective.settings import AdequacySettings
 from pikanid.objective.shooting import Accuracy, Shooting
-from pikanid.optimise.minpack import Optimum, minimise
+from pikanid.optimise.minpack import Optimum
+from pikanid.optimise.shooting_fit import fit_shooting
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.settings import changed
@@ -131,8 +132,7 @@ class NLS:
                 shooting.choose_steps(theta, accuracy)
             except errors.SimulationFailed:
                 return None
-            found = minimise(shooting.residual, shooting.jacobian, theta, shooting.problem.lower,
-                             shooting.problem.upper, tolerance, self.max_evaluations)
+            found = fit_shooting(shooting, theta, tolerance, self.max_evaluations)
             evaluations += found.evaluations
             theta = found.theta
         assert found is not None
