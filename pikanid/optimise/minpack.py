@@ -49,11 +49,10 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     >>> round(float(found.theta[0]), 6)
     2.0
     """
-    theta = np.clip(start, lower, upper)
-    r = residual(theta)
+    theta = np.minimum(np.maximum(start, lower), upper)
+    r, first = residual(theta), theta
     if len(start) == 0:
         return Optimum(theta, 0.5 * float(r @ r), True, 1)
-    scale = np.where(theta != 0, np.abs(theta), 1.0)
     best, evaluations, converged = np.inf, 0, False
     if len(r) >= len(start):
         from pikanid.optimise.lmder import CONVERGED, EVALUATE, LINEARISE, Descent
@@ -70,8 +69,10 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
         theta, best, evaluations = descent.theta, descent.cost, descent.evaluations
         converged = told == CONVERGED
     room = np.minimum(theta - lower, upper - theta)
-    if not converged or np.any(room < 1e-3 * np.maximum(np.abs(theta), 1e-12)):
+    if not converged or (room < np.maximum(1e-3 * np.abs(theta), 1e-15)).any():
         from scipy.optimize import least_squares
+
+        scale = np.where(first != 0, np.abs(first), 1.0)
 
         def boxed(z: np.ndarray) -> np.ndarray:
             return residual(np.clip(z * scale, lower, upper))

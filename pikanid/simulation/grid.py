@@ -43,7 +43,11 @@ class Grid:
         Steps as long as a lone gap cannot be judged by halving them: all other intervals would
         be crossed in one step either way.
         """
-        gaps = np.sort(self._gaps)
+        gaps = self._gaps
+        shortest, longest = float(gaps.min()), float(gaps.max())
+        if longest - shortest <= 1e-9 * longest:
+            return longest, longest
+        gaps = np.sort(gaps)
         half = np.searchsorted(np.cumsum(gaps), 0.5 * gaps.sum())
         middle = len(gaps) // 2  # they are sorted: np.median would sort them again
         return 0.5 * float(gaps[middle] + gaps[~middle]), float(gaps[min(half, len(gaps) - 1)])
@@ -61,6 +65,8 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     Observations are numbered output by output, in the order of `experiment.samples`.  A delayed
     output shows the initial state until t0 + delay.
     """
+    from pikanid.simulation.stops import draw
+
     t0 = experiment.t0
     wanted = [np.maximum(s.t - delay_out[s.output], t0) for s in experiment.samples]
     end = max([experiment.t1 if not wanted else t0, *(w[-1] for w in wanted if len(w))])
@@ -68,32 +74,16 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     breaks = [b[(b > t0) & (b < end)]
               for b in (h.switches + d for h, d in pairs if len(h.switches))]
     T, seen = _stops(np.concatenate([[t0, end], *breaks, *wanted]), experiment, wanted)
-    middle, gaps = 0.5 * (T[1:] + T[:-1]), T[1:] - T[:-1]
     # nothing is integrated beyond the last stop, but an output may show the inputs there
     U, V = np.empty((len(T), len(pairs))), np.zeros((len(T), len(pairs)))
     jumps = np.zeros(len(T), bool)
     jumps[0] = True
-    # column by column: reductions along rows as short as these take longer
     for j, (h, d) in enumerate(pairs):
-        u, v = U[:, j], V[:, j]
         if h.flat and not len(h.switches):  # one value for ever
-            u[:] = h.values[0]
-            continue
-        u[:] = h.at(np.append(middle, T[-1]), d)
-        ends = u[:-1]
-        if not h.flat:
-            v[:-1] = h.slope(middle, d)
-            v[-1] = v[-2]
-            u[:-1] -= v[:-1] * (middle - T[:-1])
-            ends = u[:-1] + v[:-1] * gaps
-            jumps[1:] |= _differ(v[1:], v[:-1], v)
-        jumps[1:] |= _differ(u[1:], ends, u)
+            U[:, j] = h.values[0]
+        else:
+            draw(T, *h.lines, d, j, U, V, jumps)
     return Grid(T, U, V, jumps, seen, len(seen.row))
-
-
-def _differ(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Where a and b (L,) differ by more than rounding."""
-    return np.asarray(np.abs(a - b) > 1e-9 * np.abs(scale).max(initial=0.0))
 
 
 def _stops(times: np.ndarray, experiment: Experiment, wanted: Sequence[np.ndarray]
@@ -101,7 +91,7 @@ def _stops(times: np.ndarray, experiment: Experiment, wanted: Sequence[np.ndarra
     """The stops for all times (K,) that are to be met, and the observations at each."""
     from pikanid.simulation.stops import lay_out
 
-    times.sort()
+    times.sort(kind="stable")  # it merges what is sorted
     seen = np.concatenate([np.empty(0), *wanted])
     shown, at = np.empty(len(seen), np.int64), 0
     for s, w in zip(experiment.samples, wanted, strict=True):
