@@ -72,15 +72,16 @@ class Shooting:
 
     @functools.cached_property
     def _tolerances(self) -> list[tuple[np.ndarray | None, float]]:
-        """For each recording the errors allowed to "fine" samples (rows,), and how many times as
-        much "coarse" ones may err.
+        """For each recording the errors allowed to "fine" samples, (rows,) or (1,) for all, and how
+        many times as much "coarse" ones may err.
         """
         found: list[tuple[np.ndarray | None, float]] = []
         for e in self.problem.experiments:
             samples = [s for s in e.samples if len(s.t)]
             fine = [_tolerance(s) for s in samples]
-            found.append((np.repeat(fine, [len(s.t) for s in samples]),
-                          min(map(_coarser, samples, fine))) if samples else (None, 1.0))
+            scale = (np.array(fine) if len(fine) == 1
+                     else np.repeat(fine, [len(s.t) for s in samples]))
+            found.append((scale, min(map(_coarser, samples, fine))) if samples else (None, 1.0))
         return found
 
     def hurry(self, on: bool = True) -> None:

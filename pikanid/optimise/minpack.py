@@ -68,8 +68,9 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
                 told = descent.linearise(r, jacobian(descent.theta))
         theta, best, evaluations = descent.theta, descent.cost, descent.evaluations
         converged = told == CONVERGED
-    room = np.minimum(theta - lower, upper - theta)
-    if not converged or (room < np.maximum(1e-3 * np.abs(theta), 1e-15)).any():
+    # plain numbers: for a few parameters NumPy's overhead is all there is
+    if not converged or any(min(q - low, high - q) < max(1e-3 * abs(q), 1e-15) for q, low, high
+                            in zip(theta.tolist(), lower.tolist(), upper.tolist(), strict=True)):
         from scipy.optimize import least_squares
 
         scale = np.where(first != 0, np.abs(first), 1.0)

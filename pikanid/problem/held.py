@@ -57,7 +57,7 @@ class HeldInput:
 
     @property
     def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Knots (K,), values and slopes right of each, and how far before a knot counts as at it."""
+        """Knots (K,), values and slopes right of each; how far before a knot counts as at it."""
         slopes = np.zeros(len(self.time))
         if self.flat:
             return self.time, self.values, slopes, 1e-9 * self._spacing
@@ -118,7 +118,7 @@ class PiecewiseInput:
 
     @property
     def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Knots (K,), values and slopes right of each, and how far before a knot counts as at it."""
+        """Knots (K,), values and slopes right of each; how far before a knot counts as at it."""
         slack = 1e-9 * (float(self.knots[-1] - self.knots[0]) / max(len(self.knots), 1))
         return self.knots, self.values, self.slopes, slack
 

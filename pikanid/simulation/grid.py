@@ -7,6 +7,7 @@ adaptive solver over the whole interval would step over short pulses without not
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -37,23 +38,29 @@ class Grid:
         return self.T[1:] - self.T[:-1]
 
     @functools.cached_property
+    def _even(self) -> float | None:
+        """The interval between stops [s] where all are alike up to rounding, else None."""
+        shortest, longest = float(self._gaps.min()), float(self._gaps.max())
+        return longest if longest - shortest <= 1e-9 * longest else None
+
+    @functools.cached_property
     def spacings(self) -> tuple[float, float]:
         """Median interval between stops [s], and the length of intervals at half of the time.
 
         Steps as long as a lone gap cannot be judged by halving them: all other intervals would
         be crossed in one step either way.
         """
-        gaps = self._gaps
-        shortest, longest = float(gaps.min()), float(gaps.max())
-        if longest - shortest <= 1e-9 * longest:
-            return longest, longest
-        gaps = np.sort(gaps)
+        if self._even is not None:
+            return self._even, self._even
+        gaps = np.sort(self._gaps)
         half = np.searchsorted(np.cumsum(gaps), 0.5 * gaps.sum())
         middle = len(gaps) // 2  # they are sorted: np.median would sort them again
         return 0.5 * float(gaps[middle] + gaps[~middle]), float(gaps[min(half, len(gaps) - 1)])
 
     def pieces(self, longest: float) -> np.ndarray:
         """Sub-steps of each interval (L-1,) so that none is longer than `longest` [s]."""
+        if self._even is not None:
+            return np.full(len(self._gaps), max(math.ceil(self._even / longest - 1e-9), 1))
         counts = np.ceil(self._gaps / longest - 1e-9)
         return np.maximum(counts, 1).astype(np.int64)
 

@@ -38,10 +38,10 @@ class Directions:
     @staticmethod
     def of(jacobian: np.ndarray, estimated: np.ndarray) -> Directions:
         """Those of a Jacobian (rows, n) and the parameters that are `estimated` (n,)."""
-        inside = np.flatnonzero(estimated)
+        n, inside = jacobian.shape[1], np.flatnonzero(estimated)
         # R of J = QR has the same, in as few rows as there are columns; LAPACK directly, as NumPy's
         # wrappers take longer than the rest of this
-        J = jacobian.T[inside].T
+        J = jacobian if len(inside) == n else jacobian.T[inside].T
         if J.size:
             J = dgeqrf(J)[0][:len(inside)]
             for j in range(J.shape[1]):
@@ -50,21 +50,26 @@ class Directions:
         seen = norms > 0
         s, vt = np.empty(0), np.empty((0, 0))
         if seen.any():
-            _, s, vt, info = dgesdd(J[:, seen] / norms[seen], full_matrices=False)
+            scaled = J / norms if seen.all() else J[:, seen] / norms[seen]
+            _, s, vt, info = dgesdd(scaled, full_matrices=False)
             if info:
                 raise LinAlgError(f"the singular values did not converge ({info})")
-        return Directions(jacobian.shape[1], inside, norms, seen, s, vt)
+        return Directions(n, inside, norms, seen, s, vt)
 
     @property
     def covariance(self) -> np.ndarray:
         """(JᵀJ)⁻¹ (n, n), see `covariance`."""
         s, norms = self.sizes, self.norms[self.seen]
-        result = np.full((self.n, self.n), np.nan)
-        result[self.inside[:, None], self.inside] = 0.0
+        inner = np.empty((0, 0))
         if len(s):
             inner = (self.axes.T / np.maximum(s, s[0] * 1e-12) ** 2) @ self.axes
-            shown = self.inside[self.seen]
-            result[shown[:, None], shown] = inner / (norms[:, None] * norms)
+            inner /= norms[:, None] * norms
+        if len(s) == self.n:
+            return inner
+        result = np.full((self.n, self.n), np.nan)
+        result[self.inside[:, None], self.inside] = 0.0
+        shown = self.inside[self.seen]
+        result[shown[:, None], shown] = inner
         hidden = self.inside[~self.seen]
         result[hidden, hidden] = np.inf
         return result
