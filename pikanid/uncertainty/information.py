@@ -38,20 +38,19 @@ class Directions:
     @staticmethod
     def of(jacobian: np.ndarray, estimated: np.ndarray) -> Directions:
         """Those of a Jacobian (rows, n) and the parameters that are `estimated` (n,)."""
+        from pikanid.optimise.small_matrices import scale_triangle
+
         n, inside = jacobian.shape[1], np.flatnonzero(estimated)
         # R of J = QR has the same, in as few rows as there are columns; LAPACK directly, as NumPy's
         # wrappers take longer than the rest of this
         J = jacobian if len(inside) == n else jacobian.T[inside].T
+        norms, s, vt = np.zeros(len(inside)), np.empty(0), np.empty((0, 0))
         if J.size:
             J = dgeqrf(J)[0][:len(inside)]
-            for j in range(J.shape[1]):
-                J[j + 1:, j] = 0.0
-        norms = np.sqrt((J * J).sum(axis=0))
+            scale_triangle(J, norms)
         seen = norms > 0
-        s, vt = np.empty(0), np.empty((0, 0))
         if seen.any():
-            scaled = J / norms if seen.all() else J[:, seen] / norms[seen]
-            _, s, vt, info = dgesdd(scaled, full_matrices=False)
+            _, s, vt, info = dgesdd(J if seen.all() else J[:, seen], full_matrices=False)
             if info:
                 raise LinAlgError(f"the singular values did not converge ({info})")
         return Directions(n, inside, norms, seen, s, vt)
@@ -59,12 +58,12 @@ class Directions:
     @property
     def covariance(self) -> np.ndarray:
         """(JᵀJ)⁻¹ (n, n), see `covariance`."""
-        s, norms = self.sizes, self.norms[self.seen]
-        inner = np.empty((0, 0))
-        if len(s):
-            inner = (self.axes.T / np.maximum(s, s[0] * 1e-12) ** 2) @ self.axes
-            inner /= norms[:, None] * norms
-        if len(s) == self.n:
+        from pikanid.optimise.small_matrices import inverse_square
+
+        norms = self.norms[self.seen]
+        inner = np.empty((norms.size, norms.size))
+        inverse_square(self.sizes, self.axes, norms, inner)
+        if norms.size == self.n:
             return inner
         result = np.full((self.n, self.n), np.nan)
         result[self.inside[:, None], self.inside] = 0.0
