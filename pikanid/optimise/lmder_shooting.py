@@ -21,20 +21,24 @@ _integrate: Any = call_integrate  # its definition has an argument more: the com
 
 @cached_jit(error_model="numpy", _nrt=False, nogil=True)
 def descend(address: int, before: Any, start: Any, p: np.ndarray, act: np.ndarray, own: np.ndarray,
-            seen: Any, simulated: Any, standardised: Any, measured: Any, work: Any
+            seen: Any, first: Any, simulated: Any, standardised: Any, measured: Any, work: Any
             ) -> tuple[int, int]:
-    """Evaluate trial points until the fit has ended; why, and which buffers are those of θ, or -1.
+    """From the starting point to where the fit ends; why, and which buffers are those of θ, or -1
+    where it is the start, or not finite.
 
     Args:
         address, before, start, p, act, seen: Of the simulation and what it takes, see `integrate`.
         own: (A,) places of the active parameters in θ.
+        first: Outputs (rows,) and sensitivities (rows, A) at the starting point.
         simulated: States (2, L, n) or (2, 0, n), outputs (2, rows), sensitivities (2, rows, A).
         standardised: Residuals (2, rows) and Jᵀ (2, A, rows).
         measured: Data (rows,) and 1/σ.
-        work: Of `lmder.go_on`, from the table on; the first trial point is there.
+        work: Of `lmder.go_on`, from the table on, as `Descent` begins.
     """
     table, points, state, orders, triangles, spare = work
-    told, best, new = EVALUATE, -1, 0
+    best, new, r, columns = -1, 0, standardised[0][0], standardised[1][0]
+    standardise(first[0], first[1], 0, own, measured[0], measured[1], r, columns)
+    told = go_on(LINEARISE, r, columns, table, points, state, orders, triangles, spare)
     while told == EVALUATE:
         for a in range(act.size):
             p[act[a]] = points[TRIAL, own[a]]

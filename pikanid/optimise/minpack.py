@@ -12,12 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from pikanid.optimise.lmder import Descent
 
 Vector = Callable[[np.ndarray], np.ndarray]
 
@@ -33,16 +29,13 @@ class Optimum:
 
 
 def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.ndarray,
-             upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100,
-             go_on: Callable[[Descent], int | None] = lambda _: None) -> Optimum:
+             upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100) -> Optimum:
     """Minimise ½|r(θ)|² within bounds from `start` (n,).
 
     Args:
         residual, jacobian: θ (n,) -> r (rows,) and ∂r/∂θ (rows, n).
         tolerance: Relative change of θ and of the cost at which to stop.
         limit: Evaluations allowed.
-        go_on: Brings a descent from its first trial point to its end, and says what that was; None
-            where that is left to `residual` and `jacobian`.
 
     >>> found = minimise(lambda q: np.array([q[0] - 3.0]), lambda q: np.ones((1, 1)),
     ...                  np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -50,30 +43,38 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     2.0
     """
     theta = np.minimum(np.maximum(start, lower), upper)
-    r, first = residual(theta), theta
+    r = residual(theta)
     if len(start) == 0:
         return Optimum(theta, 0.5 * float(r @ r), True, 1)
-    best, evaluations, converged = np.inf, 0, False
+    reached = Optimum(theta, np.inf, False, 0)
     if len(r) >= len(start):
         from pikanid.optimise.lmder import CONVERGED, EVALUATE, LINEARISE, Descent
 
         descent = Descent(theta, lower, upper, len(r), tolerance, limit)
         told = descent.linearise(r, jacobian(theta))
-        if told == EVALUATE:
-            told = go_on(descent) or told
         while told == EVALUATE:
             r = residual(descent.trial)
             told = descent.judge(r)
             if told == LINEARISE:
                 told = descent.linearise(r, jacobian(descent.theta))
-        theta, best, evaluations = descent.theta, descent.cost, descent.evaluations
-        converged = told == CONVERGED
+        reached = Optimum(
+            descent.theta, descent.cost, told == CONVERGED, descent.evaluations)
+    return inside(reached, residual, jacobian, theta, lower, upper, tolerance, limit)
+
+
+def inside(reached: Optimum, residual: Vector, jacobian: Vector, start: np.ndarray,
+           lower: np.ndarray, upper: np.ndarray, tolerance: float, limit: int) -> Optimum:
+    """What MINPACK has `reached` from `start`, or what "trf" makes of it beside a bound or where it
+    did not converge; the rest as for `minimise`.
+    """
+    theta, best = reached.theta, reached.cost
+    evaluations, converged = reached.evaluations, reached.converged
     # plain numbers: for a few parameters NumPy's overhead is all there is
     if not converged or any(min(q - low, high - q) < max(1e-3 * abs(q), 1e-15) for q, low, high
                             in zip(theta.tolist(), lower.tolist(), upper.tolist(), strict=True)):
         from scipy.optimize import least_squares
 
-        scale = np.where(first != 0, np.abs(first), 1.0)
+        scale = np.where(start != 0, np.abs(start), 1.0)
 
         def boxed(z: np.ndarray) -> np.ndarray:
             return residual(np.clip(z * scale, lower, upper))
