@@ -13,8 +13,9 @@ import numpy as np
 from pikanid.objective.shooting import REFUSED
 from pikanid.objective.standardised import standardise
 from pikanid.optimise.lmder import EVALUATE, LINEARISE, THETA, TRIAL, go_on
+from pikanid.optimise.trust_region import product
 from pikanid.simulation.native_call import call_integrate
-from pikanid.storage.jit import cached_jit, inner_jit
+from pikanid.storage.jit import cached_jit
 
 _integrate: Any = call_integrate  # its definition has an argument more: the compiler's context
 
@@ -30,7 +31,8 @@ def descend(address: int, before: Any, start: Any, p: np.ndarray, act: np.ndarra
         address, before, start, p, act, seen: Of the simulation and what it takes, see `integrate`.
         own: (A,) places of the active parameters in θ.
         first: Outputs (rows,) and sensitivities (rows, A) at the starting point.
-        simulated: States (2, L, n) or (2, 0, n), outputs (2, rows), sensitivities (2, rows, A).
+        simulated: States (2, L, n) or (2, 0, n), outputs (2, rows), sensitivities (2, rows, A) and,
+            in the same memory, (2, rows·A).
         standardised: Residuals (2, rows) and Jᵀ (2, A, rows).
         measured: Data (rows,) and 1/σ.
         work: Of `lmder.go_on`, from the table on, as `Descent` begins.
@@ -47,7 +49,9 @@ def descend(address: int, before: Any, start: Any, p: np.ndarray, act: np.ndarra
         status = _integrate(address, (*before, *start, p, act, *seen, X, Y, J))
         if status < 0:
             return status, best
-        finite = status == 0 and _finite(Y, J)
+        # by their squares, as `Simulator.run` sees it
+        flat = simulated[3][new]
+        finite = status == 0 and product(Y, Y, 0) + product(flat, flat, 0) < np.inf
         if finite:
             standardise(Y, J, 0, own, measured[0], measured[1], r, columns)
         else:
@@ -62,14 +66,3 @@ def descend(address: int, before: Any, start: Any, p: np.ndarray, act: np.ndarra
         if taken:
             best, new = (new if finite else -1), 1 - new
     return told, best
-
-
-@inner_jit(error_model="numpy")
-def _finite(Y: np.ndarray, J: np.ndarray) -> bool:
-    """Whether all numbers are, by their squares, as `Simulator.run` sees it."""
-    total = 0.0
-    for i in range(Y.size):
-        total += Y[i] * Y[i]
-        for a in range(J.shape[1]):
-            total += J[i, a] * J[i, a]
-    return total < np.inf

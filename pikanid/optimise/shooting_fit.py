@@ -49,10 +49,11 @@ def _compiled(shooting: Shooting, theta: np.ndarray, lower: np.ndarray, upper: n
         return None
     descent = Descent(theta, lower, upper, rows, tolerance, limit)
     X, Y = np.empty((2, len(grid.T), len(experiment.model.states))), np.empty((2, rows))
-    J, r, columns = np.empty((2, rows, n)), np.empty((2, rows)), np.empty((2, n, rows))
+    flat, r, columns = np.empty((2, rows * n)), np.empty((2, rows)), np.empty((2, n, rows))
+    J = flat.reshape(2, rows, n)
     told, best = descend(
         address, before, (experiment.initial(p), S0), p, active, own, tuple(grid.seen),
-        (first.y, first.sensitivity), (X, Y, J), (r, columns), (shooting.y, shooting.weights),
+        (first.y, first.sensitivity), (X, Y, J, flat), (r, columns), (shooting.y, shooting.weights),
         descent.work)
     if told < 0:
         return None
