@@ -10,7 +10,8 @@ import pytest
 from pikanid.model import systems
 from pikanid.simulation import compiled
 
-GENERATORS = ("compiled", "codegen", "printing", "lowering", "support", "layout")
+GENERATORS = ("compiled", "codegen", "printing", "constants", "lowering", "support",
+              "layout")
 HERE = Path(compiled.__file__).parent
 
 

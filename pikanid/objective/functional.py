@@ -24,7 +24,7 @@ from pikanid.approximators.tables import Shown, anchor, side_by_side
 from pikanid.formula.expressions import symbol
 from pikanid.model import Model
 from pikanid.objective.adequacy import difference_noise
-from pikanid.objective.rows import AnyApproximator, Part, Rows, Sites, by_coefficients
+from pikanid.objective.rows import ONE, AnyApproximator, Part, Rows, Sites, by_coefficients
 from pikanid.problem.chains import Chains
 from pikanid.problem.evaluated import delays
 from pikanid.problem.problem import Problem, Samples
@@ -36,7 +36,6 @@ Penalty = Literal["physics", "roughness"]
 
 # Rows for an initial state that cannot be eliminated weigh as much as data of this 1/σ.
 START_WEIGHT = 1e6  # numerical: holds them to 1e-6 of the states' units
-ONE = np.ones(1)  # definition: the number one as an array
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,6 +268,8 @@ def _data(sites: Sites, c: Array, p: Array) -> Rows:
 
 
 def _data_at(sites: Sites, values: Array, p: Array) -> Rows:
+    if (plain := sites.measured(values)) is not None:
+        return plain
     assert sites.lines is not None and sites.target is not None
     y, hx, hp = sites.lines(sites.t, values.T, sites.u, p)
     return Rows(sites.weight, ONE, y, sites.target, hx, hp)

@@ -15,6 +15,7 @@ from pikanid.approximators.tables import Bases, Shown, Table, side_by_side
 from pikanid.simulation.vectorfield import Linearised
 
 AnyApproximator = Approximator | LinearApproximator
+ONE = np.ones(1)  # definition: the number one as an array
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,22 @@ class Sites:
         tops = [table.shown._replace(derivative=table.derivative + extra) for table in self.tops]
         return Sites.of(self.t, self.u, self.weight, states, tops, self.target, self.output,
                         self.deviation, self.lines)
+
+    def measured(self, values: Array) -> Rows | None:
+        """The rows of samples of a state as it is, from all states (n, M); None of formulas."""
+        state = None if self.lines is None else self.lines.state
+        if state is None or self.target is None:
+            return None
+        return Rows(self.weight, ONE, values[state].reshape(-1, 1), self.target,
+                    self._state_slopes, None)
+
+    @functools.cached_property
+    def _state_slopes(self) -> Array:
+        """Of a state by all of them (M, 1, n)."""
+        assert self.lines is not None
+        slopes = np.zeros((self.t.size, 1, len(self.states)))
+        slopes[:, :, self.lines.state] = 1.0
+        return slopes
 
     def values(self, c: Array) -> Array:
         """States, then tops (n + E, M) for a recording's coefficients."""

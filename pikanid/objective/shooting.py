@@ -15,6 +15,7 @@ from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Step
 
 Accuracy = Literal["coarse", "fine"]
 HURRY = 16.0  # limit: how many times shorter steps another start may take
+REFUSED = 1e10  # numerical: residuals of a trajectory that cannot be finished
 
 
 class Shooting:
@@ -71,15 +72,16 @@ class Shooting:
 
     @functools.cached_property
     def _tolerances(self) -> list[tuple[np.ndarray | None, float]]:
-        """For each recording the errors allowed to "fine" samples (rows,), and how many times as
-        much "coarse" ones may err.
+        """For each recording the errors allowed to "fine" samples, (rows,) or (1,) for all, and how
+        many times as much "coarse" ones may err.
         """
         found: list[tuple[np.ndarray | None, float]] = []
         for e in self.problem.experiments:
             samples = [s for s in e.samples if len(s.t)]
             fine = [_tolerance(s) for s in samples]
-            found.append((np.repeat(fine, [len(s.t) for s in samples]),
-                          min(map(_coarser, samples, fine))) if samples else (None, 1.0))
+            scale = (np.array(fine) if len(fine) == 1
+                     else np.repeat(fine, [len(s.t) for s in samples]))
+            found.append((scale, min(map(_coarser, samples, fine))) if samples else (None, 1.0))
         return found
 
     def hurry(self, on: bool = True) -> None:
@@ -113,6 +115,13 @@ class Shooting:
             kept[key] = response
         return response
 
+    def keep(self, theta: np.ndarray, response: Response, residual: np.ndarray,
+             jacobian: np.ndarray) -> None:
+        """Take over what someone else has evaluated at θ, of the only recording."""
+        steps = self.steps[0]
+        self._at, self._kept = theta.tobytes(), (residual, jacobian)
+        self._tried = (self._at, {(0, steps.method, steps.longest): response})
+
     def residual(self, theta: np.ndarray) -> np.ndarray:
         """(ŷ - y)/σ (rows,)."""
         return self._evaluate(theta)[0]
@@ -130,7 +139,7 @@ class Shooting:
     def _simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         responses = self.responses(theta)
         if not all(r.finished for r in responses):
-            return np.full(self.rows, 1e10), np.zeros((self.rows, len(theta)))
+            return np.full(self.rows, REFUSED), np.zeros((self.rows, len(theta)))
         residual, row = np.empty(self.rows), 0
         # column by column, as optimisers take it; each recording fills those of its own parameters
         columns = np.zeros((len(theta), self.rows))

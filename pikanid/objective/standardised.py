@@ -22,7 +22,8 @@ def standardise(y: np.ndarray, sensitivity: np.ndarray, first: int, own: np.ndar
         data, weights: (rows,) measurements and 1/σ of all recordings.
     """
     for i in range(y.size):
-        at = first + i
-        residual[at] = (y[i] - data[at]) * weights[at]
-        for a in range(own.size):
-            columns[own[a], at] = sensitivity[i, a] * weights[at]
+        residual[first + i] = (y[i] - data[first + i]) * weights[first + i]
+    for a in range(own.size):
+        column = columns[own[a]]
+        for i in range(y.size):
+            column[first + i] = sensitivity[i, a] * weights[first + i]

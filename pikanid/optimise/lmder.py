@@ -46,8 +46,10 @@ class Descent:
         self.points, self.state = np.zeros((8, n)), np.zeros(9)
         self.points[:4] = start, start, lower, upper
         self.state[LIMIT], self.state[TOLERANCE] = limit, tolerance
-        self.table, self.spare = np.empty((n + 1, rows)), np.empty((n + 2, 2 * n))
-        self.orders, self.triangles = np.empty((2, n), np.int64), np.empty((2, n, n))
+        self.table = np.empty((n + 1, rows))
+        # what `go_on` takes besides r and J
+        self.work = (self.table, self.points, self.state, np.empty((2, n), np.int64),
+                     np.empty((2, n, n)), np.empty((n + 2, 2 * n)))
 
     @property
     def theta(self) -> np.ndarray:
@@ -78,8 +80,7 @@ class Descent:
         return self._go_on(EVALUATE, r, self.table)
 
     def _go_on(self, told: int, r: np.ndarray, columns: np.ndarray) -> int:
-        return go_on(told, np.ascontiguousarray(r, float), columns, self.table, self.points,
-                     self.state, self.orders, self.triangles, self.spare)
+        return go_on(told, np.ascontiguousarray(r, float), columns, *self.work)
 
 
 @cached_jit(error_model="numpy", _nrt=False, nogil=True)

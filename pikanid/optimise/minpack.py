@@ -42,12 +42,11 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     >>> round(float(found.theta[0]), 6)
     2.0
     """
-    theta = np.clip(start, lower, upper)
+    theta = np.minimum(np.maximum(start, lower), upper)
     r = residual(theta)
     if len(start) == 0:
         return Optimum(theta, 0.5 * float(r @ r), True, 1)
-    scale = np.where(theta != 0, np.abs(theta), 1.0)
-    best, evaluations, converged = np.inf, 0, False
+    reached = Optimum(theta, np.inf, False, 0)
     if len(r) >= len(start):
         from pikanid.optimise.lmder import CONVERGED, EVALUATE, LINEARISE, Descent
 
@@ -58,11 +57,24 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
             told = descent.judge(r)
             if told == LINEARISE:
                 told = descent.linearise(r, jacobian(descent.theta))
-        theta, best, evaluations = descent.theta, descent.cost, descent.evaluations
-        converged = told == CONVERGED
-    room = np.minimum(theta - lower, upper - theta)
-    if not converged or np.any(room < 1e-3 * np.maximum(np.abs(theta), 1e-12)):
+        reached = Optimum(
+            descent.theta, descent.cost, told == CONVERGED, descent.evaluations)
+    return inside(reached, residual, jacobian, theta, lower, upper, tolerance, limit)
+
+
+def inside(reached: Optimum, residual: Vector, jacobian: Vector, start: np.ndarray,
+           lower: np.ndarray, upper: np.ndarray, tolerance: float, limit: int) -> Optimum:
+    """What MINPACK has `reached` from `start`, or what "trf" makes of it beside a bound or where it
+    did not converge; the rest as for `minimise`.
+    """
+    theta, best = reached.theta, reached.cost
+    evaluations, converged = reached.evaluations, reached.converged
+    # plain numbers: for a few parameters NumPy's overhead is all there is
+    if not converged or any(min(q - low, high - q) < max(1e-3 * abs(q), 1e-15) for q, low, high
+                            in zip(theta.tolist(), lower.tolist(), upper.tolist(), strict=True)):
         from scipy.optimize import least_squares
+
+        scale = np.where(start != 0, np.abs(start), 1.0)
 
         def boxed(z: np.ndarray) -> np.ndarray:
             return residual(np.clip(z * scale, lower, upper))

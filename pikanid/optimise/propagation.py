@@ -15,9 +15,11 @@ def propagated(sensitivity: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     >>> propagated(np.array([[1.0, 0.0], [3.0, 4.0]]), np.eye(2)).tolist()
     [1.0, 5.0]
     """
-    C = finite(covariance)
-    variance = np.einsum("ij,ij->i", sensitivity @ C, sensitivity)
-    return np.asarray(np.sqrt(np.maximum(variance, 0.0, out=variance), out=variance))
+    from pikanid.optimise.small_matrices import deviations
+
+    spread = np.empty(len(sensitivity))
+    deviations(np.ascontiguousarray(sensitivity, float), finite(covariance), spread)
+    return spread
 
 
 def finite(covariance: np.ndarray) -> np.ndarray:

@@ -115,3 +115,47 @@ def inverse_diagonal(matrix: np.ndarray, inside: np.ndarray, out: np.ndarray) ->
             column[i] = rest / factor[i, i]
             total += column[i] ** 2
         out[which[j]] = total / root[j] ** 2
+
+
+@_compiled
+def scale_triangle(R: np.ndarray, norms: np.ndarray) -> None:
+    """Clear R (k, n) below its diagonal and divide its columns by their norms, which fill norms
+    (n,); columns of zeros stay.
+    """
+    for j in range(norms.size):
+        total = 0.0
+        for i in range(R.shape[0]):
+            if i > j:
+                R[i, j] = 0.0
+            total += R[i, j] ** 2
+        norms[j] = np.sqrt(total)
+        for i in range(min(j + 1, R.shape[0])):
+            if total > 0.0:
+                R[i, j] /= norms[j]
+
+
+@_compiled
+def inverse_square(sizes: np.ndarray, axes: np.ndarray, norms: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (n, n) with (AᵀA)⁻¹, A having singular values (s,), falling, and right singular
+    vectors (s, n) when its columns are divided by norms (n,); values below 1e-12 count as that.
+    """
+    for i in range(norms.size):
+        for j in range(norms.size):
+            total = 0.0
+            for k in range(sizes.size):
+                total += axes[k, i] * axes[k, j] / max(sizes[k], 1e-12 * sizes[0]) ** 2
+            out[i, j] = total / (norms[i] * norms[j])
+
+
+@_compiled
+def deviations(sensitivity: np.ndarray, covariance: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (N,) with √diag(J C Jᵀ)."""
+    n = covariance.shape[0]
+    for row in range(out.size):
+        total = 0.0
+        for i in range(n):
+            along = 0.0
+            for j in range(n):
+                along += covariance[i, j] * sensitivity[row, j]
+            total += along * sensitivity[row, i]
+        out[row] = 0.0 if total < 0.0 else np.sqrt(total)

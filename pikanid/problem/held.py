@@ -50,10 +50,19 @@ class HeldInput:
         if len(self.time) < 2:
             return np.empty(0)
         if self.hold == "zero":
-            return self.time[1:][np.diff(self.values) != 0]
+            return self.time[1:][self.values[1:] != self.values[:-1]]
         slopes = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.time), [0.0]])
         change = np.abs(np.diff(slopes)) > 1e-9 * np.max(np.abs(slopes), initial=0.0)
         return self.time[change]
+
+    @property
+    def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Knots (K,), values and slopes right of each; how far before a knot counts as at it."""
+        slopes = np.zeros(len(self.time))
+        if self.flat:
+            return self.time, self.values, slopes, 1e-9 * self._spacing
+        slopes[:-1] = np.diff(self.values) / np.diff(self.time)
+        return self.time, self.values, slopes, 0.0
 
     @property
     def flat(self) -> bool:
@@ -62,7 +71,7 @@ class HeldInput:
 
     @functools.cached_property
     def _spacing(self) -> float:
-        return float(np.diff(self.time).min()) if len(self.time) > 1 else 1.0
+        return float((self.time[1:] - self.time[:-1]).min()) if len(self.time) > 1 else 1.0
 
 
 def held_input(name: str, time: np.ndarray, values: np.ndarray,
@@ -107,8 +116,14 @@ class PiecewiseInput:
         shifted = np.asarray(t, float) - delay
         return np.where(shifted < self.knots[0], 0.0, self.slopes[self._piece(shifted, "right")])
 
-    def _piece(self, t: np.ndarray, side: Side) -> np.ndarray:
+    @property
+    def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Knots (K,), values and slopes right of each; how far before a knot counts as at it."""
         slack = 1e-9 * (float(self.knots[-1] - self.knots[0]) / max(len(self.knots), 1))
+        return self.knots, self.values, self.slopes, slack
+
+    def _piece(self, t: np.ndarray, side: Side) -> np.ndarray:
+        slack = self.lines[3]
         probe = t + (slack if side == "right" else -slack)
         return np.maximum(np.searchsorted(self.knots, probe, side="right") - 1, 0)
 

@@ -15,7 +15,8 @@ import sympy as sp
 
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
-from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
+from pikanid.simulation.constants import Constants
+from pikanid.simulation.lowering import lower_model, spline_value, switch_symbol
 from pikanid.simulation.printing import printed
 from pikanid.simulation.spline_lines import Splines
 
@@ -50,12 +51,13 @@ HOT = ("variational", "observe", "observe_sensitivity")
 class Writer:
     """Writes the bodies of a model's functions; knows its symbols and splines."""
 
-    def __init__(self, model: Model, lowered: LoweredModel):
-        self.model, self.lowered = model, lowered
+    def __init__(self, model: Model):
+        self.model, self.lowered = model, lower_model(model)
         self.x = [symbol(n) for n in model.state_names]
         self.u = [symbol(n) for n in model.input_names]
         self.p = [symbol(n) for n in model.parameter_names]
-        self.s = [switch_symbol(k) for k in range(len(lowered.switches))]
+        self.s = [switch_symbol(k) for k in range(len(self.lowered.switches))]
+        self.constants = Constants(self.p)  # of all functions written so far
         # an input whose delay is not estimated has values that no parameter moves
         self.still = not any(i.delay.free_symbols for i in model.inputs)
         self.v = [sp.Symbol(f"_v_{n}", real=True) for n in model.input_names]
@@ -64,7 +66,8 @@ class Writer:
         """Lines that bring the symbols used in `exprs` into local names."""
         used = set().union(*(e.free_symbols for e in exprs)) if exprs else set()
         lines = []
-        for array, symbols in (("x", self.x), ("u", self.u), ("p", self.p), ("v", self.v)):
+        for array, symbols in (("x", self.x), ("u", self.u), ("v", self.v),
+                               ("p", [*self.p, *self.constants.symbols.values()])):
             lines += [f"{printed(q)} = {array}[{i}]" for i, q in enumerate(symbols) if q in used]
         dynamic = self.s[: self.lowered.n_dynamic]
         return lines + [f"{printed(q)} = s[{i}]" for i, q in enumerate(dynamic) if q in used]
@@ -82,7 +85,7 @@ class Writer:
     def values(self, name: str, arguments: str, out: str, exprs: Sequence[sp.Expr],
                inline_switches: bool = False) -> str:
         """A function that fills `out` with the values of `exprs`."""
-        own = self.own_switches(inline_switches)
+        exprs, own = self.taken_out(exprs), self.own_switches(inline_switches)
         splines = Splines(self.model, [*exprs, *own])
         body = self.unpack([*exprs, *splines.arguments, *own]) + self.prelude(splines, own)
         body += self.block([(f"{out}[{i}]", e) for i, e in enumerate(exprs)], splines)
@@ -125,9 +128,10 @@ class Writer:
                 if derivative != 0:
                     targets.append((f"fp[{r}, {k}]", derivative))
         own = self.own_switches(inline_switches)
+        targets = [(name, self.constants.taken_out(e)) for name, e in targets]
         used = [*(e for _, e in targets), *own]
         splines = Splines(self.model, used)
-        edge_targets, clear, edge_lines = splines.coefficient_columns(exprs)
+        edge_targets, clear, edge_lines = splines.coefficient_columns(self.taken_out(exprs))
         # a coefficient inside the argument of another spline needs that one's derivative as well
         splines = Splines(self.model, [*used, *(e for _, e in edge_targets)])
         body = self.unpack([*used, *splines.arguments, *(e for _, e in edge_targets)])
@@ -148,7 +152,12 @@ class Writer:
 
     def own_switches(self, inline: bool) -> list[sp.Expr]:
         """The switching functions that only outputs have, where these are evaluated inline."""
-        return list(self.lowered.switches[self.lowered.n_dynamic:]) if inline else []
+        own = self.lowered.switches[self.lowered.n_dynamic:] if inline else ()
+        return self.taken_out(own)
+
+    def taken_out(self, exprs: Sequence[sp.Expr]) -> list[sp.Expr]:
+        """The formulas with symbols for what is evaluated once a run."""
+        return [self.constants.taken_out(e) for e in exprs]
 
     def prelude(self, splines: Splines, own: Sequence[sp.Expr]) -> list[str]:
         """Splines and the outputs' own switches, each after what its argument needs."""
@@ -178,10 +187,10 @@ def _function(name: str, arguments: str, body: Sequence[str]) -> str:
     return f"@{mark}\ndef {name}({arguments}):\n{lines}\n\n"
 
 
-def generate(model: Model) -> tuple[str, LoweredModel]:
-    """The model's functions as source, and its lowered formulas."""
-    lowered = lower_model(model)
-    w = Writer(model, lowered)
+def generate(model: Model) -> tuple[str, Writer]:
+    """The model's functions as source, and who wrote them; `constants_function` has to follow."""
+    w = Writer(model)
+    lowered = w.lowered
     knots = "".join(f"KNOTS_{i} = np.array({list(map(float, s.knots))})\n"
                     for i, s in enumerate(model.splines))
     f, h = lowered.rhs, lowered.outputs
@@ -222,7 +231,16 @@ def generate(model: Model) -> tuple[str, LoweredModel]:
                  for r, e in enumerate(h) for k, q in enumerate(dynamic) if e.diff(q) != 0]
         source += f"SHOWS_SIGNS = {bool(shown)}\n\n\n"
         source += _slopes(w, "observe_gain", shown, "b, t, x, u, v, p, s, Hs", True)
-    return source, lowered
+    return source, w
+
+
+def constants_function(w: Writer) -> str:
+    """A function that puts the parameters p (P,) and all constants into c: the last to be written.
+    """
+    parts = [(f"c[{len(w.p) + i}]", e) for i, e in enumerate(w.constants.symbols)]
+    body = ["for k in range(P):", "    c[k] = p[k]", *w.unpack(list(w.constants.symbols))]
+    return f"CONSTANTS = {len(parts)}\n\n\n" + _function(
+        "evaluate_constants", "p, c", body + w.block(parts, Splines(w.model, [])))
 
 
 def _rate(w: Writer, e: sp.Expr) -> sp.Expr:
@@ -238,6 +256,7 @@ def _rate(w: Writer, e: sp.Expr) -> sp.Expr:
 def _slopes(w: Writer, name: str, targets: Sequence[tuple[str, sp.Expr]], arguments: str,
             inline_switches: bool = False) -> str:
     own = w.own_switches(inline_switches and bool(targets))
+    targets = [(name, w.constants.taken_out(e)) for name, e in targets]
     used = [*(e for _, e in targets), *own]
     splines = Splines(w.model, used)
     body = w.unpack([*used, *splines.arguments]) + w.prelude(splines, own)

@@ -64,16 +64,17 @@ def generated(name: str, source: str) -> ModuleType:
 
 
 def _source(model: Model, method: Method) -> str:
-    from pikanid.simulation.codegen import Writer, generate
+    from pikanid.simulation.codegen import constants_function, generate
     from pikanid.simulation.smooth_step import step_functions
 
     _LOG.info("compiling %s, once", model.name)
-    source, lowered = generate(model)
-    kind = "hybrid" if lowered.n_dynamic else "smooth"
+    source, writer = generate(model)
+    kind = "hybrid" if writer.lowered.n_dynamic else "smooth"
     step = "rk4" if method == "explicit" else "sdirk"
     if (kind, step) == ("smooth", "rk4"):
-        source, step = source + step_functions(Writer(model, lowered)), "rk4_smooth"
+        source, step = source + step_functions(writer), "rk4_smooth"
     pieces = [f"field_{kind}", step, f"drive_{kind}", "integrate"]
+    source += constants_function(writer)
     return source + "\n\n".join(kernel_text(p) for p in pieces)
 
 
@@ -87,8 +88,8 @@ def _name(model: Model, method: Method) -> str:
     splines = tuple((s.name, s.degree, s.knots) for s in model.splines)
     kernels = sorted(k for k in (_HERE / "kernels").glob("*.py") if not k.name.startswith("tape"))
     generators = (_HERE / f"{n}.py" for n in (
-        "compiled", "codegen", "smooth_step", "spline_lines", "printing", "lowering", "support",
-        "layout"))
+        "compiled", "codegen", "smooth_step", "spline_lines", "printing", "constants", "lowering",
+        "support", "layout"))
     return named(
         "model", method, model.state_names, model.input_names, model.parameter_names,
         [to_text(e) for e in model.equations.values()],

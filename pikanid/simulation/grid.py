@@ -7,6 +7,7 @@ adaptive solver over the whole interval would step over short pulses without not
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -37,12 +38,20 @@ class Grid:
         return self.T[1:] - self.T[:-1]
 
     @functools.cached_property
+    def _even(self) -> float | None:
+        """The interval between stops [s] where all are alike up to rounding, else None."""
+        shortest, longest = float(self._gaps.min()), float(self._gaps.max())
+        return longest if longest - shortest <= 1e-9 * longest else None
+
+    @functools.cached_property
     def spacings(self) -> tuple[float, float]:
         """Median interval between stops [s], and the length of intervals at half of the time.
 
         Steps as long as a lone gap cannot be judged by halving them: all other intervals would
         be crossed in one step either way.
         """
+        if self._even is not None:
+            return self._even, self._even
         gaps = np.sort(self._gaps)
         half = np.searchsorted(np.cumsum(gaps), 0.5 * gaps.sum())
         middle = len(gaps) // 2  # they are sorted: np.median would sort them again
@@ -50,6 +59,8 @@ class Grid:
 
     def pieces(self, longest: float) -> np.ndarray:
         """Sub-steps of each interval (L-1,) so that none is longer than `longest` [s]."""
+        if self._even is not None:
+            return np.full(len(self._gaps), max(math.ceil(self._even / longest - 1e-9), 1))
         counts = np.ceil(self._gaps / longest - 1e-9)
         return np.maximum(counts, 1).astype(np.int64)
 
@@ -61,6 +72,8 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     Observations are numbered output by output, in the order of `experiment.samples`.  A delayed
     output shows the initial state until t0 + delay.
     """
+    from pikanid.simulation.stops import draw
+
     t0 = experiment.t0
     wanted = [np.maximum(s.t - delay_out[s.output], t0) for s in experiment.samples]
     end = max([experiment.t1 if not wanted else t0, *(w[-1] for w in wanted if len(w))])
@@ -68,32 +81,16 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     breaks = [b[(b > t0) & (b < end)]
               for b in (h.switches + d for h, d in pairs if len(h.switches))]
     T, seen = _stops(np.concatenate([[t0, end], *breaks, *wanted]), experiment, wanted)
-    middle, gaps = 0.5 * (T[1:] + T[:-1]), T[1:] - T[:-1]
     # nothing is integrated beyond the last stop, but an output may show the inputs there
     U, V = np.empty((len(T), len(pairs))), np.zeros((len(T), len(pairs)))
     jumps = np.zeros(len(T), bool)
     jumps[0] = True
-    # column by column: reductions along rows as short as these take longer
     for j, (h, d) in enumerate(pairs):
-        u, v = U[:, j], V[:, j]
         if h.flat and not len(h.switches):  # one value for ever
-            u[:] = h.values[0]
-            continue
-        u[:] = h.at(np.append(middle, T[-1]), d)
-        ends = u[:-1]
-        if not h.flat:
-            v[:-1] = h.slope(middle, d)
-            v[-1] = v[-2]
-            u[:-1] -= v[:-1] * (middle - T[:-1])
-            ends = u[:-1] + v[:-1] * gaps
-            jumps[1:] |= _differ(v[1:], v[:-1], v)
-        jumps[1:] |= _differ(u[1:], ends, u)
+            U[:, j] = h.values[0]
+        else:
+            draw(T, *h.lines, d, j, U, V, jumps)
     return Grid(T, U, V, jumps, seen, len(seen.row))
-
-
-def _differ(a: np.ndarray, b: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Where a and b (L,) differ by more than rounding."""
-    return np.asarray(np.abs(a - b) > 1e-9 * np.abs(scale).max(initial=0.0))
 
 
 def _stops(times: np.ndarray, experiment: Experiment, wanted: Sequence[np.ndarray]
@@ -101,7 +98,7 @@ def _stops(times: np.ndarray, experiment: Experiment, wanted: Sequence[np.ndarra
     """The stops for all times (K,) that are to be met, and the observations at each."""
     from pikanid.simulation.stops import lay_out
 
-    times.sort()
+    times.sort(kind="stable")  # it merges what is sorted
     seen = np.concatenate([np.empty(0), *wanted])
     shown, at = np.empty(len(seen), np.int64), 0
     for s, w in zip(experiment.samples, wanted, strict=True):

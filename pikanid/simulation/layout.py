@@ -18,7 +18,7 @@ class Seen(NamedTuple):
     inside: np.ndarray
 
 
-def work_dtype(n: int, m: int, P: int, q: int, k: int, stages: int, rows: int,
+def work_dtype(n: int, m: int, P: int, q: int, k: int, stages: int, constants: int, rows: int,
                width: int) -> np.dtype:
     """One record of scratch for n states, m inputs, P parameters, q outputs and k switches.
 
@@ -28,7 +28,7 @@ def work_dtype(n: int, m: int, P: int, q: int, k: int, stages: int, rows: int,
     """
     A, big = P + n + 1, max(n, k)
     shapes: dict[str, tuple[int, ...]] = {
-        "kx": (stages, n), "kS": (stages, A, n),
+        "p": (P + constants,), "kx": (stages, n), "kS": (stages, A, n),
         **dict.fromkeys(("xt", "xn", "x", "f", "before", "after", "start"), (n,)),
         **dict.fromkeys(("St", "Sn", "S", "eye", "fx"), (A, n)),
         **dict.fromkeys(("u", "uc", "held", "slope"), (m,)),

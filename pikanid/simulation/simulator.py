@@ -98,13 +98,13 @@ class Simulator:
         return not any(delayed)
 
     @functools.cached_property
-    def _fixed(self) -> bool:
+    def fixed(self) -> bool:
         """Whether parameters move no stop."""
         return self._undelayed and not any(i.shaped for i in self.model.inputs)
 
     def grid(self, p: np.ndarray) -> Grid:
         """The stops at parameters p; kept, since only delays and paths change them."""
-        if self._fixed:
+        if self.fixed:
             return self._fixed_grid
         delay_in = delays(self.acting.inputs, self.model, p)
         delay_out = delays(self.model.outputs, self.model, p)
@@ -140,7 +140,7 @@ class Simulator:
                 if (of.method, of.longest) == (steps.method, steps.longest) and np.array_equal(
                         at, p):
                     return found  # it was run when the steps were chosen
-        grid, integrate, arguments, S0 = self._prepared(p, active, steps)
+        grid, integrate, arguments, S0 = self.prepared(p, active, steps)
         if S0 is None:
             S0 = np.ascontiguousarray(self.experiment.initial_jacobian(p).T[active])
         X = np.empty((len(grid.T) if states else 0, len(self.model.states)))
@@ -153,7 +153,7 @@ class Simulator:
         finite = status == 0 and math.isfinite(np.vdot(both, both))
         return Response(Y, J, grid.T, X, finite, float(grid.T[stop]), int(status))
 
-    def _prepared(self, p: np.ndarray, active: np.ndarray, steps: Steps) -> _Prepared:
+    def prepared(self, p: np.ndarray, active: np.ndarray, steps: Steps) -> _Prepared:
         """What a run at parameters p takes besides them; kept while the stops are the same."""
         grid, key = self.grid(p), (steps.method, steps.longest, active.tobytes())
         kept: dict[tuple[Method, float, bytes], _Prepared] = self._kept.get("prepared", {})

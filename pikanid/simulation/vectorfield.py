@@ -172,12 +172,15 @@ class _Functions:
 class Linearised:
     """Some rows of f or h and their derivatives by the states and by some parameters.
 
+    `state` is the one that a single row shows as it is; None for any other formula, or several.
     Smooth models run from machine code.  NumPy's warnings are for the caller to silence: once for
     all that is evaluated.
     """
 
     def __init__(self, functions: _Functions, name: Literal["f", "h"], rows: tuple[int, ...],
                  free: tuple[int, ...]):
+        only = functions.exprs[name][rows[0]] if len(rows) == 1 else None
+        self.state = functions.x.index(only) if only in functions.x else None
         self._native: NativeField | None = None
         if can_run(functions.model) and not functions.lowered.switches:
             from pikanid.simulation.native_field import NativeField

@@ -75,7 +75,7 @@ def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray,
     for r, (e, response) in enumerate(zip(problem.experiments, responses, strict=True)):
         trajectories.append(Trajectory(response.t, response.states))
         own = problem.columns(r)[1]
-        spread = None if cov is None else propagated(response.sensitivity, cov[np.ix_(own, own)])
+        spread = None if cov is None else propagated(response.sensitivity, cov[own[:, None], own])
         row = 0
         for s in e.samples:
             output = problem.model.outputs[s.output]

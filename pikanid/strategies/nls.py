@@ -2,7 +2,8 @@
 
     p̂ = argmin Σ_i |(y_i - h(x(t_i; p)))/σ_i|²   subject to   x' = f(x, u; p)
 
-Jacobians are exact (forward sensitivities); the optimiser is `scipy.optimize.least_squares`.
+Jacobians are exact (forward sensitivities); the optimiser is MINPACK's Levenberg-Marquardt inside
+the bounds and SciPy's "trf" at them (`pikanid.optimise.minpack`).
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from pikanid.model import Model
 from pikanid.objective.settings import USUAL as ADEQUACY
 from pikanid.objective.settings import AdequacySettings
 from pikanid.objective.shooting import Accuracy, Shooting
-from pikanid.optimise.minpack import Optimum, minimise
+from pikanid.optimise.minpack import Optimum
+from pikanid.optimise.shooting_fit import fit_shooting
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.settings import changed
@@ -131,8 +133,7 @@ class NLS:
                 shooting.choose_steps(theta, accuracy)
             except errors.SimulationFailed:
                 return None
-            found = minimise(shooting.residual, shooting.jacobian, theta, shooting.problem.lower,
-                             shooting.problem.upper, tolerance, self.max_evaluations)
+            found = fit_shooting(shooting, theta, tolerance, self.max_evaluations)
             evaluations += found.evaluations
             theta = found.theta
         assert found is not None

@@ -38,33 +38,37 @@ class Directions:
     @staticmethod
     def of(jacobian: np.ndarray, estimated: np.ndarray) -> Directions:
         """Those of a Jacobian (rows, n) and the parameters that are `estimated` (n,)."""
-        inside = np.flatnonzero(estimated)
+        from pikanid.optimise.small_matrices import scale_triangle
+
+        n, inside = jacobian.shape[1], np.flatnonzero(estimated)
         # R of J = QR has the same, in as few rows as there are columns; LAPACK directly, as NumPy's
         # wrappers take longer than the rest of this
-        J = jacobian.T[inside].T
+        J = jacobian if len(inside) == n else jacobian.T[inside].T
+        norms, s, vt = np.zeros(len(inside)), np.empty(0), np.empty((0, 0))
         if J.size:
             J = dgeqrf(J)[0][:len(inside)]
-            for j in range(J.shape[1]):
-                J[j + 1:, j] = 0.0
-        norms = np.sqrt((J * J).sum(axis=0))
+            scale_triangle(J, norms)
         seen = norms > 0
-        s, vt = np.empty(0), np.empty((0, 0))
         if seen.any():
-            _, s, vt, info = dgesdd(J[:, seen] / norms[seen], full_matrices=False)
+            _, s, vt, info = dgesdd(J if seen.all() else J[:, seen], full_matrices=False)
             if info:
                 raise LinAlgError(f"the singular values did not converge ({info})")
-        return Directions(jacobian.shape[1], inside, norms, seen, s, vt)
+        return Directions(n, inside, norms, seen, s, vt)
 
     @property
     def covariance(self) -> np.ndarray:
         """(JᵀJ)⁻¹ (n, n), see `covariance`."""
-        s, norms = self.sizes, self.norms[self.seen]
+        from pikanid.optimise.small_matrices import inverse_square
+
+        norms = self.norms[self.seen]
+        inner = np.empty((norms.size, norms.size))
+        inverse_square(self.sizes, self.axes, norms, inner)
+        if norms.size == self.n:
+            return inner
         result = np.full((self.n, self.n), np.nan)
         result[self.inside[:, None], self.inside] = 0.0
-        if len(s):
-            inner = (self.axes.T / np.maximum(s, s[0] * 1e-12) ** 2) @ self.axes
-            shown = self.inside[self.seen]
-            result[shown[:, None], shown] = inner / (norms[:, None] * norms)
+        shown = self.inside[self.seen]
+        result[shown[:, None], shown] = inner
         hidden = self.inside[~self.seen]
         result[hidden, hidden] = np.inf
         return result

@@ -54,12 +54,13 @@ def switch_inputs(t, i, x, S, U, V, gap, dtau_in, delayed, p, mode, act, w):
 
 
 @called
-def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode, work, seen,
+def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, given, act, mode, work, seen,
         X, Y, J):
     """Integrate over the stops T, recording observations; returns (status, stop reached).
 
     T (L,) stops; pieces (L-1,) sub-steps of each interval; U, V (L, M) inputs right of each stop
     and their slopes; jumps (L,) whether an input jumps or kinks there;
+    given (P,) parameters, to which p adds what depends on them alone;
     dtau_* (channels, A) how each delay depends on the estimated parameters.
     Status 0: done; 1: not finite; 2: endless switching.
     """
@@ -67,7 +68,8 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
     for i in range(N):
         w.eye[i, i] = 1.0
         w.constant[i] = P
-    n, A = N, len(act)
+    p, n, A = w.p[:], N, len(act)
+    evaluate_constants(given, p)
     x, S = w.x, w.S
     for r in range(n):
         x[r] = x0[r]
@@ -99,7 +101,7 @@ def run(T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0, p, act, mode
     return 0, L - 1
 
 
-WORK = work_dtype(N, M, P, Q, K, STAGES, *BUFFERS)
+WORK = work_dtype(N, M, P, Q, K, STAGES, CONSTANTS, *BUFFERS)
 
 
 @cached_jit(error_model="numpy")
