@@ -127,7 +127,7 @@ class NLS:
             led = multiple_shooting(shooting, start, self.segments)
             theta = start if led is None else led
         passes: list[tuple[Accuracy, float]] = [
-            ("coarse", max(1e-4, self.tolerance)), ("fine", self.tolerance)]
+            ("coarse", max(1e-3, self.tolerance)), ("fine", self.tolerance)]
         for accuracy, tolerance in passes:
             try:
                 shooting.choose_steps(theta, accuracy)
