@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pikanid import Recording, excitation, simulate
+from pikanid import Model, Recording, excitation, simulate
+from pikanid.mismatch.beyond.local_force import LocalForce
 from pikanid.mismatch.beyond.patch import DEGREE, INTERVALS, FreeCurve
 from pikanid.mismatch.beyond.penalised import Penalised, _prior
 from pikanid.mismatch.catalogue.friction import coulomb_friction
@@ -132,6 +133,31 @@ def test_a_patch_is_the_same_curve_as_what_was_fitted() -> None:
     curve = basis.matrix(x[:, 0]) @ np.array(list(delta.values()))
     np.testing.assert_allclose(rates[1][:, 1] - rates[0][:, 1], curve, atol=1e-8)
     np.testing.assert_allclose(rates[2][:, 1] - rates[0][:, 1], curve, atol=1e-8)
+
+
+@pytest.mark.parametrize("make", [
+    lambda m, unit, site: FreeCurve("T", 8.0, 22.0, m).candidate(site),
+    lambda m, unit, site: FreeCurve("T_a", 5.0, 15.0, m, 3, unit).of_input(site),
+    lambda m, unit, site: FreeCurve("T", 8.0, 22.0, m, 3, unit).of_sensor(site),
+    lambda m, unit, site: LocalForce("T", 8.0, 22.0, ("below", "above"), m).candidate(site)])
+def test_free_curves_of_temperatures_know_no_zero(make: Any) -> None:
+    """In degC, where a temperature has no powers, they are what they are in K, or without units."""
+    def shown(unit: str) -> np.ndarray:
+        model = Model.from_dict({
+            "name": "house", "states": {"T": {"unit": unit, "initial": 20.0}},
+            "inputs": {"T_a": {"unit": unit}},
+            "parameters": {"k": {"unit": "1/s", "guess": 0.01, "bounds": [0.0, 1.0]}},
+            "equations": {"T": "-k*(T - T_a)"},
+            "outputs": {"T": {"unit": unit, "expression": "T"}}})
+        t = np.arange(200) * 5.0
+        heard = Recording.from_arrays(t, {"T_a": 10 + 5 * np.sin(t / 100)}, units={"T_a": unit})
+        effect = make(model, unit, sites(model, (heard,))[0])
+        values = {p.name: 1e-5 * (1 + k) for k, p in enumerate(effect.parameters)}
+        return simulate(effect.applied(model).with_values(values), heard)["T"].values
+
+    plain = shown("")
+    for unit in ("degC", "K"):
+        np.testing.assert_allclose(shown(unit), plain, rtol=1e-12)
 
 
 def test_penalised_curves_agree_with_the_dense_formulas() -> None:

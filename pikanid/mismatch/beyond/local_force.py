@@ -20,7 +20,7 @@ import numpy as np
 
 from pikanid.formula import units
 from pikanid.mismatch.beyond.force_shape import ForceShape
-from pikanid.mismatch.beyond.patch import FreeCurve
+from pikanid.mismatch.beyond.patch import Difference, FreeCurve
 from pikanid.mismatch.beyond.region import Course, Interval, course
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
@@ -132,7 +132,7 @@ class LocalForce:
 
     def __init__(self, argument: str, low: float, high: float, sides: tuple[str, ...],
                  model: Model, powers: tuple[int, ...] = (1, 2)):
-        self.argument, self.unit = argument, model.state(argument).unit
+        self.argument = argument
         self.low, self.high, self.half = low, high, max(abs(low), abs(high))
         self.sides, self.powers, self.model = sides, powers, model
         name = "local"
@@ -140,6 +140,7 @@ class LocalForce:
             name += "_x"
         self.places = {side: f"{name}_{side}" for side in sides}
         self.names = {side: {k: f"{name}_{side}_{k}" for k in powers} for side in sides}
+        self.of = Difference.of(argument, model.state(argument).unit, f"{name}_zero")
 
     def with_powers(self, *powers: int) -> LocalForce:
         """The same with other powers."""
@@ -175,22 +176,23 @@ class LocalForce:
 
     def candidate(self, site: Site) -> Candidate:
         """The force as an effect whose thresholds and coefficients are estimated."""
-        z = f"({self.argument}/{self.half!r})"
+        z, unit = f"({self.of.text}/{self.half!r})", self.of.unit
         terms, parameters = [], []
         for side in self.sides:
             at = self.places[side]
             up = f"max({at} - {z}, 0)" if side == BELOW else f"max({z} - {at}, 0)"
-            parameters.append(Parameter(at, -0.5 if side == BELOW else 0.5, self.unit,
+            parameters.append(Parameter(at, -0.5 if side == BELOW else 0.5, self.of.distance,
                                         (0.0 if side == ALIKE else -1.0, 1.0)))
             for k, name in self.names[side].items():
                 down = f" - max(-{z} - {at}, 0)**{k}" if side == ALIKE else ""
                 terms.append(f"{name}*({up}**{k}{down})")
                 # z is a number, but carries the unit of what it is made from
                 parameters.append(Parameter(name, 0.0, units.product(
-                    (site.force_unit, 1), (self.unit or "1", -k))))
+                    (site.force_unit, 1), (unit or "1", -k))))
         text = " + ".join(terms)
         return Candidate(("local",), "a force in a region", text, "dynamics", site,
-                         tuple(parameters), lambda m: m.with_term(site.v, text), lambda view: (),
+                         tuple(parameters), lambda m: m.with_parameters(
+                             *self.of.zeros).with_term(site.v, text), lambda view: (),
                          known=False)
 
     def ends(self, values: Mapping[str, float]) -> tuple[float, float]:

@@ -98,6 +98,35 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
                  *(next(iter(p.rmse.values())) for p in (before, after)))
 
 
+@dataclass(frozen=True)
+class Difference:
+    """An argument in formulas that take its powers: a temperature in degC has none, its distance
+    from a fixed one has.
+
+    Attributes:
+        text: Of the argument.
+        unit: Of the argument, which its powers and products have as well.
+        zeros: Fixed parameters that the text takes.
+    """
+
+    text: str
+    unit: str
+    zeros: tuple[Parameter, ...] = ()
+
+    @property
+    def distance(self) -> str:
+        """The unit of a distance by itself."""
+        return f"delta_{self.unit}" if self.zeros else self.unit
+
+    @classmethod
+    def of(cls, argument: str, unit: str, name: str) -> Difference:
+        """Of an argument in this unit; a parameter may have this name."""
+        if not unit or not units.begins_elsewhere(unit):
+            return cls(argument, unit)
+        zero = Parameter(name, 0.0, unit, free=False)
+        return cls(f"({argument} - {name})", unit, (zero,))
+
+
 class FreeCurve:
     """Cubic splines of a state, an input or an output as truncated powers, of the argument scaled
     to ±1.
@@ -108,13 +137,14 @@ class FreeCurve:
     def __init__(self, argument: str, low: float, high: float, model: Model,
                  intervals: int = INTERVALS, unit: str | None = None):
         self.argument = argument
-        self.unit = model.state(argument).unit if unit is None else unit
         self.low, self.high = low, high
         self.inner = np.linspace(-1.0, 1.0, intervals + 1)[1:-1]
         self.name = "delta"
         while any(taken.startswith(self.name) for taken in model.symbols):
             self.name += "_x"
         self.names = [f"{self.name}_{k}" for k in range(3 + len(self.inner))]
+        self.of = Difference.of(argument, model.state(argument).unit if unit is None else unit,
+                                f"{self.name}_zero")
 
     def _scaled(self, x: np.ndarray) -> np.ndarray:
         return (2 * x - self.low - self.high) / (self.high - self.low)
@@ -132,18 +162,18 @@ class FreeCurve:
 
     def of_input(self, site: Site) -> Candidate:
         """The edge as what an input does beside what is recorded of it."""
-        return self._effect(site, "input", self.unit, lambda m: m.map_input(
+        return self._effect(site, "input", self.of.unit, lambda m: m.map_input(
             self.argument, function=f"{self.argument} + {self.formula}"))
 
     def of_sensor(self, site: Site) -> Candidate:
         """The edge as what an output shows beside what it should."""
-        return self._effect(site, "sensor", self.unit, lambda m: m.map_output(
+        return self._effect(site, "sensor", self.of.unit, lambda m: m.map_output(
             self.argument, function=f"{self.argument} + {self.formula}"))
 
     @property
     def _shapes(self) -> list[str]:
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        z = f"(({self.argument} - ({middle!r}))/{half!r})"
+        z = f"(({self.of.text} - ({middle!r}))/{half!r})"
         return ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
                                             for k in map(float, self.inner))]
 
@@ -155,12 +185,14 @@ class FreeCurve:
     def _effect(self, site: Site, channel: Channel, unit: str,
                 extend: Callable[[Model], Model]) -> Candidate:
         # z is a number, but carries the unit of what it is made from
-        own = [units.product((unit or "1", 1), (self.unit or "1", -power))
-               for power in (0, 2, *(3 for _ in self.names[2:]))]
+        constant = self.of.distance if unit == self.of.unit else unit
+        own = [constant, *(units.product((unit or "1", 1), (self.of.unit or "1", -power))
+                           for power in (2, *(3 for _ in self.names[2:])))]
         return Candidate(("patch",), "a KAN edge", self.formula, channel, site,
                          tuple(Parameter(n, 0.0, unit)
                                for n, unit in zip(self.names, own, strict=True)),
-                         extend, lambda view: (), known=False)
+                         lambda m: extend(m.with_parameters(*self.of.zeros)), lambda view: (),
+                         known=False)
 
     def extended(self, nominal: Model, site: Site, found: Hypothesis) -> Model:
         """The nominal model, at the estimates, with the edge as a B-spline."""
