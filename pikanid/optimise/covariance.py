@@ -184,7 +184,7 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step,
 
 def _trace_of_quotient(share: Array, band: Array) -> float:
     """tr(A⁻¹ A_d), A a band that rounding may have left just short of positive definite."""
-    from pikanid.optimise.banded_products import trace_of_quotient
+    from pikanid.optimise.banded_solves import trace_of_quotient
 
     lift = 0.0
     while math.isnan(trace := trace_of_quotient(share, band, lift)):

@@ -144,7 +144,7 @@ class BandedSystem:
         Raises:
             LinAlgError: If a band or the reduced matrix is not positive definite.
         """
-        from pikanid.optimise.banded_products import follow_theta, reduce_block
+        from pikanid.optimise.banded_solves import follow_theta, reduce_block
         from pikanid.optimise.small_matrices import fall, free_minimum
 
         theta, b = at.point.theta, at.point.theta.size
@@ -206,20 +206,23 @@ class Outcome:
     converged: bool
 
 
-def gauss_newton(system: BandedSystem, start: Point | Linearisation, lam: float, lower: Array,
-                 upper: Array, *, iterations: int = 50, tolerance: float = 1e-6) -> Outcome:
-    """Minimise Eq. (2) at one λ from a point, or from where the same system was linearised.
+def gauss_newton(system: BandedSystem, start: Point | Linearisation | Outcome, lam: float,
+                 lower: Array, upper: Array, *, iterations: int = 50, tolerance: float = 1e-6
+                 ) -> Outcome:
+    """Minimise Eq. (2) at one λ from a point, from where the same system was linearised, or on from
+    where it ended at the same λ.
 
     Converged when the promised decrease is below `tolerance` of one datum's share of the cost: the
     estimate is then within √tolerance standard errors of the minimum.  Damping starts at zero and
     grows only when a step fails.
     """
-    at = start if isinstance(start, Linearisation) and start.lam == lam else (
-        system.linearise(start, lam))
+    begin, known = (start.at, start.step) if isinstance(start, Outcome) else (start, None)
+    at = begin if isinstance(begin, Linearisation) and begin.lam == lam else (
+        system.linearise(begin, lam))
     share = 1.0 / max(1, system.functional.n_data)
     nothing = NOTHING * system.functional.data_square
     damping, done = 0.0, 0
-    step = damped_step(system, at, lower, upper, damping)
+    step = known or damped_step(system, at, lower, upper, damping)
     while step.promised > max(tolerance * share * at.cost, nothing):
         if done == iterations:
             return Outcome(at, damped_step(system, at, lower, upper, 0.0), done, False)

@@ -251,7 +251,7 @@ def follow(system: BandedSystem, point: Point,
         if not found.converged:
             break
         # so far as is enough on the way: what then goes no further is no stage to keep
-        found = gauss_newton(system, found.at, stage.lam, system.lower, system.upper,
+        found = gauss_newton(system, found, stage.lam, system.lower, system.upper,
                              iterations=MAX_ITERATIONS)
         if found.iterations:
             found = replace(found, iterations=stage.iterations + found.iterations)
