@@ -264,6 +264,8 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
 
 
 def _data(sites: Sites, c: Array, p: Array) -> Rows:
+    if (plain := sites.measured_at(c)) is not None:
+        return plain
     return _data_at(sites, sites.values(c), p)
 
 

@@ -63,8 +63,16 @@ class Sites:
         """The rows of samples of a state as it is, from all states (n, M); None of formulas."""
         if self.shown is None or self.target is None:
             return None
-        return Rows(self.weight, ONE, values[self.shown].reshape(-1, 1), self.target,
-                    self._state_slopes, None)
+        return self._samples(values[self.shown].reshape(-1, 1), self.target)
+
+    def measured_at(self, c: Array) -> Rows | None:
+        """The same for a recording's coefficients: no other state is evaluated."""
+        if self.shown is None or self.target is None:
+            return None
+        return self._samples(side_by_side([self.states[self.shown]], c), self.target)
+
+    def _samples(self, value: Array, target: Array) -> Rows:
+        return Rows(self.weight, ONE, value, target, self._state_slopes, None)
 
     @functools.cached_property
     def _state_slopes(self) -> Array:

@@ -81,7 +81,12 @@ def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
 
     Directions without any are left out.
     """
-    out, diagonal = np.zeros_like(matrix), matrix.diagonal()
+    from pikanid.optimise.small_matrices import regular_inverse
+
+    out = np.zeros_like(matrix)
+    if regular_inverse(matrix, inside, out):
+        return out
+    diagonal = matrix.diagonal()
     which, = (inside & (diagonal > 0.0)).nonzero()
     if which.size == 0:
         return out
