@@ -131,7 +131,9 @@ class Functional:
     def reweighed(self, r: int, rows: Sequence[Rows], lam: float) -> list[Rows]:
         """The families of `rows` at another λ."""
         k = len(self.parts[r].data)
-        physics = replace(rows[k], factor=self._physics_factor(lam))
+        at = rows[k]
+        physics = Rows(at.weight, self._physics_factor(lam), at.value, at.target, at.state_slopes,
+                       at.theta_slopes, at.topped)
         return [*rows[:k], physics, *rows[k + 1:]]
 
     def data_rows(self, r: int, coefficients: Array, theta: Array) -> list[Rows]:

@@ -74,6 +74,9 @@ class BandedAssembler:
     """
 
     def __init__(self, part: Part, families: list[Sites], b: int):
+        from pikanid.optimise import banded_products
+
+        self.compiled = banded_products  # imported once: an iterate takes little longer than that
         self.n, self.b, self.data = part.n_coefficients, b, len(part.data)
         self.order = _interleave(part, self.n)
         position = np.empty(self.n, dtype=np.int64)
@@ -97,8 +100,6 @@ class BandedAssembler:
 
     def products(self, rows: Sequence[Rows], lam: float) -> Products:
         """Multiply out all residual families, taken at λ."""
-        from pikanid.optimise.banded_products import add_slope
-
         b, groups = self.b, len(rows) - self.data + 1
         whole = np.zeros((groups, *self.constant.shape))
         whole[0] = self.constant
@@ -111,30 +112,26 @@ class BandedAssembler:
                 costs.append(self._add_products(k, row, whole[group], corner[group]))
             else:
                 own = self.stretches[k]
-                costs.append(add_slope(row.weight, row.value, row.target, basis,
-                                       self.windows[k].at[state], own.starts, own.columns,
-                                       whole[0, :, -1]))
+                costs.append(self.compiled.add_slope(
+                    row.weight, row.value, row.target, basis, self.windows[k].at[state],
+                    own.starts, own.columns, whole[0, :, -1]))
                 corner[0, b, b] += costs[-1]
         return Products(whole, corner, tuple(costs), lam)
 
     def _add_products(self, k: int, row: Rows, whole: Array, corner: Array) -> float:
         """Add the products of family k with each other; its ‖r‖²."""
-        from pikanid.optimise.banded_products import add_products
-
         own, bases = self.stretches[k], self.bases[k]
-        return add_products(
+        return self.compiled.add_products(
             row.weight, row.factor, row.value, row.target, slopes(row.state_slopes),
             slopes(row.theta_slopes), row.topped, bases.local, bases.offset, bases.width,
             self.windows[k].at, own.starts, own.columns, whole, corner)
 
     def normal(self, products: Products, lam: float) -> BandedNormal:
         """JᵀJ and Jᵀr of all families together, at any λ."""
-        from pikanid.optimise.banded_products import add_up
-
         ratio, kd = 1.0 if lam == products.lam else lam / products.lam, self.bandwidth
         whole, corner = np.empty(products.whole.shape[1:]), np.empty(products.corner.shape[1:])
-        add_up(products.whole, ratio, whole)
-        add_up(products.corner, ratio, corner)
+        self.compiled.add_up(products.whole, ratio, whole)
+        self.compiled.add_up(products.corner, ratio, corner)
         costs = list(products.costs)
         costs[self.data] *= ratio
         return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs))

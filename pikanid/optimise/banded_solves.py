@@ -10,6 +10,9 @@ import numpy as np
 from pikanid.storage.jit import cached_jit
 
 _compiled = cached_jit(error_model="numpy", nogil=True)
+_written_out = cached_jit(error_model="numpy", nogil=True, inline="always")
+
+USUAL = 6  # numerical: kd + 1 of a second-order equation on the default grid: loops of known length
 
 
 @_compiled
@@ -56,6 +59,30 @@ def substitute(factor: np.ndarray, columns: np.ndarray) -> None:
             columns[j, c] *= pivot
 
 
+@_written_out
+def _eliminate(band: np.ndarray, columns: np.ndarray, j: int, reach: int) -> None:
+    """Take row j of LDLᵀ out of the next rows, itself becoming row j of D⁻¹L⁻¹ of the columns."""
+    pivot = 1.0 / band[j, 0]
+    for i in range(1, reach):
+        share = band[j, i] * pivot
+        for k in range(i, reach):
+            band[j + i, k - i] -= share * band[j, k]
+        for c in range(columns.shape[1]):
+            columns[j + i, c] -= share * columns[j, c]
+    for i in range(1, reach):
+        band[j, i] *= pivot
+    for c in range(columns.shape[1]):
+        columns[j, c] *= pivot
+
+
+@_written_out
+def _put_back(band: np.ndarray, columns: np.ndarray, j: int, reach: int) -> None:
+    """Row j of the solution from the rows after it."""
+    for k in range(1, reach):
+        for c in range(columns.shape[1]):
+            columns[j, c] -= band[j, k] * columns[j + k, c]
+
+
 @_compiled
 def solve_in_place(band: np.ndarray, columns: np.ndarray) -> bool:
     """Solve A x = b in place for columns (n, q), the lower band of A as in `factor_in_place`.
@@ -64,26 +91,19 @@ def solve_in_place(band: np.ndarray, columns: np.ndarray) -> bool:
     the columns follow in the same sweep: half the time of a factor first.
     """
     n, reach = band.shape
-    count = columns.shape[1]
+    usual = n - USUAL if reach == USUAL else -1
     for j in range(n):
         if not band[j, 0] > 0.0:
             return False
-        pivot = 1.0 / band[j, 0]
-        last = min(reach, n - j)
-        for i in range(1, last):
-            share = band[j, i] * pivot
-            for k in range(i, last):
-                band[j + i, k - i] -= share * band[j, k]
-            for c in range(count):
-                columns[j + i, c] -= share * columns[j, c]
-        for i in range(1, last):
-            band[j, i] *= pivot
-        for c in range(count):
-            columns[j, c] *= pivot
+        if j <= usual:
+            _eliminate(band, columns, j, USUAL)
+        else:
+            _eliminate(band, columns, j, min(reach, n - j))
     for j in range(n - 1, -1, -1):
-        for k in range(1, min(reach, n - j)):
-            for c in range(count):
-                columns[j, c] -= band[j, k] * columns[j + k, c]
+        if j <= usual:
+            _put_back(band, columns, j, USUAL)
+        else:
+            _put_back(band, columns, j, min(reach, n - j))
     return True
 
 

@@ -84,6 +84,9 @@ class BandedSystem:
     """A functional with local bases, ready for Gauss-Newton."""
 
     def __init__(self, functional: Functional):
+        from pikanid.optimise import banded_solves, small_matrices
+
+        self.solves, self.small = banded_solves, small_matrices
         self.functional = functional
         self.columns = [functional.problem.columns(r)[1] for r in range(len(functional.parts))]
         self.families = [functional.families(r) for r in range(len(functional.parts))]
@@ -144,31 +147,28 @@ class BandedSystem:
         Raises:
             LinAlgError: If a band or the reduced matrix is not positive definite.
         """
-        from pikanid.optimise.banded_solves import follow_theta, reduce_block
-        from pikanid.optimise.small_matrices import fall, free_minimum
-
         theta, b = at.point.theta, at.point.theta.size
         schur, slope, promised = np.zeros((b, b)), np.zeros(b), 0.0
         solutions, inner = [], []
         for columns, block in zip(self.columns, at.blocks, strict=True):
             solved = np.empty(block.right.shape)
-            promised += reduce_block(block.band, damping, block.right, block.corner, columns,
-                                     solved, schur, slope)
+            promised += self.solves.reduce_block(
+                block.band, damping, block.right, block.corner, columns, solved, schur, slope)
             if math.isnan(promised):
                 raise LinAlgError("a recording's band is not positive definite")
             solutions.append(solved)
             inner.append(solved[:, :-1])
         change = np.empty(b)
-        gain = free_minimum(schur, slope, theta, lower, upper, change)
+        gain = self.small.free_minimum(schur, slope, theta, lower, upper, change)
         if math.isnan(gain):  # seldom: a bound is met
             change = box_minimum(schur, slope, lower - theta, upper - theta)
-            gain = fall(schur, slope, change)
+            gain = self.small.fall(schur, slope, change)
         promised += gain
         moves = []
         for columns, order, solved in zip(self.columns, self.orders, solutions, strict=True):
             # Held coefficients, the first, are set from the initial state afterwards, exactly.
             move = np.zeros(order.size)
-            follow_theta(solved, change, columns, order, move)
+            self.solves.follow_theta(solved, change, columns, order, move)
             moves.append(move)
         return Step(tuple(moves), change, promised, schur, tuple(inner))
 

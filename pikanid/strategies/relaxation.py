@@ -137,7 +137,7 @@ def physics_scale(functional: Functional, point: Point, sigma: float) -> Array:
         sites, c = part.physics, point.coefficients[r]
         weight = sites.weight**2
         rows = functional.physics_rows(r, c, point.theta, 0.0)
-        f = np.nan_to_num(rows.value, posinf=0.0, neginf=0.0)
+        f = np.where(np.isfinite(rows.value), rows.value, 0.0)
         tops = tops + (weight * rows.target.T**2).sum(axis=0)
         rates = rates + (weight * f**2).sum(axis=0)
         total += weight[:, 0].sum()
