@@ -28,7 +28,8 @@ def tabulate(knots: np.ndarray, degree: int, derivative: int, t: np.ndarray, fir
     count = knots.size - degree - 1
     start, stop, low = knots[degree], knots[count], degree - derivative
     spans = knots[:count + 1]
-    j = degree
+    j, known = degree, -1
+    inverse = np.empty((degree + 1, degree + 1))  # of ξ_{j+1+i} - ξ_{j+1+i-order}, by order and i
     for m in range(t.size):
         x = t[m]
         if not (start <= x <= stop):
@@ -38,6 +39,11 @@ def tabulate(knots: np.ndarray, degree: int, derivative: int, t: np.ndarray, fir
                  np.searchsorted(spans, x, side="right")) - 1
         row = values[m]
         first[m] = j - degree
+        if j != known:
+            known = j
+            for order in range(1, degree + 1):
+                for i in range(order):
+                    inverse[order, i] = 1.0 / (knots[j + 1 + i] - knots[j + 1 + i - order])
         if low < 0:
             row[:] = 0.0
             continue
@@ -45,15 +51,14 @@ def tabulate(knots: np.ndarray, degree: int, derivative: int, t: np.ndarray, fir
         for order in range(1, low + 1):
             carried = 0.0
             for i in range(order):
-                left, right = knots[j + 1 + i - order], knots[j + 1 + i]
-                share = row[i] / (right - left)
-                row[i] = carried + (right - x) * share
-                carried = (x - left) * share
+                share = row[i] * inverse[order, i]
+                row[i] = carried + (knots[j + 1 + i] - x) * share
+                carried = (x - knots[j + 1 + i - order]) * share
             row[order] = carried
         for order in range(low + 1, degree + 1):
             carried = 0.0
             for i in range(order):
-                share = order * row[i] / (knots[j + 1 + i] - knots[j + 1 + i - order])
+                share = order * row[i] * inverse[order, i]
                 row[i] = carried - share
                 carried = share
             row[order] = carried

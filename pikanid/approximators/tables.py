@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg.lapack import dtrtri
 
 from pikanid.approximators import (
     Approximator,
@@ -197,9 +198,9 @@ def anchor(approximators: tuple[Approximator | LinearApproximator, ...], lengths
             sizes = [abs(value) for value in row]
             if first[0] or max(sizes[q + 1:], default=0.0) > 1e-9 * max(sizes):
                 return None
-            rows.append(row[:length])
+            rows.append(row[:q + 1] + [0.0] * (length - q - 1))
         held.append(offset + np.arange(length))
-        blocks.append(np.linalg.inv(np.array(rows)))
+        blocks.append(dtrtri(np.array(rows), lower=1)[0])
         offset += approximator.n_basis
     size = sum(lengths)
     matrix, at_row = np.zeros((size, size)), 0

@@ -131,7 +131,9 @@ class Functional:
     def reweighed(self, r: int, rows: Sequence[Rows], lam: float) -> list[Rows]:
         """The families of `rows` at another λ."""
         k = len(self.parts[r].data)
-        physics = replace(rows[k], factor=self._physics_factor(lam))
+        at = rows[k]
+        physics = Rows(at.weight, self._physics_factor(lam), at.value, at.target, at.state_slopes,
+                       at.theta_slopes, at.topped)
         return [*rows[:k], physics, *rows[k + 1:]]
 
     def data_rows(self, r: int, coefficients: Array, theta: Array) -> list[Rows]:
@@ -264,6 +266,8 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
 
 
 def _data(sites: Sites, c: Array, p: Array) -> Rows:
+    if (plain := sites.measured_at(c)) is not None:
+        return plain
     return _data_at(sites, sites.values(c), p)
 
 

@@ -54,20 +54,31 @@ class Sites:
         return Sites.of(self.t, self.u, self.weight, states, tops, self.target, self.output,
                         self.deviation, self.lines)
 
+    @functools.cached_property
+    def shown(self) -> int | None:
+        """The state that the samples show as it is; None of formulas, or without samples."""
+        return None if self.lines is None or self.target is None else self.lines.state
+
     def measured(self, values: Array) -> Rows | None:
         """The rows of samples of a state as it is, from all states (n, M); None of formulas."""
-        state = None if self.lines is None else self.lines.state
-        if state is None or self.target is None:
+        if self.shown is None or self.target is None:
             return None
-        return Rows(self.weight, ONE, values[state].reshape(-1, 1), self.target,
-                    self._state_slopes, None)
+        return self._samples(values[self.shown].reshape(-1, 1), self.target)
+
+    def measured_at(self, c: Array) -> Rows | None:
+        """The same for a recording's coefficients: no other state is evaluated."""
+        if self.shown is None or self.target is None:
+            return None
+        return self._samples(side_by_side([self.states[self.shown]], c), self.target)
+
+    def _samples(self, value: Array, target: Array) -> Rows:
+        return Rows(self.weight, ONE, value, target, self._state_slopes, None)
 
     @functools.cached_property
     def _state_slopes(self) -> Array:
         """Of a state by all of them (M, 1, n)."""
-        assert self.lines is not None
         slopes = np.zeros((self.t.size, 1, len(self.states)))
-        slopes[:, :, self.lines.state] = 1.0
+        slopes[:, :, self.shown] = 1.0
         return slopes
 
     def values(self, c: Array) -> Array:

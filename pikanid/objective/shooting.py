@@ -44,15 +44,16 @@ class Shooting:
         self.rows = len(self.y)
         self._at = b""
         self._kept: tuple[np.ndarray, np.ndarray] | None = None
-        self._tried: tuple[bytes, dict[tuple[int, str, float], Response]] = (b"", {})
+        self._tried: tuple[bytes, dict[tuple[int, str, float, bool], Response]] = (b"", {})
 
-    def choose_steps(self, theta: np.ndarray, accuracy: Accuracy) -> bool:
+    def choose_steps(self, theta: np.ndarray, accuracy: Accuracy, passed: bool = False) -> bool:
         """Choose integration steps at θ; returns whether they changed.
 
         "fine": the integration error moves no estimate by more than about a hundredth of its
         standard error (0.01 σ/√N an output), or, where no σ is known, is 1e-10 of the signal;
         "coarse": ten times that (1e-5 of the signal), never more than 1e-3 of the signal.  Each
-        output has a tolerance of its own, in its own unit.
+        output has a tolerance of its own, in its own unit.  Coarse steps may be `passed`: none but
+        the finer ones that follow from them are used.
         """
         old, self.steps = self.steps, []
         for r, simulator in enumerate(self.simulators):
@@ -63,7 +64,10 @@ class Shooting:
             method, finest = self.method, 0.0
             if self.limits:
                 method, finest = self.limits[r].method, self.limits[r].longest / HURRY
-            trial = functools.partial(self._trial, theta, r)
+            def trial(steps: Steps, likely: bool, r: int = r) -> Response:
+                # half of what is passed is often fine
+                return self._trial(theta, r, steps, likely != passed)
+
             self.steps.append(
                 simulator.choose_steps(p, tolerance, method, known, finest, trial, scale))
         self._at = b""
@@ -102,17 +106,16 @@ class Shooting:
 
         Those at the latest θ are kept: where steps are checked the optimiser starts.
         """
-        key = (r, steps.method, steps.longest)
         at = theta.tobytes()
         if self._tried[0] != at:
             self._tried = (at, {})
         kept = self._tried[1]
-        if key in kept:
-            return kept[key]
+        for more in (True, likely):
+            if (found := kept.get((r, steps.method, steps.longest, more))) is not None:
+                return found
         active = self.columns[r][0] if likely else None
         response = self.simulators[r].run(self.problem.parameters(theta, r), active, steps, likely)
-        if likely:
-            kept[key] = response
+        kept[r, steps.method, steps.longest, likely] = response
         return response
 
     def keep(self, theta: np.ndarray, response: Response, residual: np.ndarray,
@@ -120,7 +123,7 @@ class Shooting:
         """Take over what someone else has evaluated at θ, of the only recording."""
         steps = self.steps[0]
         self._at, self._kept = theta.tobytes(), (residual, jacobian)
-        self._tried = (self._at, {(0, steps.method, steps.longest): response})
+        self._tried = (self._at, {(0, steps.method, steps.longest, True): response})
 
     def residual(self, theta: np.ndarray) -> np.ndarray:
         """(ŷ - y)/σ (rows,)."""

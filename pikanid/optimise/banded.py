@@ -74,6 +74,9 @@ class BandedAssembler:
     """
 
     def __init__(self, part: Part, families: list[Sites], b: int):
+        from pikanid.optimise import banded_products
+
+        self.compiled = banded_products  # imported once: an iterate takes little longer than that
         self.n, self.b, self.data = part.n_coefficients, b, len(part.data)
         self.order = _interleave(part, self.n)
         position = np.empty(self.n, dtype=np.int64)
@@ -84,31 +87,51 @@ class BandedAssembler:
         self.bandwidth = max([
             int((own.columns.max(axis=1) - own.columns.min(axis=1)).max())
             for own in self.stretches])
+        # what samples of a state add, whatever the iterate, but for their residuals
+        self.shown = [sites.shown for sites in families]
+        self.bases_of = [None if state is None else sites.states[state].window[1]
+                         for sites, state in zip(families, self.shown, strict=True)]
+        self.constant = np.zeros((self.n, self.bandwidth + b + 2))
+        for k, sites in enumerate(families):
+            if sites.shown is not None and sites.target is not None:
+                rows = sites.measured(np.repeat(sites.target, len(sites.states), axis=0))
+                assert rows is not None
+                self._add_products(k, rows, self.constant, np.zeros((b + 1, b + 1)))
 
     def products(self, rows: Sequence[Rows], lam: float) -> Products:
         """Multiply out all residual families, taken at λ."""
-        from pikanid.optimise.banded_products import add_products
-
         b, groups = self.b, len(rows) - self.data + 1
-        whole = np.zeros((groups, self.n, self.bandwidth + b + 2))
+        whole = np.zeros((groups, *self.constant.shape))
+        whole[0] = self.constant
         corner = np.zeros((groups, b + 1, b + 1))
         costs = []
-        for k, (own, bases, windows, row) in enumerate(zip(
-                self.stretches, self.bases, self.windows, rows, strict=True)):
-            group = max(k - self.data + 1, 0)
-            costs.append(add_products(
-                row.weight, row.factor, row.value, row.target, slopes(row.state_slopes),
-                slopes(row.theta_slopes), row.topped, bases.local, bases.offset, bases.width,
-                windows.at, own.starts, own.columns, whole[group], corner[group]))
+        for k, row in enumerate(rows):
+            state, basis = self.shown[k], self.bases_of[k]
+            if state is None or basis is None:
+                group = max(k - self.data + 1, 0)
+                costs.append(self._add_products(k, row, whole[group], corner[group]))
+            else:
+                own = self.stretches[k]
+                costs.append(self.compiled.add_slope(
+                    row.weight, row.value, row.target, basis, self.windows[k].at[state],
+                    own.starts, own.columns, whole[0, :, -1]))
+                corner[0, b, b] += costs[-1]
         return Products(whole, corner, tuple(costs), lam)
+
+    def _add_products(self, k: int, row: Rows, whole: Array, corner: Array) -> float:
+        """Add the products of family k with each other; its ‖r‖²."""
+        own, bases = self.stretches[k], self.bases[k]
+        return self.compiled.add_products(
+            row.weight, row.factor, row.value, row.target, slopes(row.state_slopes),
+            slopes(row.theta_slopes), row.topped, bases.local, bases.offset, bases.width,
+            self.windows[k].at, own.starts, own.columns, whole, corner)
 
     def normal(self, products: Products, lam: float) -> BandedNormal:
         """JᵀJ and Jᵀr of all families together, at any λ."""
         ratio, kd = 1.0 if lam == products.lam else lam / products.lam, self.bandwidth
-        whole, corner = ratio * products.whole[1], ratio * products.corner[1]
-        for k in range(0, len(products.whole), 2):  # the data, and what holds the start
-            whole += products.whole[k]
-            corner += products.corner[k]
+        whole, corner = np.empty(products.whole.shape[1:]), np.empty(products.corner.shape[1:])
+        self.compiled.add_up(products.whole, ratio, whole)
+        self.compiled.add_up(products.corner, ratio, corner)
         costs = list(products.costs)
         costs[self.data] *= ratio
         return BandedNormal(whole[:, :kd + 1].T, whole[:, kd + 1:], corner, tuple(costs))

@@ -32,7 +32,7 @@ def solve_band(factor: Array, columns: Array) -> Array:
     array([[1.],
            [2.]])
     """
-    from pikanid.optimise.banded_products import substitute
+    from pikanid.optimise.banded_solves import substitute
 
     solved = np.array(columns, dtype=float, order="C")
     substitute(factor, solved)

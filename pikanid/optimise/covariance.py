@@ -81,7 +81,12 @@ def invert(matrix: Array, inside: NDArray[np.bool_]) -> Array:
 
     Directions without any are left out.
     """
-    out, diagonal = np.zeros_like(matrix), matrix.diagonal()
+    from pikanid.optimise.small_matrices import regular_inverse
+
+    out = np.zeros_like(matrix)
+    if regular_inverse(matrix, inside, out):
+        return out
+    diagonal = matrix.diagonal()
     which, = (inside & (diagonal > 0.0)).nonzero()
     if which.size == 0:
         return out
@@ -184,7 +189,7 @@ def effective_parameters(system: BandedSystem, at: Linearisation, step: Step,
 
 def _trace_of_quotient(share: Array, band: Array) -> float:
     """tr(A⁻¹ A_d), A a band that rounding may have left just short of positive definite."""
-    from pikanid.optimise.banded_products import trace_of_quotient
+    from pikanid.optimise.banded_solves import trace_of_quotient
 
     lift = 0.0
     while math.isnan(trace := trace_of_quotient(share, band, lift)):

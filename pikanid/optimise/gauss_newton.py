@@ -84,6 +84,9 @@ class BandedSystem:
     """A functional with local bases, ready for Gauss-Newton."""
 
     def __init__(self, functional: Functional):
+        from pikanid.optimise import banded_solves, small_matrices
+
+        self.solves, self.small = banded_solves, small_matrices
         self.functional = functional
         self.columns = [functional.problem.columns(r)[1] for r in range(len(functional.parts))]
         self.families = [functional.families(r) for r in range(len(functional.parts))]
@@ -144,31 +147,28 @@ class BandedSystem:
         Raises:
             LinAlgError: If a band or the reduced matrix is not positive definite.
         """
-        from pikanid.optimise.banded_products import follow_theta, reduce_block
-        from pikanid.optimise.small_matrices import fall, free_minimum
-
         theta, b = at.point.theta, at.point.theta.size
         schur, slope, promised = np.zeros((b, b)), np.zeros(b), 0.0
         solutions, inner = [], []
         for columns, block in zip(self.columns, at.blocks, strict=True):
             solved = np.empty(block.right.shape)
-            promised += reduce_block(block.band, damping, block.right, block.corner, columns,
-                                     solved, schur, slope)
+            promised += self.solves.reduce_block(
+                block.band, damping, block.right, block.corner, columns, solved, schur, slope)
             if math.isnan(promised):
                 raise LinAlgError("a recording's band is not positive definite")
             solutions.append(solved)
             inner.append(solved[:, :-1])
         change = np.empty(b)
-        gain = free_minimum(schur, slope, theta, lower, upper, change)
+        gain = self.small.free_minimum(schur, slope, theta, lower, upper, change)
         if math.isnan(gain):  # seldom: a bound is met
             change = box_minimum(schur, slope, lower - theta, upper - theta)
-            gain = fall(schur, slope, change)
+            gain = self.small.fall(schur, slope, change)
         promised += gain
         moves = []
         for columns, order, solved in zip(self.columns, self.orders, solutions, strict=True):
             # Held coefficients, the first, are set from the initial state afterwards, exactly.
             move = np.zeros(order.size)
-            follow_theta(solved, change, columns, order, move)
+            self.solves.follow_theta(solved, change, columns, order, move)
             moves.append(move)
         return Step(tuple(moves), change, promised, schur, tuple(inner))
 
@@ -206,20 +206,23 @@ class Outcome:
     converged: bool
 
 
-def gauss_newton(system: BandedSystem, start: Point | Linearisation, lam: float, lower: Array,
-                 upper: Array, *, iterations: int = 50, tolerance: float = 1e-6) -> Outcome:
-    """Minimise Eq. (2) at one λ from a point, or from where the same system was linearised.
+def gauss_newton(system: BandedSystem, start: Point | Linearisation | Outcome, lam: float,
+                 lower: Array, upper: Array, *, iterations: int = 50, tolerance: float = 1e-6
+                 ) -> Outcome:
+    """Minimise Eq. (2) at one λ from a point, from where the same system was linearised, or on from
+    where it ended at the same λ.
 
     Converged when the promised decrease is below `tolerance` of one datum's share of the cost: the
     estimate is then within √tolerance standard errors of the minimum.  Damping starts at zero and
     grows only when a step fails.
     """
-    at = start if isinstance(start, Linearisation) and start.lam == lam else (
-        system.linearise(start, lam))
+    begin, known = (start.at, start.step) if isinstance(start, Outcome) else (start, None)
+    at = begin if isinstance(begin, Linearisation) and begin.lam == lam else (
+        system.linearise(begin, lam))
     share = 1.0 / max(1, system.functional.n_data)
     nothing = NOTHING * system.functional.data_square
     damping, done = 0.0, 0
-    step = damped_step(system, at, lower, upper, damping)
+    step = known or damped_step(system, at, lower, upper, damping)
     while step.promised > max(tolerance * share * at.cost, nothing):
         if done == iterations:
             return Outcome(at, damped_step(system, at, lower, upper, 0.0), done, False)

@@ -94,6 +94,37 @@ def strictly_inside(theta: np.ndarray, lower: np.ndarray, upper: np.ndarray,
 
 
 @_compiled
+def regular_inverse(matrix: np.ndarray, inside: np.ndarray, out: np.ndarray) -> bool:
+    """Fill out (b, b) with the inverse of the rows and columns `inside` (b,), zero elsewhere.
+
+    False unless that part is positive definite and, scaled, far from singular.
+    """
+    which = np.flatnonzero(inside)
+    size = which.size
+    root, factor = np.empty(size), np.empty((size, size))
+    if not scaled_factor(matrix, which, root, factor):
+        return False
+    for j in range(size):
+        if factor[j, j] < 1e-3:
+            return False
+    out[:] = 0.0
+    lower = np.zeros((size, size))  # the factor's inverse
+    for j in range(size):
+        for i in range(j, size):
+            rest = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                rest -= factor[i, k] * lower[k, j]
+            lower[i, j] = rest / factor[i, i]
+    for i in range(size):
+        for j in range(size):
+            total = 0.0
+            for k in range(max(i, j), size):
+                total += lower[k, i] * lower[k, j]
+            out[which[i], which[j]] = total / (root[i] * root[j])
+    return True
+
+
+@_compiled
 def inverse_diagonal(matrix: np.ndarray, inside: np.ndarray, out: np.ndarray) -> None:
     """Fill out (b,) with the diagonal of the inverse of the rows and columns `inside` (b,).
 

@@ -119,7 +119,7 @@ class Pencil:
 
     def at(self, rho: float, most: float = 0.8) -> Score | None:
         """None where the system is singular or more than `most` of the data is used."""
-        from pikanid.optimise.banded_products import penalised
+        from pikanid.optimise.banded_solves import penalised
 
         effective, residual = 0.0, self.cost
         for data, rough, right, bent, probe in self.blocks:

@@ -31,8 +31,9 @@ class HeldInput:
         # a sample time met up to rounding belongs to the interval that starts there
         slack = 1e-9 * self._spacing
         probe = shifted + (slack if side == "right" else -slack)
-        index = np.searchsorted(self.time, probe, side="right") - 1
-        return self.values[np.maximum(index, 0)]  # never beyond the last one
+        knots, values = self._levels
+        index = np.searchsorted(knots, probe, side="right") - 1
+        return values[np.maximum(index, 0)]  # never beyond the last one
 
     def slope(self, t: np.ndarray, delay: float = 0.0) -> np.ndarray:
         """du/dt inside the intervals that hold the times t."""
@@ -45,12 +46,19 @@ class HeldInput:
         return np.where(inside, slopes[index], 0.0)
 
     @functools.cached_property
+    def _levels(self) -> tuple[np.ndarray, np.ndarray]:
+        """When a held value is first met (K,), and the values: often few, and found the sooner."""
+        new = np.ones(len(self.time), bool)
+        np.not_equal(self.values[1:], self.values[:-1], out=new[1:])
+        return self.time[new], self.values[new]
+
+    @functools.cached_property
     def switches(self) -> np.ndarray:
         """Times at which the value (zero-order hold) or the slope (first-order) changes."""
         if len(self.time) < 2:
             return np.empty(0)
         if self.hold == "zero":
-            return self.time[1:][self.values[1:] != self.values[:-1]]
+            return self._levels[0][1:]
         slopes = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.time), [0.0]])
         change = np.abs(np.diff(slopes)) > 1e-9 * np.max(np.abs(slopes), initial=0.0)
         return self.time[change]

@@ -81,6 +81,8 @@ class Experiment:
     @functools.cached_property
     def _parts(self) -> list[list[tuple[HeldInput | PiecewiseInput, float]]]:
         """What each input (m,) is the sum of at the model's own parameter values, with factors."""
+        if not any(item.shaped for item in self.model.inputs):
+            return [[(held, 1.0)] for held in self.held]
         values = np.array(list(self.model.values.values()))
         found: list[list[tuple[HeldInput | PiecewiseInput, float]]] = []
         for held, item, half, rate in zip(self.held, self.model.inputs,

@@ -26,6 +26,7 @@ _HERE = Path(__file__).parent
 _LOG = logging.getLogger(__name__)
 
 
+@functools.lru_cache(maxsize=256)  # what a structure is takes longer to tell than which model
 def compiled(model: Model, method: Method = "explicit") -> ModuleType:
     """The module of compiled functions for `model`; generated at the first call ever.
 

@@ -21,6 +21,7 @@ from pikanid.simulation.input_paths import split, with_parts
 
 MethodChoice = Literal["auto", "explicit", "implicit"]
 _NOTHING = np.empty(0, np.int64)  # definition: an empty array
+SPARE = 2.0  # numerical: times less than is allowed, the error that steps are foretold for
 FORETOLD = 64  # numerical: times finer: beyond that an error is far from what the order says
 CONVERGING = 0.2  # numerical: of the error, that half the step leaves at most where all is smooth
 FINEST = 4096  # limit: sub-steps of the median interval beyond which the explicit route gives up
@@ -281,15 +282,19 @@ def _foretold(trial: Trial, tolerance: float, known: Steps, finest: float,
         error = _largest(fine.y - rough.y, unit) * 16 / 15
         enough = rough.finished and fine.finished and error <= tolerance
         return Steps(known.method, known.longest, error) if enough else None
-    ratio = min((tolerance / (4 * known.error)) ** 0.25, 0.5)
-    if ratio < 1.0 / FORETOLD or known.longest * ratio < finest:
-        return None
-    finer = Steps(known.method, known.longest * ratio)
-    rough, fine = trial(known, False), trial(finer, True)
-    if not rough.finished or not fine.finished:
-        return None
-    gap = _largest(fine.y - rough.y, unit)
-    error = gap * ratio**4 / (1 - ratio**4)
-    asymptotic = gap < 1e-3 * _largest(fine.y, unit)
-    good = asymptotic and error <= tolerance
-    return Steps(known.method, finer.longest, error) if good else None
+    error = known.error
+    for _ in range(2):  # the second time from the error that is found here
+        ratio = min((tolerance / (SPARE * error)) ** 0.25, 0.5)
+        if ratio < 1.0 / FORETOLD or known.longest * ratio < finest:
+            return None
+        finer = Steps(known.method, known.longest * ratio)
+        rough, fine = trial(known, False), trial(finer, True)
+        if not rough.finished or not fine.finished:
+            return None
+        gap = _largest(fine.y - rough.y, unit)
+        if not gap < 1e-3 * _largest(fine.y, unit):
+            return None  # far from what the order says
+        error = gap / (1 - ratio**4)
+        if error * ratio**4 <= tolerance:
+            return Steps(known.method, finer.longest, error * ratio**4)
+    return None

@@ -135,12 +135,12 @@ def physics_scale(functional: Functional, point: Point, sigma: float) -> Array:
     tops, rates, total = 0.0, 0.0, 0.0
     for r, part in enumerate(functional.parts):
         sites, c = part.physics, point.coefficients[r]
-        weight = sites.weight**2
         rows = functional.physics_rows(r, c, point.theta, 0.0)
-        f = np.nan_to_num(rows.value, posinf=0.0, neginf=0.0)
-        tops = tops + (weight * rows.target.T**2).sum(axis=0)
-        rates = rates + (weight * f**2).sum(axis=0)
-        total += weight[:, 0].sum()
+        f = sites.weight * np.where(np.isfinite(rows.value), rows.value, 0.0)
+        top = sites.weight * rows.target.T
+        tops = tops + np.einsum("me,me->e", top, top)
+        rates = rates + np.einsum("me,me->e", f, f)
+        total += float(sites.weight[:, 0] @ sites.weight[:, 0])
     size = np.sqrt(np.maximum(tops, rates) / total)
     size = np.where(size > 0.0, size, 1.0)
     return size * np.sqrt(total / functional.n_data) / sigma
@@ -251,7 +251,7 @@ def follow(system: BandedSystem, point: Point,
         if not found.converged:
             break
         # so far as is enough on the way: what then goes no further is no stage to keep
-        found = gauss_newton(system, found.at, stage.lam, system.lower, system.upper,
+        found = gauss_newton(system, found, stage.lam, system.lower, system.upper,
                              iterations=MAX_ITERATIONS)
         if found.iterations:
             found = replace(found, iterations=stage.iterations + found.iterations)

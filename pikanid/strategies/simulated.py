@@ -26,7 +26,7 @@ def choose_steps(shooting: Shooting, theta: Array) -> None:
     Raises:
         SimulationFailed: The trajectory is not finite at θ with any step.
     """
-    shooting.choose_steps(theta, "coarse")
+    shooting.choose_steps(theta, "coarse", passed=True)
     shooting.choose_steps(theta, "fine")
 
 
