@@ -231,6 +231,22 @@ def test_steps_after_an_escape_are_not_foretold() -> None:
     assert _foretold(refuse, 4e-7, Steps("explicit", 1e-3, 1.5e83), 0.0, 1.0) is None
 
 
+def test_steps_are_foretold_again_from_the_error_that_is_found() -> None:
+    """The error of the known steps was worked out too small: the first answer is not enough."""
+    tried: list[float] = []
+
+    def trial(steps: Steps, likely: bool) -> Response:
+        tried.append(steps.longest)
+        return Response(np.array([1.0 + steps.longest**4]), *[np.empty(0)] * 3)
+
+    known = Steps("explicit", 0.1, 0.1**4 / 5)
+    found = _foretold(trial, 1e-6, known, 0.0, 1.0)
+    assert found is not None and found.error == pytest.approx(found.longest**4) and (
+        found.error <= 1e-6)
+    assert sorted(set(tried)) == pytest.approx(
+        [0.1 * (1e-6 / (2 * 0.1**4)) ** 0.25, 0.1 * (1e-6 / (2 * known.error)) ** 0.25, 0.1])
+
+
 def test_steps_below_the_finest_are_not_foretold() -> None:
     """One start of many that asks for far shorter steps would take most of a fit's time."""
     def steps(finest: float) -> Steps | None:
