@@ -110,6 +110,14 @@ def test_a_law_is_as_far_as_is_wanted(motor_rig: Rig, seed: int) -> None:
     assert bench.fitted(bench.seen([hidden]), [hidden]).distance < 0.5
 
 
+def test_a_temperature_in_degc_has_neither_power_nor_sign() -> None:
+    house = pk.systems.thermal_rc()
+    rig = Rig(house, inputs(house), inputs(house, seed=1), 0.01, ())
+    hidden = {one.id for one in rig.laws(house.values)}
+    assert "static_bias" in hidden
+    assert not hidden & {"coulomb_friction", "quadratic_drag", "power_drag"}
+
+
 def test_what_cannot_be_seen_is_not_hidden(motor_rig: Rig) -> None:
     values = {n: MOTOR.values[n] for n in MOTOR.free_names}
     bench = Workbench(motor_rig.nominal, values, motor_rig.scene(values))
