@@ -16,7 +16,7 @@ from pikanid.model import Model, Parameter, systems
 from pikanid.problem.problem import bind
 from pikanid.recording import Channel, Recording, excitation
 from pikanid.simulation import Simulator, Steps, VectorField
-from pikanid.simulation.simulator import Response, _foretold
+from pikanid.simulation.simulator import SPARE, Response, _foretold
 
 pytestmark = pytest.mark.compiled
 
@@ -244,7 +244,7 @@ def test_steps_are_foretold_again_from_the_error_that_is_found() -> None:
     assert found is not None and found.error == pytest.approx(found.longest**4) and (
         found.error <= 1e-6)
     assert sorted(set(tried)) == pytest.approx(
-        [0.1 * (1e-6 / (2 * 0.1**4)) ** 0.25, 0.1 * (1e-6 / (2 * known.error)) ** 0.25, 0.1])
+        [0.1 * (1e-6 / (SPARE * e)) ** 0.25 for e in (0.1**4, known.error)] + [0.1])
 
 
 def test_steps_below_the_finest_are_not_foretold() -> None:

@@ -131,9 +131,7 @@ class Functional:
     def reweighed(self, r: int, rows: Sequence[Rows], lam: float) -> list[Rows]:
         """The families of `rows` at another λ."""
         k = len(self.parts[r].data)
-        at = rows[k]
-        physics = Rows(at.weight, self._physics_factor(lam), at.value, at.target, at.state_slopes,
-                       at.theta_slopes, at.topped)
+        physics = replace(rows[k], factor=self._physics_factor(lam))
         return [*rows[:k], physics, *rows[k + 1:]]
 
     def data_rows(self, r: int, coefficients: Array, theta: Array) -> list[Rows]:
@@ -266,9 +264,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
 
 
 def _data(sites: Sites, c: Array, p: Array) -> Rows:
-    if (plain := sites.measured_at(c)) is not None:
-        return plain
-    return _data_at(sites, sites.values(c), p)
+    return sites.measured_at(c) or _data_at(sites, sites.values(c), p)
 
 
 def _data_at(sites: Sites, values: Array, p: Array) -> Rows:

@@ -9,6 +9,8 @@ import numpy as np
 
 from pikanid.storage.jit import cached_jit
 
+SINGULAR = 1e-14  # numerical: of a diagonal entry, below which its pivot is rounding
+
 _compiled = cached_jit(error_model="numpy", nogil=True)
 _written_out = cached_jit(error_model="numpy", nogil=True, inline="always")
 
@@ -200,7 +202,7 @@ def penalised(data: np.ndarray, rough: np.ndarray, rho: float, right: np.ndarray
     data and rough are the lower bands (n, kd + 1) as in `factor_in_place`, probe (n, q) the probes
     divided by their number, right (n, q + 1) A_d times the probes and minus the data's slope, bent
     (n,) the slope of the roughness.  Returns Σ probeᵀ(A_d + ρ A_q)⁻¹ A_d probe, NaN where the
-    matrix is not positive definite, and xᵀA_d x + 2 xᵀ slope at the minimum x.
+    matrix is not positive definite beyond rounding, and xᵀA_d x + 2 xᵀ slope at the minimum x.
     """
     band, solved = data + rho * rough, right.copy()
     n, q = probe.shape
@@ -210,6 +212,8 @@ def penalised(data: np.ndarray, rough: np.ndarray, rho: float, right: np.ndarray
         return np.nan, np.nan
     used = change = 0.0
     for j in range(n):
+        if band[j, 0] < SINGULAR * (data[j, 0] + rho * rough[j, 0]):
+            return np.nan, np.nan
         for c in range(q):
             used += probe[j, c] * solved[j, c]
         total = 0.5 * data[j, 0] * solved[j, q] - right[j, q]
