@@ -46,7 +46,8 @@ INTRODUCTION = f"""# Diagnoses of other rigs
 Effects concealed by `pikanid conceal --model` in other rigs (benchmarks/rigs.py), simulated by
 SciPy, {CASES} cases at each noise: nothing, one effect, two, or a law of no catalogue. What the
 words in the tables mean is said in [diagnosis.md](diagnosis.md); *place* is the equation, or the
-channel, of right answers. Intervals are Wilson's at 95 %."""
+channel, of right answers: of several hypotheses, of the one that is the truth. Intervals are
+Wilson's at 95 %."""
 
 
 def main(folder: str, *names: str) -> None:

@@ -61,7 +61,7 @@ FRICTION, PAIR = case("coulomb_friction"), case("coulomb_friction", "input_delay
     (case("coulomb_friction", "input_delay", kind="pair", seen=(30.0, 1.0)),
      answer(["coulomb_friction"]), "visible", ""),
     (case("coulomb_friction", "input_delay", kind="pair", seen=(30.0, 1.0)),
-     answer(["quadratic_drag"], ["power_drag"], ["coulomb_friction"]), "long", ""),
+     answer(["quadratic_drag"], ["power_drag"], ["coulomb_friction"]), "long", "visible"),
     (case("coulomb_friction", "input_delay", kind="pair", seen=(30.0, 1.0)),
      answer(["input_delay"]), "wrong", "part"),
     (case("coulomb_friction", "input_delay", kind="pair", seen=(1.0, 1.0)),

@@ -9,12 +9,11 @@ import numpy as np
 
 from pikanid.storage.jit import cached_jit
 
-SINGULAR = 1e-14  # numerical: of a diagonal entry, below which its pivot is rounding
-
 _compiled = cached_jit(error_model="numpy", nogil=True)
 _written_out = cached_jit(error_model="numpy", nogil=True, inline="always")
 
 USUAL = 6  # numerical: kd + 1 of a second-order equation on the default grid: loops of known length
+SINGULAR = 1e-14  # numerical: of a diagonal entry, below which its pivot is rounding
 
 
 @_compiled

@@ -140,7 +140,7 @@ class LocalForce:
             name += "_x"
         self.places = {side: f"{name}_{side}" for side in sides}
         self.names = {side: {k: f"{name}_{side}_{k}" for k in powers} for side in sides}
-        self.of = Difference.of(argument, model.state(argument).unit, f"{name}_zero")
+        self.difference = Difference.of(argument, model.state(argument).unit, f"{name}_zero")
 
     def with_powers(self, *powers: int) -> LocalForce:
         """The same with other powers."""
@@ -176,13 +176,14 @@ class LocalForce:
 
     def candidate(self, site: Site) -> Candidate:
         """The force as an effect whose thresholds and coefficients are estimated."""
-        z, unit = f"({self.of.text}/{self.half!r})", self.of.unit
+        z, unit = f"({self.difference.text}/{self.half!r})", self.difference.unit
         terms, parameters = [], []
         for side in self.sides:
             at = self.places[side]
             up = f"max({at} - {z}, 0)" if side == BELOW else f"max({z} - {at}, 0)"
-            parameters.append(Parameter(at, -0.5 if side == BELOW else 0.5, self.of.distance,
-                                        (0.0 if side == ALIKE else -1.0, 1.0)))
+            parameters.append(Parameter(
+                at, -0.5 if side == BELOW else 0.5, self.difference.distance,
+                (0.0 if side == ALIKE else -1.0, 1.0)))
             for k, name in self.names[side].items():
                 down = f" - max(-{z} - {at}, 0)**{k}" if side == ALIKE else ""
                 terms.append(f"{name}*({up}**{k}{down})")
@@ -192,7 +193,7 @@ class LocalForce:
         text = " + ".join(terms)
         return Candidate(("local",), "a force in a region", text, "dynamics", site,
                          tuple(parameters), lambda m: m.with_parameters(
-                             *self.of.zeros).with_term(site.v, text), lambda view: (),
+                             *self.difference.zeros).with_term(site.v, text), lambda view: (),
                          known=False)
 
     def ends(self, values: Mapping[str, float]) -> tuple[float, float]:

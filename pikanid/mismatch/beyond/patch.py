@@ -143,8 +143,8 @@ class FreeCurve:
         while any(taken.startswith(self.name) for taken in model.symbols):
             self.name += "_x"
         self.names = [f"{self.name}_{k}" for k in range(3 + len(self.inner))]
-        self.of = Difference.of(argument, model.state(argument).unit if unit is None else unit,
-                                f"{self.name}_zero")
+        self.difference = Difference.of(
+            argument, model.state(argument).unit if unit is None else unit, f"{self.name}_zero")
 
     def _scaled(self, x: np.ndarray) -> np.ndarray:
         return (2 * x - self.low - self.high) / (self.high - self.low)
@@ -162,18 +162,18 @@ class FreeCurve:
 
     def of_input(self, site: Site) -> Candidate:
         """The edge as what an input does beside what is recorded of it."""
-        return self._effect(site, "input", self.of.unit, lambda m: m.map_input(
+        return self._effect(site, "input", self.difference.unit, lambda m: m.map_input(
             self.argument, function=f"{self.argument} + {self.formula}"))
 
     def of_sensor(self, site: Site) -> Candidate:
         """The edge as what an output shows beside what it should."""
-        return self._effect(site, "sensor", self.of.unit, lambda m: m.map_output(
+        return self._effect(site, "sensor", self.difference.unit, lambda m: m.map_output(
             self.argument, function=f"{self.argument} + {self.formula}"))
 
     @property
     def _shapes(self) -> list[str]:
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        z = f"(({self.of.text} - ({middle!r}))/{half!r})"
+        z = f"(({self.difference.text} - ({middle!r}))/{half!r})"
         return ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
                                             for k in map(float, self.inner))]
 
@@ -185,14 +185,14 @@ class FreeCurve:
     def _effect(self, site: Site, channel: Channel, unit: str,
                 extend: Callable[[Model], Model]) -> Candidate:
         # z is a number, but carries the unit of what it is made from
-        constant = self.of.distance if unit == self.of.unit else unit
-        own = [constant, *(units.product((unit or "1", 1), (self.of.unit or "1", -power))
+        constant = self.difference.distance if unit == self.difference.unit else unit
+        own = [constant, *(units.product((unit or "1", 1), (self.difference.unit or "1", -power))
                            for power in (2, *(3 for _ in self.names[2:])))]
         return Candidate(("patch",), "a KAN edge", self.formula, channel, site,
                          tuple(Parameter(n, 0.0, unit)
                                for n, unit in zip(self.names, own, strict=True)),
-                         lambda m: extend(m.with_parameters(*self.of.zeros)), lambda view: (),
-                         known=False)
+                         lambda m: extend(m.with_parameters(*self.difference.zeros)),
+                         lambda view: (), known=False)
 
     def extended(self, nominal: Model, site: Site, found: Hypothesis) -> Model:
         """The nominal model, at the estimates, with the edge as a B-spline."""

@@ -195,8 +195,8 @@ def _starts_still(model: Model, recording: Recording) -> bool:
            for s in model.states for q in s.initial.free_symbols):
         return False
     at = {symbol(n): value for n, value in model.values.items()}
-    at |= {symbol(n): float(recording[n].values[0]) if n in recording else 0.0
-           for n in model.input_names}
+    at |= {symbol(i.name): float(recording[i.name].values[0]) if i.name in recording
+           else i.default or 0.0 for i in model.inputs}
     at |= {symbol(s.name): s.initial.subs(at) for s in model.states}
     return all(e.subs(at).subs(TIME, recording.start).doit() == 0 for e in model.equations.values())
 

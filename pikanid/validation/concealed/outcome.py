@@ -104,7 +104,7 @@ def outcome_of(case: Mapping[str, Any], truth: Truth, answer: Answer) -> tuple[O
         return ("right" if few else "long"), ""
     visible = truth.visible
     if visible and any(same(explanation, visible) for explanation in given):
-        return ("visible" if few else "long"), ""
+        return ("visible", "") if few else ("long", "visible")
     readings = [[read(effect) for effect in explanation] for explanation in given]
     if any(same(explanation, truth.effects) for explanation in readings):
         return "formula", ""

@@ -54,7 +54,7 @@ class Score:
         reason: Of a wrong answer: `indistinguishable` (the truth's best rival, closer than 4σ: no
             method could know), `part` of the truth, `extra` effects besides it, a `family` that
             does not hide, `near` (the entry that the hidden law resembles), `nothing` is hidden,
-            or `other`.
+            or `other`; of a `long` one `visible` if only the visible part is in it.
         hypotheses: How many were given.
         probability: Of the most probable one; None where nothing is answered.
         first_is_truth: Whether that one is the truth, its visible part, or a formula of its kind.
@@ -183,7 +183,7 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
         "right": Share(len(right), len(nameable)),
         "wrong": Share(len(wrong), len(every)),
         "wrong_strictly": Share(
-            len(wrong) + sum(s.outcome == "visible" for s in every), len(every)),
+            len(wrong) + sum("visible" in (s.outcome, s.reason) for s in every), len(every)),
         "wrong_of_answers": Share(len(wrong), len(answers)),
         "wrong_but_knowable": Share(
             sum(s.reason != "indistinguishable" for s in wrong), len(every)),
