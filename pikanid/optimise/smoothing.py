@@ -19,6 +19,7 @@ from pikanid.optimise.gauss_newton import BandedSystem, Linearisation, Point, ga
 
 # The splines use all that they can of the data once a decade adds less than this share to it.
 FLAT = 1e-4  # numerical: of the effective parameters, whose trace is estimated
+STRIDE = 2.0  # numerical: decades between scores that say where the least one is
 LINEAR = 1e-6  # numerical: of the data's cost that was foretold of one step, a rise that is none
 
 
@@ -96,26 +97,29 @@ class Pencil:
                                 all_.slope - only.slope, probe / number))
 
     def search(self, ridge: float) -> Score | None:
-        """The least score, by decades and then half a decade beside it.
+        """The least score, by every other decade, and then a decade and half a one beside it.
 
         From 1e4 of `ridge` down to where less roughness changes nothing: the splines use all of the
         data that they can, or more than they may.  1e-14 is the end in any case.
         """
         found: list[Score] = []
-        for rho in ridge * 10.0 ** np.arange(4.0, -15.0, -1.0):
+        for rho in ridge * 10.0 ** np.arange(4.0, -15.0, -STRIDE):
             score = self.at(rho)
             if score is not None:
                 found.append(score)
             elif found:
                 break
             used = [score.effective for score in found]
-            if len(used) > 1 and used[-1] > 2.0 * used[0] and used[-1] < (1 + FLAT) * used[-2]:
+            if len(used) > 1 and used[-1] > 2.0 * used[0] and used[-1] < (
+                    1 + STRIDE * FLAT) * used[-2]:
                 break
         if not found:
             return None
         best = min(found, key=lambda score: score.value)
-        beside = [self.at(best.rho * factor) for factor in (10**-0.5, 10**0.5)]
-        return min([best, *filter(None, beside)], key=lambda score: score.value)
+        for decades in (1.0, 0.5):
+            beside = [self.at(best.rho * 10.0**by) for by in (-decades, decades)]
+            best = min([best, *filter(None, beside)], key=lambda score: score.value)
+        return best
 
     def at(self, rho: float, most: float = 0.8) -> Score | None:
         """None where the system is singular or more than `most` of the data is used."""
