@@ -120,19 +120,19 @@ class Functional:
 
     def rows(self, r: int, coefficients: Array, theta: Array, lam: float) -> list[Rows]:
         """All residual families of recording r with derivatives: data, physics, start."""
-        part, p = self.parts[r], self.problem.parameters(theta, r)
+        p = self.problem.parameters(theta, r)
         with np.errstate(all="ignore"):  # a wild iterate is told from its cost
-            families = [_data(sites, coefficients, p) for sites in part.data]
-            families.append(self._physics(part.physics, coefficients, p, lam))
-        if part.start is not None:
-            families.append(self._start(part.start, r, coefficients, p))
-        return families
+            return [self.family(r, k, coefficients, p, lam)
+                    for k, _ in enumerate(self.families(r))]
 
-    def reweighed(self, r: int, rows: Sequence[Rows], lam: float) -> list[Rows]:
-        """The families of `rows` at another λ."""
-        k = len(self.parts[r].data)
-        physics = replace(rows[k], factor=self._physics_factor(lam))
-        return [*rows[:k], physics, *rows[k + 1:]]
+    def family(self, r: int, k: int, c: Array, p: Array, lam: float) -> Rows:
+        """The k-th of them, at all parameters p (P,)."""
+        part = self.parts[r]
+        if k < len(part.data):
+            return _data(part.data[k], c, p)
+        if part.start is None or k == len(part.data):
+            return self._physics(part.physics, c, p, lam)
+        return self._start(part.start, r, c, p)
 
     def data_rows(self, r: int, coefficients: Array, theta: Array) -> list[Rows]:
         """The data families of recording r alone."""
@@ -150,9 +150,8 @@ class Functional:
         """Data and physics families of recording r from the states, and then tops, (n + E, M) that
         are given for each of them.
         """
-        part, p = self.parts[r], self.problem.parameters(theta, r)
+        part, p, (*seen, physics) = self.parts[r], self.problem.parameters(theta, r), values
         with np.errstate(all="ignore"):
-            *seen, physics = values
             families = [_data_at(s, v, p) for s, v in zip(part.data, seen, strict=True)]
             return [*families, self._physics_at(part.physics, physics, p, lam)]
 
@@ -161,14 +160,15 @@ class Functional:
 
     def _physics_at(self, sites: Sites, values: Array, p: Array, lam: float) -> Rows:
         n = len(self.chains.root)
-        factor, tops = self._physics_factor(lam), values[n:]
+        factor, tops = self.physics_factor(lam), values[n:]
         if self.penalty == "roughness":
             return Rows(sites.weight, factor, np.zeros(tops.T.shape), tops, None, None, True)
         assert sites.lines is not None
         f, fx, fp = sites.lines(sites.t, values[:n].T, sites.u, p)
         return Rows(sites.weight, factor, f, tops, fx, fp, True)
 
-    def _physics_factor(self, lam: float) -> Array:
+    def physics_factor(self, lam: float) -> Array:
+        """What multiplies the physics residual (E,) besides the weights of the sites."""
         return -math.sqrt(lam) / self.scale
 
     def _start(self, sites: Sites, r: int, c: Array, p: Array) -> Rows:

@@ -7,15 +7,17 @@ two knots share their columns: a stretch of them is summed up before it goes to 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pikanid.approximators import Array
-from pikanid.objective.functional import Part, Rows, Sites
+from pikanid.objective.functional import Functional, Part, Rows, Sites
+
+if TYPE_CHECKING:
+    from pikanid.simulation.native_field import NativeField
 
 Ints = NDArray[np.int64]
 
@@ -73,10 +75,13 @@ class BandedAssembler:
     state first, then all chains interleaved along time.
     """
 
-    def __init__(self, part: Part, families: list[Sites], b: int):
-        from pikanid.optimise import banded_products
+    def __init__(self, functional: Functional, r: int, b: int):
+        from pikanid.optimise import banded_families, banded_products
 
-        self.compiled = banded_products  # imported once: an iterate takes little longer than that
+        # imported once: an iterate takes little longer than that
+        self.compiled, self.evaluating = banded_products, banded_families
+        part, families = functional.parts[r], functional.families(r)
+        self.r, self.families = r, families
         self.n, self.b, self.data = part.n_coefficients, b, len(part.data)
         self.order = _interleave(part, self.n)
         position = np.empty(self.n, dtype=np.int64)
@@ -89,8 +94,6 @@ class BandedAssembler:
             for own in self.stretches])
         # what samples of a state add, whatever the iterate, but for their residuals
         self.shown = [sites.shown for sites in families]
-        self.bases_of = [None if state is None else sites.states[state].window[1]
-                         for sites, state in zip(families, self.shown, strict=True)]
         self.constant = np.zeros((self.n, self.bandwidth + b + 2))
         for k, sites in enumerate(families):
             if sites.shown is not None and sites.target is not None:
@@ -98,25 +101,53 @@ class BandedAssembler:
                 assert rows is not None
                 self._add_products(k, rows, self.constant, np.zeros((b + 1, b + 1)))
 
-    def products(self, rows: Sequence[Rows], lam: float) -> Products:
-        """Multiply out all residual families, taken at λ."""
-        b, groups = self.b, len(rows) - self.data + 1
+    def products(self, functional: Functional, c: Array, theta: Array, lam: float) -> Products:
+        """Multiply out all residual families at coefficients c (n,), θ and λ.
+
+        `functional` has the sites of the one that the sparsity was read from.
+        """
+        b, groups = self.b, len(self.families) - self.data + 1
         whole = np.zeros((groups, *self.constant.shape))
         whole[0] = self.constant
         corner = np.zeros((groups, b + 1, b + 1))
-        costs = []
-        for k, row in enumerate(rows):
-            state, basis = self.shown[k], self.bases_of[k]
-            if state is None or basis is None:
-                group = max(k - self.data + 1, 0)
-                costs.append(self._add_products(k, row, whole[group], corner[group]))
+        p, costs = functional.problem.parameters(theta, self.r), []
+        for k, sites in enumerate(functional.families(self.r)):
+            if self.shown[k] is not None:
+                cost = self._add_samples(k, sites, c, whole[0, :, -1])
+                corner[0, b, b] += cost
             else:
-                own = self.stretches[k]
-                costs.append(self.compiled.add_slope(
-                    row.weight, row.value, row.target, basis, self.windows[k].at[state],
-                    own.starts, own.columns, whole[0, :, -1]))
-                corner[0, b, b] += costs[-1]
+                group = max(k - self.data + 1, 0)
+                native = sites.lines.native if sites.lines and k == self.data else None
+                if native is not None and functional.penalty == "physics":
+                    cost = self._add_equations(k, sites, native, c, p,
+                                               functional.physics_factor(lam), whole[group],
+                                               corner[group])
+                else:
+                    with np.errstate(all="ignore"):  # a wild iterate is told from its cost
+                        row = functional.family(self.r, k, c, p, lam)
+                    cost = self._add_products(k, row, whole[group], corner[group])
+            costs.append(cost)
         return Products(whole, corner, tuple(costs), lam)
+
+    def _add_samples(self, k: int, sites: Sites, c: Array, slope: Array) -> float:
+        """Add Jᵀr of family k, samples of a state; its ‖r‖²."""
+        state, own = self.shown[k], self.stretches[k]
+        assert state is not None and sites.target is not None
+        first, basis = sites.states[state].window
+        return self.evaluating.add_samples(
+            sites.weight, sites.target, first, basis, c, self.windows[k].at[state], own.starts,
+            own.columns, slope)
+
+    def _add_equations(self, k: int, sites: Sites, native: NativeField, c: Array, p: Array,
+                       factor: Array, whole: Array, corner: Array) -> float:
+        """Add the products of family k, a smooth model's equations, without rows; its ‖r‖²."""
+        own, bases = self.stretches[k], sites.bases
+        assert bases is not None
+        # registers of its own for every call: threads may share the field
+        return self.evaluating.add_equations(
+            native.code, native.at, native.r.copy(), native.d.copy(), sites.t, sites.u, p, c,
+            bases.first, bases.local, bases.offset, bases.width, sites.weight, factor,
+            self.windows[k].at, own.starts, own.columns, whole, corner)
 
     def _add_products(self, k: int, row: Rows, whole: Array, corner: Array) -> float:
         """Add the products of family k with each other; its ‖r‖²."""

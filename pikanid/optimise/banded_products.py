@@ -67,25 +67,6 @@ def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, targ
 
 
 @_compiled
-def add_slope(weight: np.ndarray, value: np.ndarray, target: np.ndarray, local: np.ndarray,
-              at: int, starts: np.ndarray, columns: np.ndarray, right: np.ndarray) -> float:
-    """Add Jᵀr of samples of a state to right (n,); their ‖r‖².
-
-    r is weight (M, 1) times (value (M, 1) - target (1, M)), local (M, width) the state's basis; the
-    rest is as in `add_products`.
-    """
-    cost = 0.0
-    for g in range(columns.shape[0]):
-        for m in range(starts[g], starts[g + 1]):
-            residual = weight[m, 0] * (value[m, 0] - target[0, m])
-            cost += residual**2
-            scaled = weight[m, 0] * residual
-            for a in range(local.shape[1]):
-                right[columns[g, at + a]] += scaled * local[m, a]
-    return cost
-
-
-@_compiled
 def add_up(groups: np.ndarray, ratio: float, out: np.ndarray) -> None:
     """Fill out (n, k) with the sum of all groups (G, n, k), the second one times a ratio."""
     for m in range(out.shape[0]):

@@ -13,6 +13,7 @@ together take 0.23 ms and 1.0 ms.
 from __future__ import annotations
 
 import copy
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -58,15 +59,21 @@ class Eliminated(NamedTuple):
 class Linearisation:
     """Eq. (2) and its Gauss-Newton model at a point."""
 
+    functional: Functional
     point: Point
     lam: float
-    rows: tuple[Sequence[Rows], ...]  # per recording, per family
     products: tuple[Products, ...]  # per recording
     blocks: tuple[Eliminated, ...]
     data_costs: tuple[tuple[float, ...], ...]  # per recording, per data family
     data_cost: float  # their sum
     physics_cost: float
     cost: float  # ‖r‖², all families together
+
+    @functools.cached_property
+    def rows(self) -> tuple[Sequence[Rows], ...]:
+        """Per recording, per family: what was summed up, for the few points that need it."""
+        return tuple(self.functional.rows(r, c, self.point.theta, self.lam)
+                     for r, c in enumerate(self.point.coefficients))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +98,7 @@ class BandedSystem:
         self.columns = [functional.problem.columns(r)[1] for r in range(len(functional.parts))]
         self.families = [functional.families(r) for r in range(len(functional.parts))]
         self.assemblers = [
-            BandedAssembler(part, families, columns.size) for part, families, columns
-            in zip(functional.parts, self.families, self.columns, strict=True)]
+            BandedAssembler(functional, r, columns.size) for r, columns in enumerate(self.columns)]
         self.start_moves = functional.start_moves
         self.counts = [len(part.data) for part in functional.parts]
         self.lower, self.upper = functional.problem.lower, functional.problem.upper
@@ -108,18 +114,13 @@ class BandedSystem:
         """Residuals and normal equations at a point, or at another λ where they are known."""
         point = at if isinstance(at, Point) else at.point
         blocks, data, seen, physics, cost = [], [], 0.0, 0.0, 0.0
-        families, multiplied = [], []
+        multiplied = []
         for r, (part, c) in enumerate(zip(self.functional.parts, point.coefficients, strict=True)):
             assembler = self.assemblers[r]
-            if isinstance(at, Point):
-                rows = self.functional.rows(r, c, point.theta, lam)
-                products = assembler.products(rows, lam)
-            else:
-                rows = self.functional.reweighed(r, at.rows[r], lam)
-                products = at.products[r]
+            products = (assembler.products(self.functional, c, point.theta, lam)
+                        if isinstance(at, Point) else at.products[r])
             normal = assembler.normal(products, lam)
             held = self.functional.hold_jacobian(r, point.theta) if self.start_moves else None
-            families.append(rows)
             multiplied.append(products)
             blocks.append(_eliminate(normal, part.held.size, held))
             count = self.counts[r]
@@ -127,7 +128,7 @@ class BandedSystem:
             seen += sum(normal.costs[:count])
             physics += normal.costs[count]
             cost += sum(normal.costs)
-        return Linearisation(point, lam, tuple(families), tuple(multiplied), tuple(blocks),
+        return Linearisation(self.functional, point, lam, tuple(multiplied), tuple(blocks),
                              tuple(data), seen, physics, cost)
 
     def moved(self, point: Point, step: Step) -> Point:

@@ -173,19 +173,19 @@ class Linearised:
     """Some rows of f or h and their derivatives by the states and by some parameters.
 
     `state` is the one that a single row shows as it is; None for any other formula, or several.
-    Smooth models run from machine code.  NumPy's warnings are for the caller to silence: once for
-    all that is evaluated.
+    Smooth models run from machine code, `native`, which others have none of.  NumPy's warnings are
+    for the caller to silence: once for all that is evaluated.
     """
 
     def __init__(self, functions: _Functions, name: Literal["f", "h"], rows: tuple[int, ...],
                  free: tuple[int, ...]):
         only = functions.exprs[name][rows[0]] if len(rows) == 1 else None
         self.state = functions.x.index(only) if only in functions.x else None
-        self._native: NativeField | None = None
+        self.native: NativeField | None = None
         if can_run(functions.model) and not functions.lowered.switches:
             from pikanid.simulation.native_field import NativeField
 
-            self._native = NativeField(tape(Structure(functions.model)), name, rows, free)
+            self.native = NativeField(tape(Structure(functions.model)), name, rows, free)
             return
         places, self._function, self._edges = functions.table(name)
         self._functions, self._rows = functions, rows
@@ -203,8 +203,8 @@ class Linearised:
     def __call__(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values (M, E), ∂/∂x (M, E, n) and ∂/∂p (M, E, b)."""
-        if self._native is not None:
-            return self._native(t, x, u, p)
+        if self.native is not None:
+            return self.native(t, x, u, p)
         shape = (*t.shape, self._size)
         values = np.empty(shape)
         jx, jp = np.zeros((*shape, self._n)), np.zeros((*shape, self._b))
