@@ -36,3 +36,16 @@ def test_without_parameters_the_cost_is_that_of_the_residual() -> None:
     found = minimise(lambda q: np.array([3.0, 4.0]), lambda q: np.empty((2, 0)), none, none, none)
     assert (found.cost, found.converged, found.evaluations) == (12.5, True, 1)
     assert found.theta.shape == (0,)
+
+
+def test_a_fit_that_another_one_follows_ends_where_a_step_promises_too_little() -> None:
+    """A line whose residual has a part that no step removes: ½·4² of it, and ½·3² that one does."""
+    wide = np.full(1, 100.0)
+
+    def found(enough: float) -> float:
+        return float(minimise(lambda q: np.array([q[0], 4.0]), lambda q: np.array([[1.0], [0.0]]),
+                              np.array([3.0]), -wide, wide, enough=enough).theta[0])
+
+    share = 3.0**2 / (3.0**2 + 4.0**2)
+    assert found(1.01 * share) == 3.0
+    assert found(0.99 * share) == pytest.approx(0.0, abs=1e-9)

@@ -25,9 +25,9 @@ FLAT = 1e-15  # numerical: cosine of the angle between r and every column, at wh
 EPS = float(np.finfo(float).eps)  # definition: of numbers
 # rows of the points (8, n)
 (THETA, TRIAL, LOWER, UPPER, DIAG, NORMS, QTR, STEP) = range(8)  # definition: positions
-# entries of the state (9,)
+# entries of the state (10,)
 (COST, RADIUS, PAR, SIZE, SLOPE, COUNT, MOVED, LIMIT,
- TOLERANCE) = range(9)  # definition: positions
+ TOLERANCE, ENOUGH) = range(10)  # definition: positions
 
 
 class Descent:
@@ -38,14 +38,15 @@ class Descent:
         rows: Number of residuals, at least n.
         tolerance: Relative change of θ and of the cost at which to stop.
         limit: Evaluations allowed.
+        enough: Share of |r|² that a whole Gauss-Newton step must promise, else this is the end.
     """
 
     def __init__(self, start: np.ndarray, lower: np.ndarray, upper: np.ndarray, rows: int,
-                 tolerance: float, limit: int):
+                 tolerance: float, limit: int, enough: float = 0.0):
         n = len(start)
-        self.points, self.state = np.zeros((8, n)), np.zeros(9)
+        self.points, self.state = np.zeros((8, n)), np.zeros(10)
         self.points[:4] = start, start, lower, upper
-        self.state[LIMIT], self.state[TOLERANCE] = limit, tolerance
+        self.state[LIMIT:] = limit, tolerance, enough
         self.table = np.empty((n + 1, rows))
         # what `go_on` takes besides r and J
         self.work = (self.table, self.points, self.state, np.empty((2, n), np.int64),
@@ -121,12 +122,13 @@ def go_on(told: int, r: np.ndarray, columns: np.ndarray, table: np.ndarray, poin
 @inner
 def _linearise(norm: float, table: np.ndarray, points: np.ndarray, state: np.ndarray,
                order: np.ndarray, R: np.ndarray) -> int:
-    """Factors of J, the norms of its columns, and the test of the gradient."""
+    """Factors of J, the norms of its columns, and the tests of the gradient and of the promise."""
     n, norms, diag = order.size, points[NORMS], points[DIAG]
     factor(table, order, R)
-    slope = 0.0
+    slope, promised = 0.0, 0.0
     for j in range(n):
         points[QTR, j] = table[n, j]
+        promised += table[n, j] ** 2
         square, along = 0.0, 0.0
         for i in range(j + 1):
             square += R[i, j] ** 2
@@ -144,7 +146,9 @@ def _linearise(norm: float, table: np.ndarray, points: np.ndarray, state: np.nda
     for j in range(n):
         diag[j] = max(diag[j], norms[j])
     state[SLOPE] = slope
-    return CONVERGED if slope <= FLAT else EVALUATE
+    if slope <= FLAT or promised <= state[ENOUGH] * norm**2:
+        return CONVERGED
+    return EVALUATE
 
 
 @inner

@@ -29,13 +29,15 @@ class Optimum:
 
 
 def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.ndarray,
-             upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100) -> Optimum:
+             upper: np.ndarray, tolerance: float = 1e-9, limit: int = 100, enough: float = 0.0
+             ) -> Optimum:
     """Minimise ½|r(θ)|² within bounds from `start` (n,).
 
     Args:
         residual, jacobian: θ (n,) -> r (rows,) and ∂r/∂θ (rows, n).
         tolerance: Relative change of θ and of the cost at which to stop.
         limit: Evaluations allowed.
+        enough: Share of the cost that a step must promise, for a fit that another one follows.
 
     >>> found = minimise(lambda q: np.array([q[0] - 3.0]), lambda q: np.ones((1, 1)),
     ...                  np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -50,7 +52,7 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
     if len(r) >= len(start):
         from pikanid.optimise.lmder import CONVERGED, EVALUATE, LINEARISE, Descent
 
-        descent = Descent(theta, lower, upper, len(r), tolerance, limit)
+        descent = Descent(theta, lower, upper, len(r), tolerance, limit, enough)
         told = descent.linearise(r, jacobian(theta))
         while told == EVALUATE:
             r = residual(descent.trial)

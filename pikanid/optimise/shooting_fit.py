@@ -14,21 +14,21 @@ from pikanid.simulation.simulator import Response
 SHORT = 20_000  # limit: sub-steps of a simulation; Python's part is small beyond, and hears Ctrl-C
 
 
-def fit_shooting(shooting: Shooting, start: np.ndarray, tolerance: float = 1e-9, limit: int = 100
-                 ) -> Optimum:
-    """The local optimum from `start` (n,) within the bounds of θ."""
+def fit_shooting(shooting: Shooting, start: np.ndarray, tolerance: float = 1e-9, limit: int = 100,
+                 enough: float = 0.0) -> Optimum:
+    """The local optimum from `start` (n,) within the bounds of θ; the rest as for `minimise`."""
     lower, upper = shooting.problem.lower, shooting.problem.upper
     theta = np.minimum(np.maximum(start, lower), upper)
-    reached = _compiled(shooting, theta, lower, upper, tolerance, limit)
+    reached = _compiled(shooting, theta, lower, upper, tolerance, limit, enough)
     if reached is None:
         return minimise(
-            shooting.residual, shooting.jacobian, theta, lower, upper, tolerance, limit)
+            shooting.residual, shooting.jacobian, theta, lower, upper, tolerance, limit, enough)
     return inside(reached, shooting.residual, shooting.jacobian, theta, lower, upper, tolerance,
                   limit)
 
 
 def _compiled(shooting: Shooting, theta: np.ndarray, lower: np.ndarray, upper: np.ndarray,
-              tolerance: float, limit: int) -> Optimum | None:
+              tolerance: float, limit: int, enough: float) -> Optimum | None:
     """Where MINPACK ends from θ; None where parameters move more than the states, and the like."""
     simulator, steps, (active, own) = (
         shooting.simulators[0], shooting.steps[0], shooting.columns[0])
@@ -47,7 +47,7 @@ def _compiled(shooting: Shooting, theta: np.ndarray, lower: np.ndarray, upper: n
     address = integrate_address(integrate)
     if not address:
         return None
-    descent = Descent(theta, lower, upper, rows, tolerance, limit)
+    descent = Descent(theta, lower, upper, rows, tolerance, limit, enough)
     X, Y = np.empty((2, len(grid.T), len(experiment.model.states))), np.empty((2, rows))
     flat, r, columns = np.empty((2, rows * n)), np.empty((2, rows)), np.empty((2, n, rows))
     J = flat.reshape(2, rows, n)

@@ -32,6 +32,8 @@ from pikanid.strategies.starts import starting_points
 from pikanid.uncertainty.settings import USUAL as UNCERTAINTY
 from pikanid.uncertainty.settings import UncertaintySettings
 
+ROUGH = 1e-3  # numerical: relative change of θ and of the cost at which finer steps are due
+
 
 @dataclass(frozen=True)
 class NLS:
@@ -126,14 +128,15 @@ class NLS:
         if self.segments > 1:
             led = multiple_shooting(shooting, start, self.segments)
             theta = start if led is None else led
-        passes: list[tuple[Accuracy, float]] = [
-            ("coarse", max(1e-3, self.tolerance)), ("fine", self.tolerance)]
-        for accuracy, tolerance in passes:
+        # the first pass leaves its last step to the other one
+        passes: list[tuple[Accuracy, float, float]] = [
+            ("coarse", max(ROUGH, self.tolerance), ROUGH), ("fine", self.tolerance, 0.0)]
+        for accuracy, tolerance, enough in passes:
             try:
                 shooting.choose_steps(theta, accuracy)
             except errors.SimulationFailed:
                 return None
-            found = fit_shooting(shooting, theta, tolerance, self.max_evaluations)
+            found = fit_shooting(shooting, theta, tolerance, self.max_evaluations, enough)
             evaluations += found.evaluations
             theta = found.theta
         assert found is not None
