@@ -15,7 +15,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
                      "hysteresis:bouc_wen", "smooth_friction", "stick_slip_friction",
                      "position_friction"),
     "drag": ("quadratic_drag", "power_drag", "amplitude_damping", "boundary_layer",
-             "fluid_memory", "position_friction"),
+             "fluid_memory", "fading_memory", "position_friction"),
     "restoring force": ("cubic_stiffness", "quintic_stiffness", "even_stiffness", "wall_impact",
                         "hard_stop", "cogging", "cable_drag", "magnet", "asymmetric_spring"),
     "constant force": ("static_bias", "sensor_offset", "one_way_friction"),
