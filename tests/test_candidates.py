@@ -176,6 +176,19 @@ def test_a_constant_force_beside_friction_need_not_be_in_balance() -> None:
     assert held.applied(model).equations == free.applied(model).equations
 
 
+def test_a_constant_force_is_in_balance_when_the_recording_begins_though_parameters_drift() -> None:
+    """The initial value is no formula of time; at its first instant nothing moves."""
+    model = systems.sloshing()
+    by_key = {c.key: c for c in made(model)}
+    wider = by_key["static_bias"].applied(by_key["parameter_drift[l_theta]"].applied(model))
+    values = {**wider.values, "bias": 0.02, "r_l_theta": 0.1}
+    start = wider.state("theta").initial.subs({symbol(n): v for n, v in values.items()})
+    assert start.is_number
+    p, x = np.array([values[n] for n in wider.parameter_names]), np.array([[float(start), 0.0]])
+    force = VectorField(wider).rhs(np.zeros(1), x, np.zeros((1, 2)), p)[0, 1]
+    assert abs(force) < 1e-6 * abs(values["bias"])
+
+
 @pytest.mark.parametrize("x, force", [(0.3, -2.0), (-0.3, 2.0), (0.1, 0.0), (-0.05, 0.0)])
 def test_walls_on_both_sides_push_back_from_either(x: float, force: float) -> None:
     wall = {c.key: c for c in made(systems.sloshing())}["wall_impact[both sides]"]

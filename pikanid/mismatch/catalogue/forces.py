@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import sympy as sp
 
-from pikanid.formula.expressions import symbol
+from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, Powers, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -63,6 +63,7 @@ def static_bias(site: Site) -> list[Candidate]:
             return model
         still = {symbol(n): sp.Integer(0) for n in (*model.state_names, *model.input_names)
                  if n != site.q}
+        still[TIME] = sp.Float(site.span[0])  # where other effects have parameters change
         force = model.equations[site.v].xreplace(still)
         near = symbol(b.name) / k
         at = {symbol(site.q): near}
