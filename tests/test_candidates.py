@@ -209,3 +209,18 @@ def test_a_stiffness_of_its_own_is_an_explanation_beside_another_only() -> None:
     stiffness = by_key["linear_stiffness"]
     assert not stiffness.suits() and not stiffness.suits([by_key["coulomb_friction"]])
     assert stiffness.suits([by_key["wall_impact"]]) and not stiffness.known
+
+
+def test_a_coordinate_beside_another_is_not_in_balance_by_itself() -> None:
+    """A constant torque on one of two masses on a shaft moves both; liquid in two directions rests
+    in either.
+    """
+    apart = systems.sloshing_2d()
+    leaning = {c.key: c for c in made(apart)}["static_bias_theta"].applied(apart)
+    assert leaning.state("theta").initial != 0
+    drive = systems.two_mass_drive()
+    moved = pk.Recording.from_arrays(np.arange(9.0), {"tau": np.arange(9.0)}, {"tau": "N*m"})
+    found = candidates(sites(drive, (pk.simulate(drive, moved),)))
+    pushed = {c.key: c for c in found}["static_bias_phi_m"].applied(drive)
+    assert pushed.state("phi_m").initial == 0
+    assert pushed.equations["omega_m"] == drive.equations["omega_m"] + symbol("bias_phi_m")

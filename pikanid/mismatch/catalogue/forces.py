@@ -54,8 +54,8 @@ def static_bias(site: Site) -> list[Candidate]:
     """
     b = Parameter(site.name("bias"), 0.0, site.force_unit)
     k = site.stiffness
-    # without a restoring force there is no balance to start in
-    balanced = site.rest and site.rate > 0
+    # without a restoring force there is no balance to start in, beside others not in q alone
+    balanced = site.rest and site.rate > 0 and site.alone
 
     def extend(model: Model) -> Model:
         model = model.with_term(site.v, b.name)

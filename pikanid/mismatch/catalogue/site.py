@@ -28,6 +28,8 @@ class Site:
         extra: Recorded channels that the model does not use.
         rate: Natural frequency at the guesses [rad/s]; 0 without a restoring force.
         rest: Whether the model starts in equilibrium.
+        alone: Whether a little of q leaves every other state at rest, so that what holds q in
+            balance holds the model.
         still: Whether it does under the first values of its inputs as well, in every recording:
             only then is an input that comes late the same as an output that does.
         span: First and last time [s] of the first recording.
@@ -45,6 +47,7 @@ class Site:
     extra: tuple[str, ...]
     rate: float
     rest: bool
+    alone: bool
     still: bool
     span: tuple[float, float]
     half_range: float
@@ -164,8 +167,10 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
     k = -float(slope) if slope.is_number else 0.0
     force = _at_rest(model, a)
     starts = [s.initial for s in model.states if s.name in (q, v)]
+    alone = all(_at_rest(model, e.diff(symbol(q))).subs(at) == 0
+                for n, e in model.equations.items() if n not in (q, v))
     return Site(model, q, v, output, inputs, extra, k**0.5 if k > 0 else 0.0,
-                sp.simplify(force) == 0 and all(e == 0 for e in starts),
+                sp.simplify(force) == 0 and all(e == 0 for e in starts), alone,
                 all(_starts_still(model, r) for r in recordings),
                 (first.start, first.stop), _swing(first, output.name),
                 _interval(first, output.name), suffix)
