@@ -98,9 +98,9 @@ class Model(Operations):
             n: e if checked.holds(e := self.equations[n]) else to_real(e, f"The equation of '{n}'")
             for n in order}))
         validate(self, checked)
-        model_units.check(part for part in (
+        parts: tuple[State | Input | Parameter | Output, ...] = (
             *self.states, *self.inputs, *self.parameters, *self.outputs)
-            if not checked.holds(part))
+        model_units.check(part for part in parts if not checked.holds(part))
         for name, value in model_units.coherent(self).items():
             put(self, name, MappingProxyType(value) if name == "equations" else value)
 
