@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,13 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.descent import descended
-from pikanid.mismatch.fitting.hypothesis import extended, fitted, read_otherwise, turned
+from pikanid.mismatch.fitting.hypothesis import (
+    Hypothesis,
+    extended,
+    fitted,
+    read_otherwise,
+    turned,
+)
 from pikanid.mismatch.search.screen import Screen, law
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
@@ -178,3 +185,15 @@ def test_a_leak_reaches_a_second_mode_or_not_as_the_recording_shows(directly: bo
     assert found.values["kappa_u_y"] == pytest.approx(0.6, abs=0.01)
     assert found.values["omega_2"] == pytest.approx(46.0, abs=0.5)
     assert read_otherwise((leak,)) == (leak,)
+
+
+def test_a_fit_is_no_better_by_less_than_fits_stop_at() -> None:
+    def left(chi2: float) -> SimpleNamespace:
+        return SimpleNamespace(minimum=SimpleNamespace(chi2=chi2), whitened=SimpleNamespace(
+            rows=500, settings=DEFAULTS))
+
+    def improves(chi2: float, known: float) -> bool:
+        return Hypothesis.improves_on(left(chi2), left(known))  # type: ignore[arg-type]
+
+    assert improves(499.8, 500.0) and not improves(499.96, 500.0)
+    assert improves(4998.9, 5000.0) and not improves(4999.1, 5000.0)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from pikanid import errors
 from pikanid.formula.expressions import FUNCTIONS, check_name, parse, symbol, to_real, to_text
 from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
+from pikanid.formula.remembered import parse_again
 
 NAMES = {"x", "y", "k"}
 X, Y = symbol("x"), symbol("y")
@@ -210,3 +211,11 @@ def test_derivatives_of_own_functions_agree_with_differences(expr: sp.Expr) -> N
             ahead = value(x + h * shift[0], y + h * shift[1])
             back = value(x - h * shift[0], y - h * shift[1])
             assert slope(x, y) == pytest.approx((ahead - back) / (2 * h), rel=1e-7, abs=1e-8)
+
+
+def test_a_formula_that_was_read_before_is_refused_where_its_names_are_none() -> None:
+    assert parse_again("k*x", {"k", "x"}, "equation of x") == parse("k*x", {"k", "x"}, "there")
+    with pytest.raises(errors.BadModel, match="equation of y"):
+        parse_again("k*x", {"k", "y"}, "equation of y")
+    with pytest.raises(errors.BadModel, match="equation of z"):
+        parse_again("k*x", {"k", "z"}, "equation of z")

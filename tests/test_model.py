@@ -108,6 +108,21 @@ def test_operations_leave_the_model_as_it_was() -> None:
     assert model.to_dict() == before
 
 
+def test_what_is_new_in_a_model_made_from_another_is_checked() -> None:
+    model = systems.sloshing()
+    first, *others = model.parameters
+    for changes, message in (
+            ({"parameters": tuple(others)}, first.name),  # equations hold it
+            ({"parameters": (Parameter(first.name, float("nan")), *others)}, first.name),
+            ({"equations": {**model.equations, "theta": sp.Symbol("nowhere")}}, "nowhere"),
+            ({"states": model.states[1:]}, model.states[0].name)):
+        with pytest.raises(errors.BadModel, match=message):
+            model.replace(**changes)
+    with pytest.raises(TypeError, match="colour"):
+        model.replace(colour="red")
+    assert model.replace(parameters=model.parameters[::-1]).parameters[-1] is first
+
+
 def test_equal_models_are_equal_and_hash_alike() -> None:
     assert systems.sloshing() == systems.sloshing()
     assert hash(systems.sloshing()) == hash(systems.sloshing())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, get_args
 
@@ -25,11 +26,52 @@ MOST = {"states": 1000, "inputs": 200, "parameters": 20_000, "outputs": 500, "sp
         "knots": 10_000}  # limit: numbers of entries in a model
 MAX_DEGREE = 20  # limit: of a spline
 
-def check_types(model: Lookup) -> None:
+@dataclass(frozen=True)
+class Checked:
+    """What need not be checked again in a model that is made from another one.
+
+    Attributes:
+        model: The other one, if there is one.
+        parts: Its parts and right-hand sides, by their identity: two that are equal need not be of
+            one type.
+    """
+
+    model: Lookup | None = None
+    parts: frozenset[int] = frozenset()
+
+    @classmethod
+    def of(cls, model: Lookup) -> Checked:
+        """All that a model holds."""
+        return cls(model, frozenset(map(id, (
+            *model.states, *model.inputs, *model.parameters, *model.outputs, *model.splines,
+            *model.effects, *model.equations.values()))))
+
+    def holds(self, part: Any) -> bool:
+        """Whether a part was checked by itself."""
+        return id(part) in self.parts
+
+    def named(self, model: Lookup) -> Checked:
+        """What need not be looked up again: nothing, where a name is gone or stands for another
+        kind of thing.
+        """
+        before = self.model
+        if before is None or any(not {p.name for p in old} <= {p.name for p in new}
+                                 for old, new in ((before.states, model.states),
+                                                  (before.inputs, model.inputs),
+                                                  (before.parameters, model.parameters),
+                                                  (before.splines, model.splines))):
+            return Checked()
+        return self
+
+
+def check_types(model: Lookup, checked: Checked) -> None:
     """Raise `BadModel` unless every part of the model is of its type, and of a sensible size.
 
     Formulas are left to `pikanid.formula.expressions.to_real`.
     """
+    def new(items: Iterable[Any]) -> list[Any]:
+        return [item for item in items if not checked.holds(item)]
+
     entry(model.name, "The model's name").text(longest=MAX_NAME)
     entry(model.equations, "The equations").table(optional=None, most=MOST["states"])
     parts: list[tuple[str, tuple[Any, ...]]] = [
@@ -40,14 +82,14 @@ def check_types(model: Lookup) -> None:
             raise errors.BadModel(errors.too_many_entries(
                 f"The model's list of {section}", len(items), MOST[section]))
         what = section.rstrip("s")
-        for item in items:
+        for item in new(items):
             check_name(item.name, what)
             if section != "splines":
                 entry(item.unit, f"The unit of {what} '{item.name}'").text()
-    for item in model.inputs:
+    for item in new(model.inputs):
         if item.default is not None:
             entry(item.default, f"The default of input '{item.name}'").number()
-    for p in model.parameters:
+    for p in new(model.parameters):
         entry(p.value, f"The value of parameter '{p.name}'").number()
         entry(p.description, f"The description of parameter '{p.name}'").text()
         bounds = entry(p.bounds, f"The bounds of parameter '{p.name}'")
@@ -55,16 +97,16 @@ def check_types(model: Lookup) -> None:
             raise bounds.fail("[lower, upper]")
         for bound in bounds.items():
             bound.number(finite=False)
-    for o in model.outputs:
+    for o in new(model.outputs):
         if o.sigma is not None:
             sigma = entry(o.sigma, f"The sigma of output '{o.name}'")
             if sigma.number() <= 0:
                 raise sigma.fail("positive (or left out)")
-    for effect in model.effects:
+    for effect in new(model.effects):
         if not isinstance(effect, Effect | EffectForm):
             raise errors.BadModel(errors.not_of_kind(
                 "An effect of the model", type(effect).__name__, "a pikanid.Effect"))
-    for s in model.splines:
+    for s in new(model.splines):
         degree = entry(s.degree, f"The degree of spline '{s.name}'")
         if not is_integer(s.degree) or not 1 <= s.degree <= MAX_DEGREE:
             raise degree.fail(f"an integer, degree >= 1 and <= {MAX_DEGREE}")
@@ -77,33 +119,39 @@ def entry(value: Any, where: str) -> Entry:
     return Entry(value, where, errors.BadModel)
 
 
-def validate(model: Lookup) -> None:
+def validate(model: Lookup, checked: Checked) -> None:
     """Raise `BadModel` unless names, symbols, values and bounds of the model are consistent."""
     if not model.states:
         raise errors.BadModel(errors.no_states())
     if not model.outputs:
         raise errors.BadModel(errors.no_outputs())
     _check_names(model)
+    checked = checked.named(model)
+
+    def new(items: Iterable[Any]) -> list[Any]:
+        return [item for item in items if not checked.holds(item)]
+
     everything = model.symbols | {TIME.name}
     constants = set(model.parameter_names)
     start = constants | set(model.input_names)
     for name, expr in model.equations.items():
-        _check_symbols(expr, everything, f"The equation of '{name}'", model)
-    for output in model.outputs:
+        if not checked.holds(expr):
+            _check_symbols(expr, everything, f"The equation of '{name}'", model)
+    for output in new(model.outputs):
         _check_symbols(output.expression, everything, f"Output '{output.name}'", model)
         _check_symbols(output.delay, constants, f"The delay of output '{output.name}'", model)
-    for state in model.states:
+    for state in new(model.states):
         _check_symbols(state.initial, start, f"The initial value of '{state.name}'", model)
         if splines := state.initial.atoms(AppliedUndef):
             raise errors.BadModel(errors.spline_at_start(state.name, str(splines.pop())))
-    for item in model.inputs:
+    for item in new(model.inputs):
         for what, formula in (("delay", item.delay), ("backlash", item.backlash),
                               ("rate limit", item.rate_limit)):
             _check_symbols(formula, constants, f"The {what} of input '{item.name}'", model)
         if item.hold not in get_args(Hold):
             raise errors.BadModel(errors.bad_value(
                 f"The hold of input '{item.name}'", item.hold, "'zero', 'first' or 'cubic'"))
-    for p in model.parameters:
+    for p in new(model.parameters):
         if not p.bounds[0] < p.bounds[1] or (p.free and not p.bounds[0] <= p.value <= p.bounds[1]):
             raise errors.BadModel(errors.bad_bounds(p.name, p.value, p.bounds))
         if p.scope not in ("shared", "recording"):

@@ -23,7 +23,7 @@ from pikanid.formula.expressions import to_real
 from pikanid.model import channel_maps
 from pikanid.model import file as model_file
 from pikanid.model import units as model_units
-from pikanid.model.checks import check_types, validate
+from pikanid.model.checks import Checked, check_types, validate
 from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm
 from pikanid.model.half_derivative import with_half_derivative
@@ -65,19 +65,25 @@ class Model(Operations):
     effects: tuple[Effect | EffectForm, ...] = ()
 
     def __post_init__(self) -> None:
+        self.settle(Checked())
+
+    def settle(self, checked: Checked) -> None:
+        """Check all that is new, and put it into one form."""
         put = object.__setattr__
-        check_types(self)
+        check_types(self, checked)
         put(self, "states", tuple(
-            dataclasses.replace(s, initial=_constant(s.initial, f"The initial value of '{s.name}'"))
+            s if checked.holds(s) else dataclasses.replace(
+                s, initial=_constant(s.initial, f"The initial value of '{s.name}'"))
             for s in self.states))
         put(self, "inputs", tuple(
-            dataclasses.replace(i, **{
+            i if checked.holds(i) else dataclasses.replace(i, **{
                 what: _constant(getattr(i, what), f"The {what.replace('_', ' ')} of '{i.name}'")
                 for what in ("delay", "backlash", "rate_limit")}) for i in self.inputs))
         put(self, "parameters", tuple(self.parameters))
         put(self, "outputs", tuple(
-            dataclasses.replace(o, expression=to_real(o.expression, f"Output '{o.name}'"),
-                                delay=_constant(o.delay, f"The delay of '{o.name}'"))
+            o if checked.holds(o) else dataclasses.replace(
+                o, expression=to_real(o.expression, f"Output '{o.name}'"),
+                delay=_constant(o.delay, f"The delay of '{o.name}'"))
             for o in self.outputs))
         put(self, "splines", tuple(self.splines))
         put(self, "effects", tuple(self.effects))
@@ -89,9 +95,12 @@ class Model(Operations):
             if name not in self.equations:
                 raise errors.BadModel(errors.missing_equation(name))
         put(self, "equations", MappingProxyType({
-            n: to_real(self.equations[n], f"The equation of '{n}'") for n in order}))
-        validate(self)
-        model_units.check((*self.states, *self.inputs, *self.parameters, *self.outputs))
+            n: e if checked.holds(e := self.equations[n]) else to_real(e, f"The equation of '{n}'")
+            for n in order}))
+        validate(self, checked)
+        parts: tuple[State | Input | Parameter | Output, ...] = (
+            *self.states, *self.inputs, *self.parameters, *self.outputs)
+        model_units.check(part for part in parts if not checked.holds(part))
         for name, value in model_units.coherent(self).items():
             put(self, name, MappingProxyType(value) if name == "equations" else value)
 

@@ -10,8 +10,10 @@ from typing import Any, Self
 import sympy as sp
 
 from pikanid import errors
-from pikanid.formula.expressions import parse, symbol, to_real
+from pikanid.formula.expressions import symbol, to_real
+from pikanid.formula.remembered import parse_again
 from pikanid.model.arguments import limits, number, parameters_of, table
+from pikanid.model.checks import Checked
 from pikanid.model.lookup import Lookup
 from pikanid.model.parts import Formula, Parameter, Spline, State
 
@@ -25,15 +27,22 @@ class Operations(Lookup):
         """Read a formula (text, number or SymPy) in this model's names."""
         if isinstance(text, str):
             names = self.symbols | set(extra)
-            return parse(text, names, where, [s.name for s in self.splines])
+            return parse_again(text, names, where, [s.name for s in self.splines])
         return to_real(text, where[:1].upper() + where[1:])
 
     # --- new models from this one ----------------------------------------------------------------
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some of the seven fields replaced."""
+        """A copy with some of the fields replaced; what stays is not checked again."""
         fields: Any = self  # a dataclass: see `Model`
-        return dataclasses.replace(fields, **changes)
+        names = fields.__dataclass_fields__
+        if not changes.keys() <= names.keys():
+            return dataclasses.replace(fields, **changes)  # which refuses them
+        new = object.__new__(type(fields))
+        for name in names:
+            object.__setattr__(new, name, changes.get(name, getattr(self, name)))
+        new.settle(Checked.of(self))
+        return new
 
     def with_parameters(self, *new: Parameter) -> Self:
         """Add parameters; one that exists already is replaced."""

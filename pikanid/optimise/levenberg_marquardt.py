@@ -96,11 +96,19 @@ def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit
         at = evaluate(theta)
         return None if at is None else Rows(*at)
 
-    found = descend(
-        rows, start, lower, upper, limit, give_up=give_up,
-        # far from an explanation nobody needs the last digits
-        enough=lambda at: max(tolerance, 2e-5 * at.cost, 0.1 * at.cost / len(at.r)))
+    found = descend(rows, start, lower, upper, limit, give_up=give_up,
+                    enough=lambda at: worth_a_step(at.cost, len(at.r), tolerance))
     return None if found is None else Minimum(found.theta, found.at.r, found.at.J, found.converged)
+
+
+def worth_a_step(cost: float, rows: int, tolerance: float = 0.02) -> float:
+    """Decrease of |r|² that `minimise` asks of a step: far from an explanation nobody needs the
+    last digits.
+
+    >>> worth_a_step(100.0, 1000), worth_a_step(5000.0, 1000)
+    (0.02, 0.5)
+    """
+    return max(tolerance, 2e-5 * cost, 0.1 * cost / rows)
 
 
 def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, upper: Array,

@@ -122,9 +122,12 @@ class _Recorder:
         else:
             return True
         for e in self.lowered.rhs:
-            gap = e.diff(sign).subs(surface).replace(
-                lambda z: isinstance(z, positive_power) and z.args[0] == 0,
-                lambda z: sp.Integer(0))
+            if sign not in e.free_symbols:
+                continue
+            gap = e.diff(sign).subs(surface)
+            if gap.has(positive_power):
+                gap = gap.replace(lambda z: isinstance(z, positive_power) and z.args[0] == 0,
+                                  lambda z: sp.Integer(0))
             if sp.expand(gap) != 0:
                 return True
         return False

@@ -12,6 +12,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.closest import Closest
+from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.descent import (
     Start,
     basin_hopping,
@@ -23,7 +24,7 @@ from pikanid.mismatch.fitting.descent import (
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
 from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
-from pikanid.optimise.levenberg_marquardt import Minimum
+from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 NEAR = 1e-6  # numerical: of a parameter, by which an estimate at its bound may be off it
 
@@ -143,6 +144,12 @@ class Hypothesis:
         free = self.whitened.problem.free
         return {f.name: float(v) for f, v in zip(free, np.sqrt(np.diag(self.covariance)),
                                                  strict=True)}
+
+    def improves_on(self, known: Hypothesis) -> bool:
+        """Whether it is closer than another fit of the same effects, by more than fits stop at."""
+        chi2, rows = known.minimum.chi2, max(known.whitened.rows, 1)
+        equal = self.whitened.settings.search.equal
+        return below(self.minimum.chi2, chi2 - max(equal, worth_a_step(chi2, rows)))
 
     def score(self, scale: float = 1.0) -> float:
         """The criterion: smaller is better; `scale` divides χ² where noise is underestimated."""

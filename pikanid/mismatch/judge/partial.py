@@ -19,7 +19,8 @@ from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import needed
 from pikanid.mismatch.judge.doubt import Predict, worth
-from pikanid.mismatch.judge.prediction import HeldOut, rmse
+from pikanid.mismatch.judge.left_over import left_over
+from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.search.overdispersion import repeated
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import PartSettings
@@ -201,16 +202,6 @@ def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
         chosen += [h for h in left if channel not in needed(h)][: rule.rivals]
     chosen += [h for h in left if not h.effects]
     return list({h.fit: h for h in chosen}.values())
-
-
-def left_over(h: Hypothesis, predicted: HeldOut, noise: Sequence[dict[str, float]]) -> float:
-    """Σ max(rms²/σ² - 1, 0) over outputs, in the train and the held-out recordings; there with the
-    parameters moved within their errors.
-    """
-    return sum(max((size / sigma[name]) ** 2 - 1, 0.0)
-               for sizes, sigma in zip((rmse(h.whitened, h.minimum.theta), predicted.rmse_moved),
-                                       noise, strict=True)
-               for name, size in sizes.items())
 
 
 def _weighed(found: list[Weighed], nominal: Weighed, scale: float,

@@ -268,7 +268,7 @@ class Search:
         `settled` are not looked for beyond hills.
         """
         order = {c.key: k for k, c in enumerate(self.candidates)}
-        failed, equal = frozenset(self.failed_searches), self.settings.search.equal
+        failed = frozenset(self.failed_searches)
 
         def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
             (effects, starts), closest = job, Closest(chi2)
@@ -285,8 +285,7 @@ class Search:
             if found and hits(found.effects) and lost(
                     found.minimum.chi2, found.whitened.rows, self.settings):
                 self.failed_searches.add(key)
-            if found and (key not in self.fits
-                          or below(found.minimum.chi2, self.fits[key].minimum.chi2 - equal)):
+            if found and (key not in self.fits or found.improves_on(self.fits[key])):
                 self.fits[key] = found
 
         jobs = [job for job in jobs if all(e.suits(job[0]) for e in job[0])

@@ -56,8 +56,8 @@ class SearchSettings:
         promising: Share of what an effect gained that another in its place must promise.
         kept: Share of what an effect promises that a fit of it must gain, or it has lost its way.
         much: Share of χ² that one more effect must promise where much is left anyway.
-        equal: [χ²]: another fit of the same that is no better than by this is not kept, and what
-            was tested stands; fits stop at a hundredth.
+        equal: [χ²]: another fit of the same that is no better than by this, or by what fits stop
+            at where much is left, is not kept, and what was tested stands.
     """
 
     faint: Amount = 3.0

@@ -19,6 +19,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.left_over import left_in_train, left_over
 from pikanid.mismatch.judge.partial import (
     Doubtful,
     Explanations,
@@ -27,7 +28,6 @@ from pikanid.mismatch.judge.partial import (
     explanations,
     families_of,
     lasting,
-    left_over,
     surely_there,
 )
 from pikanid.mismatch.judge.verdict import Answer
@@ -126,8 +126,9 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
         rest = [e for e in h.effects if e not in members]
         others = [s for s in p.effect.site.moving if s != argument]
         # a curve holds a constant, too
+        enough = p.dominance * max(own_left, rule.floor)
         rivals = [] if p.family == "constant force" or not members else [
-            _left_with_curve(case, h, rest, s, p.effect.site, noise) for s in others]
+            _left_with_curve(case, h, rest, s, p.effect.site, noise, enough) for s in others]
         if h.far and rivals:  # no fit may get there
             rivals += [nominal * share_lacking(case.base, s, p.effect.site) for s in others]
         kappa = min(rivals, default=np.inf) / max(own_left, rule.floor)
@@ -137,8 +138,9 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
                                      f"{rule.dominance:.2g} are asked"))
             continue
         if p.names and members:
-            beside = min((_left(case, found, noise) for found in _with_its_form_free(
-                case.model, h, p, argument)), default=np.inf)
+            beside = min((_left(case, found, noise, own_left / rule.form)
+                          for found in _with_its_form_free(case.model, h, p, argument)),
+                         default=np.inf)
             if not smaller(own_left / max(beside, rule.floor), rule.form):
                 p = replace(p, names=())
         present.append(replace(p, dominance=min(p.dominance, float(kappa))))
@@ -178,11 +180,20 @@ def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present, argument: str
 
 
 def _left_with_curve(case: Case, h: Hypothesis, effects: Sequence[Candidate], argument: str,
-                     site: Site, noise: Sequence[dict[str, float]]) -> float:
+                     site: Site, noise: Sequence[dict[str, float]], enough: float) -> float:
     """What these effects and a free curve of a state leave; infinite where that cannot be run."""
-    return _left(case, with_free_curve(case.model, h, effects, argument, site), noise)
+    return _left(case, with_free_curve(case.model, h, effects, argument, site), noise, enough)
 
 
-def _left(case: Case, found: Hypothesis | None, noise: Sequence[dict[str, float]]) -> float:
-    after = None if found is None else case.predicted(found)
-    return np.inf if found is None or after is None else left_over(found, after, noise)
+def _left(case: Case, found: Hypothesis | None, noise: Sequence[dict[str, float]], enough: float
+          ) -> float:
+    """What a fit leaves in all recordings; in the train ones alone where more than `enough`, which
+    decides, is left in these already.
+    """
+    if found is None:
+        return np.inf
+    seen = left_in_train(found, noise)
+    if smaller(enough, seen):
+        return seen
+    after = case.predicted(found)
+    return np.inf if after is None else left_over(found, after, noise)
