@@ -1,9 +1,9 @@
 """Diagnoses of concealed recordings of rigs of other kinds than the sloshing tank.
 
-Usage: python benchmarks/report_rigs.py FOLDER [RIG ...]
+Usage: python benchmarks/report_rigs.py FOLDER [RIG[:NOISE] ...]
 
 Makes and diagnoses the sets of the named rigs, of all if none is named, and keeps a row for every
-case in FOLDER/rigs.json, from which FOLDER/rigs.md is written; rows of other rigs stay.  Sets lie
+case in FOLDER/rigs.json, from which FOLDER/rigs.md is written; rows of other sets stay.  Sets lie
 in build/rigs until the code that makes them changes, answers until any code of the package does;
 interrupted, it goes on there.
 """
@@ -54,9 +54,11 @@ def main(folder: str, *names: str) -> None:
     """Run what is asked for, and write the page."""
     kept = Path(folder) / "rigs.json"
     found = json.loads(kept.read_bytes()) if kept.exists() else {}
-    for name in names or RIGS:
-        found[name] = {"made": f"{datetime.now(UTC):%Y-%m-%d}, {provenance()}",
-                       "sets": [_set(name, noise) for noise in NOISES]}
+    for asked in names or RIGS:
+        name, _, only = asked.partition(":")
+        for noise in [float(only)] if only else NOISES:
+            sets = {one["noise"]: one for one in found.get(name, [])} | {noise: _set(name, noise)}
+            found[name] = [sets[n] for n in NOISES if n in sets]
         together({kept: json.dumps(found, indent=1).encode(),
                   kept.with_suffix(".md"): page(found).encode()})
 
@@ -73,6 +75,7 @@ def _set(name: str, noise: float) -> dict[str, Any]:
     answered = trials(room / "set", truth, rig.model.with_candidates(*own), room / _code(""),
                       WORKERS, print)
     return {"noise": noise, "seed": seed,
+            "made": f"{datetime.now(UTC):%Y-%m-%d}, {provenance()}",
             "trials": [asdict(one) for one in answered]}
 
 
@@ -87,16 +90,17 @@ def _code(*rooms: str) -> str:
 def page(found: Mapping[str, Any]) -> str:
     """Of all rigs, in Markdown."""
     sets = {(name, one["noise"]): [_trial(row) for row in one["trials"]]
-            for name, rig in found.items() for one in rig["sets"]}
+            for name, rig in found.items() for one in rig}
     every = [one for some in sets.values() for one in some]
-    rest = ", ".join(name for name in RIGS if name not in found)
+    rest = ", ".join(f"{name} at {100 * noise:g} %" for name, noise in SEEDS
+                     if (name, noise) not in sets)
     parts = [INTRODUCTION, *([f"Not run so far: {rest}."] if rest else []), "## Together",
              _shares(every).to_markdown(), _each(sets).to_markdown(), "## Wrong answers",
              _wrong(sets)]
     for name, rig in found.items():
-        parts.append(f"## {name}\n\n{rig['made']}.")
-        for one in rig["sets"]:
-            parts.append(f"### Noise {100 * one['noise']:g} % of the range, seed {one['seed']}")
+        for one in rig:
+            parts.append(f"## {name}, noise {100 * one['noise']:g} % of the range")
+            parts.append(f"Seed {one['seed']}; {one['made']}.")
             parts.append(_shares(sets[name, one["noise"]]).to_markdown())
     return "\n\n".join(parts) + "\n"
 
