@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pikanid.optimise.banded_products import put_away
 from pikanid.simulation.native_call import call_native
 from pikanid.storage.jit import cached_jit
 
@@ -53,7 +54,7 @@ def add_equations(code: np.ndarray, registers: np.ndarray, r: np.ndarray, d: np.
     `registers` (E,) hold it.  The rest is as in `banded_products.add_products`, tops included.
     """
     E, m, b, w = registers.size, u.shape[1], corner.shape[0] - 1, columns.shape[1]
-    n, size, kd, cost = at.size - E, w + b + 1, whole.shape[1] - b - 2, 0.0
+    n, size, cost = at.size - E, w + b + 1, 0.0
     row, gram = np.empty(size), np.empty((size, size))
     for k in range(p.size):
         r[1 + n + m + k] = p[k]
@@ -93,14 +94,5 @@ def add_equations(code: np.ndarray, registers: np.ndarray, r: np.ndarray, d: np.
                     left = row[i]
                     for j in range(i + 1):
                         gram[i, j] += left * row[j]
-        for i in range(w):
-            own = columns[g, i]
-            for j in range(i + 1):
-                other = columns[g, j]
-                whole[min(own, other), abs(own - other)] += gram[i, j]
-            for k in range(w, size):
-                whole[own, kd + 1 + k - w] += gram[k, i]
-        for k in range(w, size):
-            for j in range(w, size):
-                corner[k - w, j - w] += gram[max(k, j), min(k, j)]
+        put_away(gram, columns, g, whole, corner)
     return cost

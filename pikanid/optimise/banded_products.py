@@ -7,9 +7,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from pikanid.storage.jit import cached_jit
+from pikanid.storage.jit import cached_jit, inner_jit
 
 _compiled = cached_jit(error_model="numpy", nogil=True)
+
+
+@inner_jit(error_model="numpy")
+def put_away(gram: np.ndarray, columns: np.ndarray, g: int, whole: np.ndarray, corner: np.ndarray
+             ) -> None:
+    """Add the products (lower triangle of gram) of stretch g's rows where they belong, see
+    `add_products`.
+    """
+    w, size, kd = columns.shape[1], gram.shape[0], whole.shape[1] - corner.shape[0] - 1
+    for i in range(w):
+        one = columns[g, i]
+        for j in range(i + 1):
+            other = columns[g, j]
+            whole[min(one, other), abs(one - other)] += gram[i, j]
+        for k in range(w, size):
+            whole[one, kd + 1 + k - w] += gram[k, i]
+    for k in range(w, size):
+        for j in range(w, size):
+            corner[k - w, j - w] += gram[max(k, j), min(k, j)]
 
 
 @_compiled
@@ -28,7 +47,7 @@ def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, targ
     corner (b + 1, b + 1).
     """
     w, states = columns.shape[1], by_state.shape[2]
-    size, kd, cost = w + corner.shape[0], whole.shape[1] - corner.shape[0] - 1, 0.0
+    size, cost = w + corner.shape[0], 0.0
     row, gram = np.zeros(size), np.empty((size, size))
     for g in range(columns.shape[0]):
         gram[:] = 0.0
@@ -53,16 +72,7 @@ def add_products(weight: np.ndarray, factor: np.ndarray, value: np.ndarray, targ
                     left = row[i]
                     for j in range(i + 1):
                         gram[i, j] += left * row[j]
-        for i in range(w):
-            one = columns[g, i]
-            for j in range(i + 1):
-                other = columns[g, j]
-                whole[min(one, other), abs(one - other)] += gram[i, j]
-            for k in range(w, size):
-                whole[one, kd + 1 + k - w] += gram[k, i]
-        for k in range(w, size):
-            for j in range(w, size):
-                corner[k - w, j - w] += gram[max(k, j), min(k, j)]
+        put_away(gram, columns, g, whole, corner)
     return cost
 
 
