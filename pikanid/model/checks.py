@@ -50,6 +50,10 @@ class Checked:
         """Whether a part was checked by itself."""
         return id(part) in self.parts
 
+    def new(self, items: Iterable[Any]) -> list[Any]:
+        """Those of some parts that it does not hold."""
+        return [item for item in items if not self.holds(item)]
+
     def named(self, model: Lookup) -> Checked:
         """What need not be looked up again: nothing, where a name is gone or stands for another
         kind of thing.
@@ -69,9 +73,6 @@ def check_types(model: Lookup, checked: Checked) -> None:
 
     Formulas are left to `pikanid.formula.expressions.to_real`.
     """
-    def new(items: Iterable[Any]) -> list[Any]:
-        return [item for item in items if not checked.holds(item)]
-
     entry(model.name, "The model's name").text(longest=MAX_NAME)
     entry(model.equations, "The equations").table(optional=None, most=MOST["states"])
     parts: list[tuple[str, tuple[Any, ...]]] = [
@@ -82,14 +83,14 @@ def check_types(model: Lookup, checked: Checked) -> None:
             raise errors.BadModel(errors.too_many_entries(
                 f"The model's list of {section}", len(items), MOST[section]))
         what = section.rstrip("s")
-        for item in new(items):
+        for item in checked.new(items):
             check_name(item.name, what)
             if section != "splines":
                 entry(item.unit, f"The unit of {what} '{item.name}'").text()
-    for item in new(model.inputs):
+    for item in checked.new(model.inputs):
         if item.default is not None:
             entry(item.default, f"The default of input '{item.name}'").number()
-    for p in new(model.parameters):
+    for p in checked.new(model.parameters):
         entry(p.value, f"The value of parameter '{p.name}'").number()
         entry(p.description, f"The description of parameter '{p.name}'").text()
         bounds = entry(p.bounds, f"The bounds of parameter '{p.name}'")
@@ -97,16 +98,16 @@ def check_types(model: Lookup, checked: Checked) -> None:
             raise bounds.fail("[lower, upper]")
         for bound in bounds.items():
             bound.number(finite=False)
-    for o in new(model.outputs):
+    for o in checked.new(model.outputs):
         if o.sigma is not None:
             sigma = entry(o.sigma, f"The sigma of output '{o.name}'")
             if sigma.number() <= 0:
                 raise sigma.fail("positive (or left out)")
-    for effect in new(model.effects):
+    for effect in checked.new(model.effects):
         if not isinstance(effect, Effect | EffectForm):
             raise errors.BadModel(errors.not_of_kind(
                 "An effect of the model", type(effect).__name__, "a pikanid.Effect"))
-    for s in new(model.splines):
+    for s in checked.new(model.splines):
         degree = entry(s.degree, f"The degree of spline '{s.name}'")
         if not is_integer(s.degree) or not 1 <= s.degree <= MAX_DEGREE:
             raise degree.fail(f"an integer, degree >= 1 and <= {MAX_DEGREE}")
@@ -127,31 +128,27 @@ def validate(model: Lookup, checked: Checked) -> None:
         raise errors.BadModel(errors.no_outputs())
     _check_names(model)
     checked = checked.named(model)
-
-    def new(items: Iterable[Any]) -> list[Any]:
-        return [item for item in items if not checked.holds(item)]
-
     everything = model.symbols | {TIME.name}
     constants = set(model.parameter_names)
     start = constants | set(model.input_names)
     for name, expr in model.equations.items():
         if not checked.holds(expr):
             _check_symbols(expr, everything, f"The equation of '{name}'", model)
-    for output in new(model.outputs):
+    for output in checked.new(model.outputs):
         _check_symbols(output.expression, everything, f"Output '{output.name}'", model)
         _check_symbols(output.delay, constants, f"The delay of output '{output.name}'", model)
-    for state in new(model.states):
+    for state in checked.new(model.states):
         _check_symbols(state.initial, start, f"The initial value of '{state.name}'", model)
         if splines := state.initial.atoms(AppliedUndef):
             raise errors.BadModel(errors.spline_at_start(state.name, str(splines.pop())))
-    for item in new(model.inputs):
+    for item in checked.new(model.inputs):
         for what, formula in (("delay", item.delay), ("backlash", item.backlash),
                               ("rate limit", item.rate_limit)):
             _check_symbols(formula, constants, f"The {what} of input '{item.name}'", model)
         if item.hold not in get_args(Hold):
             raise errors.BadModel(errors.bad_value(
                 f"The hold of input '{item.name}'", item.hold, "'zero', 'first' or 'cubic'"))
-    for p in new(model.parameters):
+    for p in checked.new(model.parameters):
         if not p.bounds[0] < p.bounds[1] or (p.free and not p.bounds[0] <= p.value <= p.bounds[1]):
             raise errors.BadModel(errors.bad_bounds(p.name, p.value, p.bounds))
         if p.scope not in ("shared", "recording"):
