@@ -6,15 +6,19 @@ from scipy.interpolate import BSpline
 
 import pikanid as pk
 from pikanid import simulate
-from pikanid.mismatch.beyond.force_shape import force_shape
-from pikanid.mismatch.beyond.formulas import symbolic_candidates
+from pikanid.mismatch.beyond.force_shape import Edge, force_shape
+from pikanid.mismatch.beyond.formulas import CONSTANT, _candidate, symbolic_candidates
 from pikanid.mismatch.beyond.patch import patch
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
+from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import systems
 from pikanid.recording import excitation
+from pikanid.symbolic.curve import Curve
+from pikanid.symbolic.fitting import FormFit
+from pikanid.symbolic.library import LIBRARY
 
 SIGMA = 0.1 * np.pi / 180
 EVEN = systems.sloshing().with_term(
@@ -122,3 +126,27 @@ def test_a_law_outside_the_catalogue_is_named_as_a_formula() -> None:
     value = next(iter(effect.parameters.values()))
     assert abs(value.value - 60.0) < 4 * value.std
     assert value.unit == "1/(rad*s^2)"
+
+
+@pytest.mark.parametrize("unit", ["degC", "K", ""])
+def test_every_law_suits_a_temperature(unit: str) -> None:
+    """In degC, where a temperature has no power, its distance from 0 degC has one."""
+    room = pk.Model.from_dict({
+        "name": "room", "states": {"T": {"unit": unit, "initial": 20.0}},
+        "inputs": {"T_a": {"unit": unit}},
+        "parameters": {"a": {"unit": "1/s", "guess": 1e-3, "bounds": [0.0, 1.0]}},
+        "equations": {"T": "a*(T_a - T)"}, "outputs": {"T": {"unit": unit, "expression": "T"}}})
+    t = np.arange(50) * 10.0
+    heard = pk.Recording.from_arrays(t, {"T_a": 5 + np.sin(t)}, units={"T_a": unit})
+    site, x = sites(room, (heard,))[0], np.linspace(2.0, 30.0, 40)
+    curve, entries = Curve.of_points(x, 1e-3 * x**2), {CONSTANT: "static_bias"}
+    for argument in ("T", "T_a"):
+        edge = Edge(argument, x, curve.y, np.ones(40), 1.0, 0.0, 1.0, curve)
+        for form in LIBRARY[1:]:
+            k, q = len(form.amplitudes), len(form.knobs)
+            fit = FormFit(form, np.full(k, 1e-3), np.full(q, 0.5), 0.0, 1.0, np.eye(k + q + 1),
+                          curve.y, np.empty(0))
+            for constant in (False, True):
+                law = _candidate(site, edge, fit, constant, entries)
+                added = law.applied(room).equations["T"] - room.equations["T"]
+                assert {s.name for s in added.free_symbols} >= {argument}, form.name

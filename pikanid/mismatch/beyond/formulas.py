@@ -13,6 +13,7 @@ from dataclasses import asdict, replace
 from pikanid.formula import units
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
+from pikanid.mismatch.beyond.patch import Difference
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.settings.settings import Settings
@@ -59,8 +60,13 @@ def _forms(edge: Edge, settings: Settings) -> list[FormFit]:
 def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entries) -> Candidate:
     law = sum_of_laws(site.model, [edge.argument], {(0, 0, 0): fit},
                       [(edge.curve.low, edge.curve.high)])
-    parameters = tuple(_with_units(law, site, edge, fit))
-    expression = law.expression
+    channels: list[State | Input] = [*site.model.states, *site.model.inputs]
+    unit = next(c.unit for c in channels if c.name == edge.argument)
+    distance = Difference.of(edge.argument, unit, site.name("zero"))
+    argument = symbol(edge.argument)
+    moved = argument - sum(symbol(zero.name) for zero in distance.zeros)
+    expression = law.expression.xreplace({argument: moved})
+    parameters = tuple(_with_units(law, site, distance, fit))
     if constant:
         force = Parameter(site.name("force_0"), 0.0, site.force_unit)
         parameters = (*parameters, force)
@@ -69,15 +75,16 @@ def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entr
     alone = named.get((fit.form.name, edge.argument))
     covers: dict[str, dict[str, float]] = {alone: {}, named[CONSTANT]: {}} if alone else {}
     return Candidate((SYMBOLIC + text,), f"a law {text}", text, "dynamics", site, parameters,
-                     lambda m: m.with_term(site.v, expression), lambda view: (),
+                     lambda m: m.with_parameters(*distance.zeros).with_term(site.v, expression),
+                     lambda view: (),
                      covers=covers, static=True)
 
 
-def _with_units(law: Laws, site: Site, edge: Edge, fit: FormFit) -> Iterator[Parameter]:
-    channels: list[State | Input] = [*site.model.states, *site.model.inputs]
-    own = next(c.unit for c in channels if c.name == edge.argument)
+def _with_units(law: Laws, site: Site, distance: Difference, fit: FormFit) -> Iterator[Parameter]:
+    own = distance.unit
     powers = [(site.force_unit, 1, -(p or 0)) for p in fit.form.powers]
     found = [units.product((unit, one), (own, power)) for unit, one, power in powers]
-    found += ["" if k.power is None else units.product((own, k.power)) for k in fit.form.knobs]
+    found += ["" if k.power is None else distance.distance if k.power == 1
+              else units.product((own, k.power)) for k in fit.form.knobs]
     for parameter, unit in zip(law.parameters, found, strict=True):
         yield replace(parameter, unit=unit)
