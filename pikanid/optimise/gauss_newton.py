@@ -208,20 +208,20 @@ class Outcome:
 
 
 def gauss_newton(system: BandedSystem, start: Point | Linearisation | Outcome, lam: float,
-                 lower: Array, upper: Array, *, iterations: int = 50, tolerance: float = 1e-6
-                 ) -> Outcome:
+                 lower: Array, upper: Array, *, iterations: int = 50, tolerance: float = 1e-6,
+                 enough: float = 0.0) -> Outcome:
     """Minimise Eq. (2) at one λ from a point, from where the same system was linearised, or on from
     where it ended at the same λ.
 
     Converged when the promised decrease is below `tolerance` of one datum's share of the cost: the
-    estimate is then within √tolerance standard errors of the minimum.  Damping starts at zero and
-    grows only when a step fails.
+    estimate is then within √tolerance standard errors of the minimum; or below `enough`.  Damping
+    starts at zero and grows only when a step fails.
     """
     begin, known = (start.at, start.step) if isinstance(start, Outcome) else (start, None)
     at = begin if isinstance(begin, Linearisation) and begin.lam == lam else (
         system.linearise(begin, lam))
     share = 1.0 / max(1, system.functional.n_data)
-    nothing = NOTHING * system.functional.data_square
+    nothing = max(enough, NOTHING * system.functional.data_square)
     damping, done = 0.0, 0
     step = known or damped_step(system, at, lower, upper, damping)
     while step.promised > max(tolerance * share * at.cost, nothing):

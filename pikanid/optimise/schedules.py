@@ -41,6 +41,10 @@ class Schedule(Protocol):
     """Names the next λ."""
 
     @property
+    def enough(self) -> float:
+        """What a fit at a λ on the way may still promise of the cost."""
+
+    @property
     def warmup(self) -> int:
         """Iterations at the first λ in which only the trajectory moves, θ staying at its guess."""
 
@@ -64,6 +68,7 @@ class Fixed:
 
     lam: float
     warmup: int = 15
+    enough: float = 0.0
 
     def next(self, past: Sequence[Stage]) -> float | None:
         """λ once."""
@@ -101,6 +106,7 @@ class Continuation:
     relative: float = 1e-6
     limit: float = 1e12
     warmup: int = 0
+    enough: float = 0.0
 
     def next(self, past: Sequence[Stage]) -> float | None:
         """The next λ, or None where the estimate has settled, locked, or got no further."""

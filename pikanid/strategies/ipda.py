@@ -35,6 +35,9 @@ from pikanid.strategies.settings import RELAXATION, RelaxationSettings, recorded
 PAPER_DEGREE = 3  # definition: of Table II
 PAPER_LAMBDA = 1e-4  # definition: of Table II
 PAPER_WARMUP = 15  # definition: of Table II
+# Of a sample's share of the noise: θ is then within a tenth of a standard error of its place at
+# that λ, and where the bias falls a hundredfold from λ to λ that hides a thousandth at most.
+ENOUGH = 1e-2  # numerical: that a fit at a λ on the way may still promise
 STEADY_STARTS = (1e4, 1e8)  # numerical: λ at which physics keeps to the guess, as shooting does
 
 
@@ -126,12 +129,12 @@ def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
             warmup = PAPER_WARMUP if settings.warmup is None else settings.warmup
             return [Fixed(settings.lam or _paper_lambda(problem), warmup)]
         gentle = Continuation(noise**2 * problem.n_samples, grid.locks,
-                              warmup=settings.warmup or 0)
+                              warmup=settings.warmup or 0, enough=ENOUGH * noise**2)
         if grid.locks:
-            return [replace(gentle, factor=10.0, bias=LOCKABLE_BIAS)]
+            return [replace(gentle, factor=10.0, bias=LOCKABLE_BIAS, enough=0.0)]
         # Weak physics at first tolerates a bad guess; where that goes astray, strong physics keeps
         # to the guess, as shooting does.
-        steady = replace(gentle, factor=100.0, warmup=0)
+        steady = replace(gentle, factor=100.0, warmup=0, enough=0.0)
         return [gentle, *(replace(steady, start=start) for start in STEADY_STARTS)]
 
     return relax(setup, grid, plans, refine=settle)

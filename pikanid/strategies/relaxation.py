@@ -235,7 +235,8 @@ def follow(system: BandedSystem, point: Point,
         at = gauss_newton(system, point, lam, point.theta, point.theta, iterations=plan.warmup).at
     while lam is not None:
         outcome = gauss_newton(system, at, lam, system.lower, system.upper,
-                               iterations=MAX_ITERATIONS, tolerance=UNDER_WAY)
+                               iterations=MAX_ITERATIONS, tolerance=UNDER_WAY,
+                               enough=plan.enough)
         stages.append(_stage(system, lam, outcome))
         if plan.locked(stages) and follows_physics(system, outcome.at, lam):
             stages[-1] = replace(stages[-1], free=True)
