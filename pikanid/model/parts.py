@@ -48,7 +48,7 @@ class Input:
     @property
     def shaped(self) -> bool:
         """Whether the recorded signal passes through play or a limit of its rate."""
-        return bool(self.backlash != 0 or self.rate_limit != 0)
+        return not (self.backlash.is_zero and self.rate_limit.is_zero)
 
 
 @dataclass(frozen=True)

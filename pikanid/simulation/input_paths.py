@@ -18,7 +18,6 @@ from pikanid.model import Model
 from pikanid.problem.held import HeldInput, PiecewiseInput, acting
 
 
-@functools.lru_cache(maxsize=64)
 def with_parts(model: Model) -> Model:
     """The model with every input that has play or a limited rate written as c + s·b + q·R; the
     parts s and q are its last inputs.
@@ -27,8 +26,12 @@ def with_parts(model: Model) -> Model:
     >>> with_parts(systems.sloshing()).input_names
     ('u_x', 'u_z')
     """
-    if not any(i.shaped for i in model.inputs):
-        return model
+    # most models have none, and which model it is takes longer to tell
+    return _with_parts(model) if any(i.shaped for i in model.inputs) else model
+
+
+@functools.lru_cache(maxsize=64)
+def _with_parts(model: Model) -> Model:
     plain = {"unit": "", "backlash": sp.S.Zero, "rate_limit": sp.S.Zero}
     added, swap = [], {}
     for item in model.inputs:

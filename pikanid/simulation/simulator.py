@@ -94,9 +94,8 @@ class Simulator:
 
     @functools.cached_property
     def _undelayed(self) -> bool:
-        delayed = [c.delay != 0 for c in self.model.inputs] + [
-            c.delay != 0 for c in self.model.outputs]
-        return not any(delayed)
+        channels: list[Input | Output] = [*self.model.inputs, *self.model.outputs]
+        return all(c.delay.is_zero for c in channels)
 
     @functools.cached_property
     def fixed(self) -> bool:

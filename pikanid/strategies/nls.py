@@ -44,7 +44,9 @@ class NLS:
             design of `extra` more only if that fit does not explain the recording.
         protocol: "default", or "paper": best of five starts drawn within ±20 % of the guess (Table
             II).
-        tolerance: Relative change of parameters and cost at which the optimiser stops.
+        tolerance: Relative change of parameters and cost at which the optimiser stops; of the cost
+            also one that a Gauss-Newton step promises: θ is then within √(tolerance·rows) standard
+            errors.
         max_evaluations: Simulations allowed a start.
         seed: Of the starting points.
         method: Integration method, see `pikanid.simulate`.
@@ -128,15 +130,14 @@ class NLS:
         if self.segments > 1:
             led = multiple_shooting(shooting, start, self.segments)
             theta = start if led is None else led
-        # the first pass leaves its last step to the other one
-        passes: list[tuple[Accuracy, float, float]] = [
-            ("coarse", max(ROUGH, self.tolerance), ROUGH), ("fine", self.tolerance, 0.0)]
-        for accuracy, tolerance, enough in passes:
+        passes: list[tuple[Accuracy, float]] = [
+            ("coarse", max(ROUGH, self.tolerance)), ("fine", self.tolerance)]
+        for accuracy, tolerance in passes:
             try:
                 shooting.choose_steps(theta, accuracy)
             except errors.SimulationFailed:
                 return None
-            found = fit_shooting(shooting, theta, tolerance, self.max_evaluations, enough)
+            found = fit_shooting(shooting, theta, tolerance, self.max_evaluations, tolerance)
             evaluations += found.evaluations
             theta = found.theta
         assert found is not None
