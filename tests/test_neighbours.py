@@ -63,6 +63,17 @@ def test_neighbours_differ_in_one_effect(case: Case) -> None:
     assert not list(without_one(hypothesis(case, "cubic_stiffness")))
 
 
+def test_twins_begin_as_strong_as_what_they_replace(case: Case) -> None:
+    """Where one unit measures both: an offset of the sensor says nothing of the force's."""
+    gain = hypothesis(case, "sensor_gain", k_out=1.2)
+    begun = {frozenset(keys(effects)): start[0] for effects, start in with_twins(
+        gain, case.candidates)}
+    assert begun[frozenset({"input_gain"})]["k_in"] == gain.values["k_out"]
+    offset = hypothesis(case, "sensor_offset")
+    (_, [start]), = with_twins(offset, case.candidates)
+    assert start == offset.point
+
+
 def test_laws_that_hold_others_are_neighbours_both_ways(case: Case) -> None:
     drag = hypothesis(case, "quadratic_drag", c_q=0.01)
     wider = [keys(effects) for effects, _ in with_wider(drag, case.candidates)]

@@ -110,13 +110,17 @@ def reduced(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
 
 
 def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
-    """With what small motions cannot tell from one of its effects in that one's place."""
+    """With what small motions cannot tell from one of its effects in that one's place, as strong if
+    that has a unit in common.
+    """
     for effect in h.effects:
         for other in candidates:
             alike = (effect.twin and other.twin == effect.twin) or (
                 set(effect.ids) & set(other.instead_of))
             if alike and other.fits and other.key not in h.key:
-                yield (*_rest(h, effect), other), [h.point]
+                size, alone = other.parameters[0], effect.parameters[0]
+                start = {size.name: as_strong(h, effect, other)} if size.unit == alone.unit else {}
+                yield (*_rest(h, effect), other), [{**h.point, **start}]
 
 
 def with_relatives(h: Hypothesis, effect: Candidate, candidates: Sequence[Candidate]

@@ -20,8 +20,10 @@ ANSWERS = ("named", "set")
 MOST_HYPOTHESES = 2  # definition: of an answer that is right
 SYMBOLIC = "symbolic:"
 # Laws that an entry of the catalogue includes: dry friction, with or without a rise at low speed,
-# with a sharp or a rounded reversal.
-INCLUDED = {"stribeck_friction": "coulomb_friction", "smooth_friction": "coulomb_friction"}
+# with a sharp or a rounded reversal; and of a temperature, where that has an entry, one that fades
+# is the exchange with a hidden store to the letter.
+INCLUDED = {"stribeck_friction": "coulomb_friction", "smooth_friction": "coulomb_friction",
+            "fading_memory": "hidden_storage"}
 # Entries that a truth holds beside more: liquid has a second planar mode, which stays linear.
 HELD = {"potential_flow": "second_mode"}
 # What the formula of a law that is in no catalogue must hold; who writes another one is wrong.
