@@ -82,6 +82,18 @@ def test_a_family_needs_an_entry_that_explains_it(left: float, sure: bool) -> No
         assert "only a law outside the catalogue" in found.why
 
 
+@pytest.mark.parametrize("without_law, sure", [(5.0, True), (15.0, False)])
+def test_what_does_less_than_a_law_of_no_catalogue_is_not_sure(
+        without_law: float, sure: bool) -> None:
+    """It may be a facet of what that law stands for."""
+    law = effect("coupled_state", "coupling", known=False)
+    found = examined(weighed((COULOMB, law), 1.0, 0.995), weighed((law,), 8.0, 0.002),
+                     weighed((COULOMB,), without_law, 0.002))
+    assert isinstance(found, Present) is sure
+    if isinstance(found, Doubtful):
+        assert "outside the catalogue explains more" in found.why
+
+
 def test_nothing_is_sure_that_held_out_data_could_not_have_refuted() -> None:
     found = examined(weighed((COULOMB,), 1.0, 0.999, later=1.0),
                      weighed((DRAG,), 9.0, 0.001, later=1.2))

@@ -55,6 +55,7 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.stribeck_friction, ("dry friction",)),
     (decoys.dissipating_wall, ("restoring force",)),
     (decoys.velocity_coupled_drive, ("input curve",)),
+    (decoys.coupled_state, ("coupling",)),
     (decoys.soft_saturation, ("input curve",)),
     (decoys.clock_error, ("timing",)),
     (decoys.wobble, ("slow change",)),

@@ -126,8 +126,13 @@ class Hypothesis:
     @property
     def point(self) -> dict[str, float]:
         """Where another fit may begin: estimates by name, and by label for every recording."""
+        return self.point_with({})
+
+    def point_with(self, given: Mapping[str, float]) -> dict[str, float]:
+        """`point`, with the values that are `given` by name, in all recordings."""
         both = zip(self.whitened.problem.free, self.minimum.theta, strict=True)
-        return {**self.values, **{f.label: float(v) for f, v in both}}
+        return {**self.values, **given,
+                **{f.label: given.get(f.name, float(v)) for f, v in both}}
 
     @property
     def covariance(self) -> np.ndarray:

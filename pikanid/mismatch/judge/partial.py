@@ -252,6 +252,10 @@ def _examined(family: Family, lead: Weighed, found: Sequence[Weighed], rule: Par
             e.known and family in families_of(e, w.hypothesis, rule.dry)
             for e in w.hypothesis.effects)), default=0.0), rule.dominance):
         return Doubtful(family, effect, "only a law outside the catalogue explains so much of it")
+    # what does less than a law that is in no catalogue may be a facet of what that stands for
+    if smaller(kappa, max((dominance(lead, [w for w in found if not _holds(w.hypothesis, e)], rule)
+                           for e in lead.hypothesis.effects if not e.known), default=0.0)):
+        return Doubtful(family, effect, "beside it a law outside the catalogue explains more")
     if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof):
         return Doubtful(family, effect, "the held-out recording could not have refuted it (it is "
                         f"worth {power:.2g} of chi-squared there, {proof:.2g} are asked)")

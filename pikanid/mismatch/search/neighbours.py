@@ -29,10 +29,12 @@ def beside(h: Hypothesis, candidates: Sequence[Candidate]) -> list[Candidate]:
             and (not c.twin or c.twin not in groups) and not (c.absent and h.far)]
 
 
-def afresh(h: Hypothesis) -> Iterator[Job]:
-    """The same, effects begun where what it leaves shows them as well: a mode, or a moment, may
+def afresh(h: Hypothesis, guess: Mapping[str, float]) -> Iterator[Job]:
+    """The same, begun where the nominal model was given, which alone may have been led into another
+    minimum; and effects begun where what it leaves shows them as well: a mode, or a moment, may
     have been a wrong one.
     """
+    yield h.effects, [h.point_with(guess)]
     for effect in h.effects:
         if len(effect.parameters) > 2:
             for _, starts in Screen(h, [effect]).singles(1):
@@ -118,8 +120,9 @@ def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
             alike = (effect.twin and other.twin == effect.twin) or (
                 set(effect.ids) & set(other.instead_of))
             if alike and other.fits and other.key not in h.key:
-                size, alone = other.parameters[0], effect.parameters[0]
-                start = {size.name: as_strong(h, effect, other)} if size.unit == alone.unit else {}
+                sizes = zip(effect.parameters[:1], other.parameters[:1], strict=False)
+                start = {there.name: as_strong(h, effect, other) for size, there in sizes
+                         if size.unit == there.unit}
                 yield (*_rest(h, effect), other), [{**h.point, **start}]
 
 

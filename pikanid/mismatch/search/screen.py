@@ -176,7 +176,7 @@ class Screen:
         """Where a fit of a candidate begins that promises nothing."""
         c = self.found.candidates[candidate]
         if c.levels:
-            points = [self.about.point, *([{**self.about.point, **self.guess}] * bool(self.guess))]
+            points = [self.about.point, *([self.about.point_with(self.guess)] * bool(self.guess))]
             return [best_level(self.about, c, point) for point in points]
         own = np.flatnonzero((self.found.owner == candidate) & (self.lengths > 0))
         levels = [int(k) for k in own if not self.found.directions[k].scales]

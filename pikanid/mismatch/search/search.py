@@ -101,6 +101,8 @@ class Search:
                 again=True, always=True, reach=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
+        if not adequate(best := self.ranked()[0]):
+            self._fit_all([*neighbours.afresh(best, self.guess)], again=True)
         if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
             self._fit_all(screen.pairs(budget.pairs))
@@ -113,7 +115,7 @@ class Search:
         close = settings.verdict.indistinct
         for count in range(1, budget.effects):
             if not adequate(best := self.ranked()[0]):
-                self._fit_all([*neighbours.afresh(best)], again=True)
+                self._fit_all([*neighbours.afresh(best, self.guess)], again=True)
             if adequate(best := self.ranked()[0]) or self.budget_exhausted:
                 break
             self.tell(f"{count + 1} effects together")
@@ -198,8 +200,7 @@ class Search:
         """
         before = {h.fit for h in self.fits.values()}
         for h in hypotheses[:self.settings.budget.asked_again]:
-            self._fit_all([*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates)],
-                          again=True, always=True)
+            self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates)))
             self._exchange(h, anyway=True)
         return {h.fit for h in self.fits.values()} != before
 
@@ -234,7 +235,7 @@ class Search:
         return in_order(self.fits.values(), lambda h: h.score(scale), Hypothesis.place)
 
     def scale(self) -> float:
-        """What χ² counts for."""
+        """The overdispersion: what χ² is divided by."""
         return overdispersion(self.fits.values())
 
     def _extend(self, hypothesis: Hypothesis, count: int, least: float = 0.0,
