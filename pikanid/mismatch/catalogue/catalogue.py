@@ -9,6 +9,7 @@ from pikanid import errors
 from pikanid.formula import units
 from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
+from pikanid.mismatch.catalogue.coupled_state import coupled_state
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
 from pikanid.mismatch.catalogue.neighbouring_forms import neighbouring_forms
 from pikanid.mismatch.catalogue.own_effects import own_effects, with_twins
@@ -43,6 +44,7 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (channels.sensor_drift, ("slow change",)),
     (channels.sensor_saturation, ("sensor curve",)),
     (channels.sensor_nonlinearity, ("sensor curve",)),
+    (coupled_state, ("coupling",)),
     (forces.initial_state, ("once",)),
     (channels.input_hold, ("timing",)),
 )
@@ -55,7 +57,6 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.stribeck_friction, ("dry friction",)),
     (decoys.dissipating_wall, ("restoring force",)),
     (decoys.velocity_coupled_drive, ("input curve",)),
-    (decoys.coupled_state, ("coupling",)),
     (decoys.soft_saturation, ("input curve",)),
     (decoys.clock_error, ("timing",)),
     (decoys.wobble, ("slow change",)),

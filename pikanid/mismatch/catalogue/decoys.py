@@ -31,10 +31,6 @@ def _product(u: str, v: str) -> Shape:
     return lambda w: w.u[u] * w.x[v]
 
 
-def _state(y: str) -> Shape:
-    return lambda w: w.x[y]
-
-
 def _half_sign(v: str, sign: int) -> Shape:
     # at rest friction holds whatever pushes, as dry friction does: half of it would push by itself
     def shape(w: View) -> np.ndarray:
@@ -164,20 +160,6 @@ def velocity_coupled_drive(site: Site) -> list[Candidate]:
             site, "velocity_coupled_drive",
             f"a drive that depends on {'speed' if site.q else site.v}", f"{k.name}*{u}*{site.v}", k,
             _product(u, site.v), one_sided=False, known=False))
-    return found
-
-
-def coupled_state(site: Site) -> list[Candidate]:
-    """k y: what goes into a state in proportion to another one."""
-    if site.q:
-        return []
-    found = []
-    for y in (s for s in site.model.states if s.name != site.v):
-        k = Parameter(site.name("k_of"), 0.0, units.product((site.force_unit, 1), (y.unit, -1))
-                      if y.unit else "")
-        found.append(term(
-            site, "coupled_state", f"a part of {site.v}' in proportion to {y.name}",
-            f"{k.name}*{y.name}", k, _state(y.name), one_sided=False, variant=y.name, known=False))
     return found
 
 

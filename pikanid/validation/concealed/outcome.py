@@ -47,7 +47,6 @@ FORMULAS = {
     "one_way_gain": r"Abs\(\w+\)",
     "local_force": r"exp\(",
     "periodic_force": r"sin\([^)]*\bt\b",
-    "coupled_state": r":-?\w+\*\w+$",
     "product_of_states": r"\w+\*\w+\*\w+",
     "bilinear_input": r"\w+\*\w+\*\w+",
     "one_sided_spring": r"max\(\w+ - \w+, 0\)\*\*2",
