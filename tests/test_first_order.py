@@ -130,23 +130,37 @@ def test_a_sensor_whose_range_ends_on_one_side(seen: Seen, law: str) -> None:
     assert abs(limit.value - 14.0) < 4 * limit.std < 0.5
 
 
+def run_tanks(seed: int, more: Callable[[np.ndarray], np.ndarray]) -> pk.Recording:
+    """Of `tanks`, a = 0.1 and b = 0.08, with `more` [cm/s] in the equations."""
+    rng = np.random.default_rng(seed)
+    n, h = 1000, 1.0
+    u, x = np.repeat(rng.uniform(0.2, 1.0, n // 50), 50), np.zeros((n, 2))
+    for k in range(n - 1):
+        def rates(t: float, y: np.ndarray, push: float = u[k]) -> np.ndarray:
+            return np.array([push - 0.1 * y[0], 0.1 * y[0] - 0.08 * y[1]]) + more(y)
+        x[k + 1] = solve_ivp(rates, (0, h), x[k], "DOP853", rtol=1e-8, atol=1e-10).y[:, -1]
+    return pk.Recording.from_arrays(np.arange(n) * h, {"u": u, "y": x[:, 1] + rng.normal(
+        0, 0.03, n)}, units={"u": "V", "y": "cm"})
+
+
 @pytest.mark.slow
 def test_a_leak_of_the_tank_that_is_not_seen_is_found_there() -> None:
-    def run(seed: int) -> pk.Recording:
-        rng = np.random.default_rng(seed)
-        n, h = 1000, 1.0
-        u, x = np.repeat(rng.uniform(0.2, 1.0, n // 50), 50), np.zeros((n, 2))
-        for k in range(n - 1):
-            def rates(t: float, y: np.ndarray, push: float = u[k]) -> list[float]:
-                return [push - 0.1 * y[0] - 0.01 * y[0] ** 2, 0.1 * y[0] - 0.08 * y[1]]
-            x[k + 1] = solve_ivp(rates, (0, h), x[k], "DOP853", rtol=1e-8, atol=1e-10).y[:, -1]
-        return pk.Recording.from_arrays(
-            np.arange(n) * h, {"u": u, "y": x[:, 1] + rng.normal(0, 0.03, n)},
-            units={"u": "V", "y": "cm"})
-
-    answer = pk.diagnose(tanks(), run(1), run(2))
+    train, other = (run_tanks(seed, lambda y: np.array([-0.01 * y[0] ** 2, 0.0]))
+                    for seed in (1, 2))
+    answer = pk.diagnose(tanks(), train, other)
     assert answer.verdict in ("named", "set") and answer.where.equation == "x1"
     assert any("quadratic_drag" in e.ids for h in answer.hypotheses for e in h.effects)
+
+
+def test_what_flows_back_into_a_linear_tank_is_a_coupling_or_a_gain() -> None:
+    """Their transfer function tells poles and a gain: one number more than the model has."""
+    train, other = (run_tanks(seed, lambda y: np.array([0.02 * y[1], 0.0])) for seed in (1, 2))
+    answer = pk.diagnose(tanks(), train, other)
+    found = {(e.ids, e.equation): e for h in answer.hypotheses for e in h.effects}
+    assert answer.verdict == "set" and {i for ids, _ in found for i in ids} == {
+        "coupled_state", "input_gain", "sensor_gain"}
+    (k,) = found[("coupled_state",), "x1"].parameters.values()
+    assert abs(k.value - 0.02) < 4 * k.std < 0.005
 
 
 def test_no_law_is_looked_for_that_units_forbid() -> None:
