@@ -17,7 +17,6 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.search.neighbours import (
     Job,
-    afresh,
     closest_of_each,
     with_parts,
     with_relatives,
@@ -62,43 +61,6 @@ def test_neighbours_differ_in_one_effect(case: Case) -> None:
     assert [keys(effects) for effects, _ in with_twins(h, case.candidates)] == [
         {"cubic_stiffness", "static_bias"}]
     assert not list(without_one(hypothesis(case, "cubic_stiffness")))
-
-
-def test_an_explanation_begins_again_at_the_guess() -> None:
-    """The model's own parameters, in every recording, not those of effects."""
-    tank = pk.Model.from_dict({
-        "name": "tank", "states": {"h": {"unit": "cm", "initial": "h_0"}},
-        "inputs": {"u": {"unit": "V"}},
-        "parameters": {"h_0": {"unit": "cm", "guess": 4.0, "bounds": [0.1, 20.0],
-                               "scope": "recording"},
-                       "k": {"unit": "cm/(s*V)", "guess": 0.4, "bounds": [0.01, 5.0]},
-                       "a": {"unit": "1/s", "guess": 0.1, "bounds": [0.001, 2.0]}},
-        "equations": {"h": "k*u - a*h"}, "outputs": {"y": {"unit": "cm", "expression": "h"}}})
-    t, guess = np.arange(200) * 0.5, {n: tank.parameter(n).value for n in tank.free_names}
-    runs = tuple(pk.simulate(
-        tank.with_values(h_0=start, a=0.2), pk.Recording.from_arrays(
-            t, {"u": 2.0 + np.sin(t / 9.0)}, units={"u": "V"}), sigma=0.01, seed=k)
-        for k, start in enumerate((3.0, 6.0)))
-    case = open_case(tank, runs, None, None, lambda text: None, DEFAULTS)
-    h = hypothesis(case, "static_bias")
-    labels = [f.label for f in h.whitened.problem.free if f.name == "h_0"]
-    assert [round(h.point[label]) for label in labels] == [3, 6]
-    effects, [start] = next(iter(afresh(h, guess)))
-    assert effects == h.effects and isinstance(start, Mapping)
-    assert [start[label] for label in labels] == [4.0, 4.0] and start["a"] == 0.1
-    assert start["bias"] == h.values["bias"]
-
-
-def test_twins_begin_as_strong_as_what_they_replace(case: Case) -> None:
-    """Where one unit measures both: an offset of the sensor says nothing of the force's."""
-    gain = hypothesis(case, "sensor_gain", k_out=1.2)
-    begun: dict[frozenset[str], Any] = {
-        frozenset(keys(effects)): start[0]
-        for effects, start in with_twins(gain, case.candidates)}
-    assert begun[frozenset({"input_gain"})]["k_in"] == gain.values["k_out"]
-    offset = hypothesis(case, "sensor_offset")
-    (_, [start]), = with_twins(offset, case.candidates)
-    assert start == offset.point
 
 
 def test_laws_that_hold_others_are_neighbours_both_ways(case: Case) -> None:
