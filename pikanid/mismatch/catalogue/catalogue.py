@@ -25,7 +25,6 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (friction.power_drag, ("drag",)),
     (friction.amplitude_damping, ("drag",)),
     (forces.cubic_stiffness, ("restoring force",)),
-    (forces.free_spring, ("restoring force",)),
     (forces.static_bias, ("constant force",)),
     (forces.parameter_drift, ("slow change",)),
     (second_mode, ("mode",)),

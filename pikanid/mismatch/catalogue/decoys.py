@@ -14,7 +14,7 @@ import numpy as np
 
 from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Candidate, Parts, TangentDirection, View
-from pikanid.mismatch.catalogue.forces import BOTH, INF, spring, term, wall_impact
+from pikanid.mismatch.catalogue.forces import BOTH, INF, term, wall_impact
 from pikanid.mismatch.catalogue.friction import STICKING, sense
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -50,7 +50,7 @@ def _through(u: str, text: str) -> Callable[[Model], Model]:
 
 def even_stiffness(site: Site) -> list[Candidate]:
     """-k q²: not the same on both sides."""
-    if not site.q:
+    if not site.rate:
         return []
     k = Parameter(site.name("k_even"), 0.0, f"1/(s^2*{site.unit})")
     return [term(site, "even_stiffness", "a stiffness that differs between the sides",
@@ -60,7 +60,7 @@ def even_stiffness(site: Site) -> list[Candidate]:
 
 def quintic_stiffness(site: Site) -> list[Candidate]:
     """-k q⁵."""
-    if not site.q:
+    if not site.rate:
         return []
     k = Parameter(site.name("k5"), 0.0, f"1/(s^2*({site.unit})^4)")
     return [term(site, "quintic_stiffness", "quintic stiffness", f"-{k.name}*{site.q}**5", k,
@@ -71,8 +71,10 @@ def linear_stiffness(site: Site) -> list[Candidate]:
     """-k q beside another restoring force: alone it is the model's own stiffness and a gain."""
     if not site.rate:
         return []
-    law = spring(site, "a stiffness beside the model's own")
-    return [replace(law, known=False, instead_of=("input_gain", "sensor_gain"), beside=(
+    k = Parameter(site.name("k1"), 0.0, "1/s^2")
+    law = term(site, "linear_stiffness", "a stiffness beside the model's own",
+               f"-{k.name}*{site.q}", k, lambda w: -w.x[site.q], one_sided=False, known=False)
+    return [replace(law, instead_of=("input_gain", "sensor_gain"), beside=(
         "wall_impact", "dissipating_wall", "cubic_stiffness", "quintic_stiffness",
         "even_stiffness"))]
 
