@@ -37,7 +37,7 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
         residual, jacobian: θ (n,) -> r (rows,) and ∂r/∂θ (rows, n).
         tolerance: Relative change of θ and of the cost at which to stop.
         limit: Evaluations allowed.
-        enough: Share of the cost that a step must promise, for a fit that another one follows.
+        enough: Share of the cost that a step must promise.
 
     >>> found = minimise(lambda q: np.array([q[0] - 3.0]), lambda q: np.ones((1, 1)),
     ...                  np.array([1.0]), np.array([0.0]), np.array([2.0]))

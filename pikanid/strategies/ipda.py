@@ -129,13 +129,14 @@ def fit_relaxed(problem: Problem, settings: IPDA) -> RelaxedFit:
             warmup = PAPER_WARMUP if settings.warmup is None else settings.warmup
             return [Fixed(settings.lam or _paper_lambda(problem), warmup)]
         gentle = Continuation(noise**2 * problem.n_samples, grid.locks,
-                              warmup=settings.warmup or 0, enough=ENOUGH * noise**2)
+                              warmup=settings.warmup or 0)
         if grid.locks:
-            return [replace(gentle, factor=10.0, bias=LOCKABLE_BIAS, enough=0.0)]
+            return [replace(gentle, factor=10.0, bias=LOCKABLE_BIAS)]
         # Weak physics at first tolerates a bad guess; where that goes astray, strong physics keeps
         # to the guess, as shooting does.
-        steady = replace(gentle, factor=100.0, warmup=0, enough=0.0)
-        return [gentle, *(replace(steady, start=start) for start in STEADY_STARTS)]
+        steady = replace(gentle, factor=100.0, warmup=0)
+        return [replace(gentle, enough=ENOUGH * noise**2),
+                *(replace(steady, start=start) for start in STEADY_STARTS)]
 
     return relax(setup, grid, plans, refine=settle)
 
