@@ -36,7 +36,7 @@ def test_one_start_of_pikanid(benchmark, recording, by_hand) -> None:
     model = pk.systems.sloshing().with_values(l_theta=0.06, d_theta=0.05)
     shooting = Shooting(Problem(model, recording))
     strategy = pk.NLS(starts=1)
-    found = in_turn(benchmark, strategy.one_start, (shooting, reference.START), by_hand, 100)
+    found = in_turn(benchmark, strategy.one_start, (shooting, reference.START), by_hand, 500)
     assert found.theta == pytest.approx([0.04501202, 0.14891704], rel=1e-5)
 
 
@@ -44,7 +44,7 @@ def test_whole_fit_of_pikanid(benchmark, recording, by_hand) -> None:
     """`NLS(starts=1).fit`: reading units, covariance, verdict, warnings and trajectory as well."""
     benchmark.group = GROUP
     model = pk.systems.sloshing().with_values(l_theta=0.06, d_theta=0.05)
-    estimate = in_turn(benchmark, pk.NLS(starts=1).fit, (model, recording), by_hand, 100)
+    estimate = in_turn(benchmark, pk.NLS(starts=1).fit, (model, recording), by_hand, 500)
     # p̂ of the hand-written reference in the limit of small steps
     assert estimate.theta == pytest.approx([0.04501202, 0.14891704], rel=1e-5)
 
@@ -53,7 +53,7 @@ def test_ipda_of_pikanid(benchmark, recording, by_hand) -> None:
     """`IPDA().fit`, which estimates the trajectory as well."""
     benchmark.group = GROUP
     model = pk.systems.sloshing().with_values(l_theta=0.06, d_theta=0.05)
-    estimate = in_turn(benchmark, pk.IPDA().fit, (model, recording), by_hand, 100)
+    estimate = in_turn(benchmark, pk.IPDA().fit, (model, recording), by_hand, 500)
     assert estimate.theta == pytest.approx([0.04501202, 0.14891704], rel=1e-4)
 
 
@@ -63,5 +63,5 @@ def test_reference(benchmark, recording, name: str) -> None:
     benchmark.extra_info["reference"] = name == "numba_rk4"
     simulate = getattr(reference, name)()
     found = benchmark.pedantic(reference.fit, (simulate, recording["theta"].values),
-                               warmup_rounds=2, rounds=100 if name == "numba_rk4" else 5)
+                               warmup_rounds=2, rounds=500 if name == "numba_rk4" else 5)
     assert found == pytest.approx([0.045012, 0.148917], rel=1e-3)

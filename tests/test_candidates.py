@@ -21,7 +21,7 @@ from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.friction import _half_derivative
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Model, systems
-from pikanid.recording import excitation
+from pikanid.recording import Recording, excitation
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.symbolic.library import LIBRARY
 
@@ -49,6 +49,17 @@ def test_candidates_are_well_formed(make: Callable[[], Model]) -> None:
     groups = Counter(c.twin for c in found if c.twin)
     assert groups and min(groups.values()) > 1  # nothing is a twin of nothing
     assert {c.channel for c in found} == set(get_args(Channel))
+
+
+@pytest.mark.parametrize("make", [systems.cart_pole, systems.sloshing_2d, systems.thermal_rc])
+def test_a_channel_is_offered_once(make: Callable[[], Model]) -> None:
+    """One force moves cart and pole: what happens to it on its way in is one explanation."""
+    model, t = make(), 0.01 * np.arange(500)
+    moved = Recording.from_arrays(t, {i.name: np.sin(t) for i in model.inputs},
+                                  {i.name: i.unit for i in model.inputs})
+    found = candidates(sites(model, (pk.simulate(model, moved),)))
+    offered = Counter((c.ids[0], c.variant) for c in found if c.channel == "input")
+    assert offered and set(offered.values()) == {1}
 
 
 def test_the_boundary_layer_damps_by_the_half_derivative_of_the_rate() -> None:

@@ -135,6 +135,42 @@ def test_a_fit_of_the_next_form_begins_as_loud_as_the_law(by_key: dict[str, Cand
             50.0 * (np.abs(q).max() - 0.2))
 
 
+def test_a_loss_of_free_exponent_may_saturate(by_key: dict[str, Candidate]) -> None:
+    """A fit of it begins as loud as the power, and as steep at the usual speed."""
+    [law] = [c for c in by_key.values() if c.next_to == "power_drag"]
+    assert force(law, theta_dot=-0.6, v_half=0.2) == pytest.approx(0.75)
+    v = np.sin(np.linspace(0.01, 6, 601))
+    usual = float(np.sqrt(np.mean(v**2)))
+    assert law.starts is not None
+    [start] = law.starts({"c_n": 0.7, "n": 0.5}, {"theta": v, "theta_dot": v})
+    shape = np.abs(v) / (start["v_half"] + np.abs(v))
+    assert np.mean((start["c_most"] * shape) ** 2) == pytest.approx(np.mean(0.49 * np.abs(v)))
+    rise = start["v_half"] / (start["v_half"] + usual)  # d ln F/d ln v
+    assert rise == pytest.approx(0.5)
+
+
+def test_springs_belong_to_coordinates_that_have_a_place() -> None:
+    """A cart that its controller holds has one, though its own equation brings it nowhere; a cart
+    by itself has none.
+    """
+    def springs(fed_back: str) -> set[str]:
+        model = pk.Model.from_dict({
+            "name": "cart", "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}},
+            "parameters": {"b": {"unit": "1/s", "value": 1.0}},
+            "inputs": {"u": {"unit": "m/s^2"}},
+            "equations": {"x": "v", "v": f"u - b*v {fed_back}"},
+            "outputs": {"x": {"unit": "m", "expression": "x"}}})
+        t = np.arange(100) * 0.01
+        run = Recording.from_arrays(
+            t, {"u": np.sin(t), "x": np.cos(t)}, units={"u": "m/s^2", "x": "m"})
+        return {c.ids[0] for c in candidates(sites(model, (run,)))} & {
+            "cubic_stiffness", "amplitude_damping", "linear_stiffness", "quintic_stiffness"}
+
+    assert springs("") == set()
+    assert springs("+ 2.0*x") == {"cubic_stiffness", "amplitude_damping", "linear_stiffness",
+                                  "quintic_stiffness"}
+
+
 def test_without_a_rest_friction_has_no_next_form() -> None:
     """Where a coordinate has no origin, no force is a power of it."""
     model = pk.Model.from_dict({
@@ -147,7 +183,8 @@ def test_without_a_rest_friction_has_no_next_form() -> None:
     t = np.arange(100) * 0.01
     run = Recording.from_arrays(t, {"u": np.sin(t), "x": np.cos(t)}, units={"u": "m/s^2", "x": "m"})
     assert not [c for c in candidates(sites(model, (run,)))
-                if c.next_to and c.channel == "dynamics" and c.ids != ("stiffening_wall",)]
+                if c.next_to and c.channel == "dynamics"
+                and c.ids not in (("stiffening_wall",), ("saturating_loss",))]
 
 
 def swings(seed: int, force: Callable[[float], float]) -> Recording:

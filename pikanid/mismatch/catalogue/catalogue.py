@@ -13,6 +13,7 @@ from pikanid.mismatch.catalogue.coupled_state import coupled_state
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
 from pikanid.mismatch.catalogue.neighbouring_forms import neighbouring_forms
 from pikanid.mismatch.catalogue.own_effects import own_effects, with_twins
+from pikanid.mismatch.catalogue.reversed_signs import input_sign, sensor_sign
 from pikanid.mismatch.catalogue.second_mode import second_mode
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Effect, Model
@@ -25,6 +26,7 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (friction.power_drag, ("drag",)),
     (friction.amplitude_damping, ("drag",)),
     (forces.cubic_stiffness, ("restoring force",)),
+    (forces.free_spring, ("restoring force",)),
     (forces.static_bias, ("constant force",)),
     (forces.parameter_drift, ("slow change",)),
     (second_mode, ("mode",)),
@@ -47,6 +49,8 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (coupled_state, ("coupling",)),
     (forces.initial_state, ("once",)),
     (channels.input_hold, ("timing",)),
+    (input_sign, ("gain",)),
+    (sensor_sign, ("gain",)),
 )
 DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.even_stiffness, ("restoring force",)),
@@ -77,16 +81,16 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known and c.suits() and not c.refines for c in found), found[0].key
-    (34, 'coulomb_friction')
+    (36, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
-    # two coordinates may be seen in one output, which has one sensor
-    first = {s.output.name: s.v for s in reversed(sites)}
+    # two coordinates may be seen in one output, or moved by one input: each is one channel
+    first = {name: s.v for s in reversed(sites) for name in (*s.inputs, s.output.name)}
     for table in (ENTRIES, DECOYS):
         for site in sites:
             for make, families in table:
                 for candidate in make(site):
-                    if candidate.channel != "sensor" or first[site.output.name] == site.v:
+                    if all(first[name] == site.v for name in _channels(candidate)):
                         made.setdefault(candidate.key, replace(candidate, families=families))
     for entry in [*made.values()]:
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
@@ -97,6 +101,17 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     if any(map(units.begins_elsewhere, measured)):
         made = {key: c for key, c in made.items() if _has_meaning(c, model)}
     return tuple(with_twins([*own, *made.values()], effects))
+
+
+def _channels(candidate: Candidate) -> list[str]:
+    """The input or output that a candidate changes, rather than an equation."""
+    site = candidate.site
+    if candidate.channel == "sensor":
+        return [site.output.name]
+    if candidate.channel != "input" or len(site.inputs) == 1:
+        return [*site.inputs] if candidate.channel == "input" else []
+    changed = candidate.applied(site.model).inputs
+    return [a.name for a, b in zip(site.model.inputs, changed, strict=True) if a != b]
 
 
 def _has_meaning(candidate: Candidate, model: Model) -> bool:

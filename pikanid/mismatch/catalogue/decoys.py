@@ -14,7 +14,7 @@ import numpy as np
 
 from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Candidate, Parts, TangentDirection, View
-from pikanid.mismatch.catalogue.forces import BOTH, INF, term, wall_impact
+from pikanid.mismatch.catalogue.forces import BOTH, INF, spring, term, wall_impact
 from pikanid.mismatch.catalogue.friction import STICKING, sense
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -50,7 +50,7 @@ def _through(u: str, text: str) -> Callable[[Model], Model]:
 
 def even_stiffness(site: Site) -> list[Candidate]:
     """-k q²: not the same on both sides."""
-    if not site.rate:
+    if not site.placed:
         return []
     k = Parameter(site.name("k_even"), 0.0, f"1/(s^2*{site.unit})")
     return [term(site, "even_stiffness", "a stiffness that differs between the sides",
@@ -60,7 +60,7 @@ def even_stiffness(site: Site) -> list[Candidate]:
 
 def quintic_stiffness(site: Site) -> list[Candidate]:
     """-k q⁵."""
-    if not site.rate:
+    if not site.placed:
         return []
     k = Parameter(site.name("k5"), 0.0, f"1/(s^2*({site.unit})^4)")
     return [term(site, "quintic_stiffness", "quintic stiffness", f"-{k.name}*{site.q}**5", k,
@@ -71,10 +71,8 @@ def linear_stiffness(site: Site) -> list[Candidate]:
     """-k q beside another restoring force: alone it is the model's own stiffness and a gain."""
     if not site.rate:
         return []
-    k = Parameter(site.name("k1"), 0.0, "1/s^2")
-    law = term(site, "linear_stiffness", "a stiffness beside the model's own",
-               f"-{k.name}*{site.q}", k, lambda w: -w.x[site.q], one_sided=False, known=False)
-    return [replace(law, instead_of=("input_gain", "sensor_gain"), beside=(
+    law = spring(site, "a stiffness beside the model's own")
+    return [replace(law, known=False, instead_of=("input_gain", "sensor_gain"), beside=(
         "wall_impact", "dissipating_wall", "cubic_stiffness", "quintic_stiffness",
         "even_stiffness"))]
 
@@ -159,7 +157,7 @@ def velocity_coupled_drive(site: Site) -> list[Candidate]:
         found.append(term(
             site, "velocity_coupled_drive",
             f"a drive that depends on {'speed' if site.q else site.v}", f"{k.name}*{u}*{site.v}", k,
-            _product(u, site.v), one_sided=False, known=False))
+            _product(u, site.v), one_sided=False, variant=_which(site, u), known=False))
     return found
 
 
@@ -178,8 +176,13 @@ def soft_saturation(site: Site) -> list[Candidate]:
                 one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)] if top else []
 
         found.append(Candidate(("soft_saturation",), "an input limited softly", text, "input", site,
-                               (k,), _through(u, text), directions, known=False))
+                               (k,), _through(u, text), directions, _which(site, u), known=False))
     return found
+
+
+def _which(site: Site, u: str) -> str:
+    """A variant for each of several inputs."""
+    return u if len(site.inputs) > 1 else ""
 
 
 def clock_error(site: Site) -> list[Candidate]:
@@ -239,7 +242,7 @@ def rate_limit(site: Site) -> list[Candidate]:
         found.append(Candidate(
             ("rate_limited_input",), "an input of limited rate",
             f"{u} changing by at most {most.name}", "input", site, (most,),
-            _limited(u, most.name), directions, known=False))
+            _limited(u, most.name), directions, _which(site, u), known=False))
     return found
 
 

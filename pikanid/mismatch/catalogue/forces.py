@@ -39,13 +39,25 @@ def term(site: Site, identifier: str, name: str, expression: str, size: Paramete
 
 def cubic_stiffness(site: Site) -> list[Candidate]:
     """A restoring force that bends: hardening or softening."""
-    if not site.rate:
+    if not site.placed:
         return []
     k = Parameter(site.name("k3"), 0.0, f"1/(s^2*({site.unit})^2)")
     law = term(site, "cubic_stiffness", "cubic stiffness", f"-{k.name}*{site.q}**3", k,
                lambda w: -w.x[site.q] ** 3, one_sided=False)
     return [replace(law, static=True, form="cubic", argument=site.q,
                     powers=Powers(3, 0, restores=True))]
+
+
+def free_spring(site: Site) -> list[Candidate]:
+    """A spring at a coordinate that has a place but that nothing brings back to it."""
+    return [spring(site, "a spring")] if site.placed and not site.rate else []
+
+
+def spring(site: Site, name: str) -> Candidate:
+    """-k q."""
+    k = Parameter(site.name("k1"), 0.0, "1/s^2")
+    return term(site, "linear_stiffness", name, f"-{k.name}*{site.q}", k,
+                lambda w: -w.x[site.q], one_sided=False)
 
 
 def static_bias(site: Site) -> list[Candidate]:

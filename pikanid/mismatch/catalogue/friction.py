@@ -84,10 +84,8 @@ def power_drag(site: Site) -> list[Candidate]:
 
 
 def amplitude_damping(site: Site) -> list[Candidate]:
-    """Viscous damping that grows with the square of the amplitude, where there is a rest to swing
-    about.
-    """
-    if not site.rate:
+    """Viscous damping that grows with the square of the distance from zero."""
+    if not site.placed:
         return []
     c = Parameter(site.name("c2"), 0.0, f"1/(s*({site.unit})^2)", (0.0, INF))
     law = term(site, "amplitude_damping", "damping that grows with amplitude",

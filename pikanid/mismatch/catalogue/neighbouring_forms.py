@@ -3,7 +3,8 @@
 A name claims a form.  Where the form next to it explains a recording about as well, the recording
 has not shown which of them acts; where it explains far more, the entry is not what acts.  So
 compared are: every power law of the catalogue with those of one power more and one less in each
-state; an elastic wall with one whose force rises with the square, as that of a cable that tightens;
+state, that of a free exponent with a loss that saturates; an elastic wall with one whose force
+rises with the square, as that of a cable that tightens;
 a boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially; a
 steady drift with a parameter that settles; a loop of hysteresis with a spring that gives way
 without a memory; a scale error of input or sensor with curves that bend as well, and a cubic one
@@ -29,6 +30,8 @@ MEMORIES = (0.3, 1.0, 3.0)  # numerical: of the time to swing, where fits of a m
 SETTLED = (0.1, 0.3, 1.0)  # numerical: of the recording, where fits of what settles begin
 ROUNDED = (1.0, 1.5)  # numerical: of a sensor's limit, where fits of a rounded one begin
 KNEES = (0.03, 0.2)  # numerical: of the half range, how wide these begin where one side is limited
+SLOWEST = 0.005  # numerical: of the usual speed, the least at which a loss is half of its bound
+STEEPEST = 0.05  # numerical: what a loss that saturates lacks of being in proportion, at least
 BENT = (2, 3)  # definition: powers of a curve beside its straight part
 Starts = list[dict[str, float]]
 
@@ -37,6 +40,8 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
     """The decoys next to an entry in form; none where no form is next to it."""
     if entry.ids == ("wall_impact",):
         return [_stiffening(entry)]
+    if entry.ids == ("power_drag",):
+        return [_saturating(entry)]
     if entry.ids == ("boundary_layer",):
         return [_fading(entry)]
     if entry.ids == ("parameter_drift",):
@@ -51,7 +56,7 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
         return [_bent_otherwise(entry, n) for n in (2, 4)]
     if entry.ids == ("sensor_saturation",):
         return [_rounded(entry)]
-    if entry.powers is None or not entry.site.rate:
+    if entry.powers is None or not entry.site.placed:
         return []
     return [_power_law(entry, near) for near in _next(entry.powers)]
 
@@ -120,6 +125,27 @@ def _stiffening(wall: Candidate) -> Candidate:
     return _decoy(wall, "stiffening_wall", wall_force(
         site, distance.name, k.name, wall.variant, power=2),
                   (distance, k), starts, wall.families)
+
+
+def _saturating(drag: Candidate) -> Candidate:
+    """-c v/(s + |v|): in proportion at first, and bounded, as a reaction's rate is (L. Michaelis
+    and M. L. Menten, Biochem. Z. 49, 1913).
+    """
+    site, (size, exponent) = drag.site, drag.parameters
+    c = Parameter(site.name("c_most"), 0.0, site.force_unit, (0.0, INF))
+    half = Parameter(site.name("v_half"), site.usual_speed or 1.0, site.speed_unit,
+                     (SLOWEST * (site.usual_speed or 1.0), INF))
+
+    def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
+        v, n = np.abs(states[site.v]), values[exponent.name]
+        usual = float(np.sqrt(np.mean(v**2)))
+        # where both rise alike
+        at = usual * n / max(1 - n, STEEPEST)
+        as_loud = np.sqrt(np.mean(v ** (2 * n)) / max(np.mean((v / (at + v)) ** 2), 1e-300))
+        return [{c.name: values[size.name] * float(as_loud), half.name: at}]
+
+    text = f"-{c.name}*{site.v}/({half.name} + abs({site.v}))"
+    return _decoy(drag, "saturating_loss", text, (c, half), starts, drag.families)
 
 
 def _fading(layer: Candidate) -> Candidate:

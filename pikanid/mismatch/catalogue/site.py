@@ -84,6 +84,11 @@ class Site:
         return f"{self.unit}/s^2" if self.q else units.product((self.speed_unit, 1), ("s", -1))
 
     @property
+    def placed(self) -> bool:
+        """Whether the model depends on where its coordinate is: else no place of it is special."""
+        return bool(self.q) and self.acceleration.has(symbol(self.q))
+
+    @property
     def moving(self) -> tuple[str, ...]:
         """Names of coordinate and rate, or of the state alone."""
         return (self.q, self.v) if self.q else (self.v,)

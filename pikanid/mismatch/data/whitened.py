@@ -132,8 +132,11 @@ class Whitened:
             p = self.problem.parameters(theta, r)
             halved = replace(self.steps[r], longest=self.steps[r].longest / 2)
             rough, fine = (simulator.run(p, steps=s) for s in (self.steps[r], halved))
+            if not rough.finished or not fine.finished:
+                found.append(np.inf)
+                continue
             size = float(np.abs((fine.y - rough.y) / self.sigma[r]).max(initial=0.0)) * 16 / 15
-            found.append(size / SHARE if rough.finished and fine.finished else np.inf)
+            found.append(size / SHARE)
         return found
 
     def step_as(self, *others: Whitened) -> None:

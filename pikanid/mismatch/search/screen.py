@@ -162,6 +162,8 @@ class Screen:
                 self._start(candidate, s, self.z[s]) for s in signs]
             if law(candidate):
                 starts += self._instead(signs[0])
+            if fixed(candidate):
+                starts += self._at_the_guess()
             listed.append((candidate, starts))
         # decoys beside the entries, not in their place
         known = [one for one in listed if one[0].known][:count]
@@ -185,7 +187,14 @@ class Screen:
         if some:
             return [self._start(c, k, 0.0) for k in some]
         return [Start(self.about.point, self.about.point),
-                *(self._instead(int(own[0])) if len(own) and law(c) else [])]
+                *(self._instead(int(own[0])) if len(own) and law(c) else []),
+                *(self._at_the_guess() if fixed(c) else [])]
+
+    def _at_the_guess(self) -> list[Mapping[str, float]]:
+        """Where an effect that nothing makes small may begin besides: the fit without it, as of a
+        reversed sign, can have made all motion small instead.
+        """
+        return [self.about.point_with(self.guess)] if self.about.far and self.guess else []
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
         size = float(amplitude / self.lengths[sign])

@@ -46,11 +46,10 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
-    if case.proves and (base := case.predicted(case.base)) and below(
-            base.motion, asked):
+    if case.proves and (shown := case.predicted(best)) and below(shown.motion, asked):
         case.notes.append(
             "The held-out recording is at rest, or too short: all that moves in it is worth "
-            f"{base.motion:.2g} of chi-squared, and {asked:.0f} are needed to confirm "
+            f"{shown.motion:.2g} of chi-squared, and {asked:.0f} are needed to confirm "
             "anything.")
     levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, site)

@@ -49,6 +49,7 @@ FORMULAS = {
     "periodic_force": r"sin\([^)]*\bt\b",
     "product_of_states": r"\w+\*\w+\*\w+",
     "bilinear_input": r"\w+\*\w+\*\w+",
+    "bounded_loss": r"/\(\w+ \+ [Aa]bs\(\w+\)\)",
     "one_sided_spring": r"max\(\w+ - \w+, 0\)\*\*2",
     "rippled_sensor": r"sin\(",
 }
