@@ -103,15 +103,15 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     return tuple(with_twins([*own, *made.values()], effects))
 
 
-def _channels(candidate: Candidate) -> list[str]:
+def _channels(candidate: Candidate) -> Sequence[str]:
     """The input or output that a candidate changes, rather than an equation."""
     site = candidate.site
+    if candidate.channel == "dynamics":
+        return ()
     if candidate.channel == "sensor":
-        return [site.output.name]
-    if candidate.channel != "input" or len(site.inputs) == 1:
-        return [*site.inputs] if candidate.channel == "input" else []
-    changed = candidate.applied(site.model).inputs
-    return [a.name for a, b in zip(site.model.inputs, changed, strict=True) if a != b]
+        return (site.output.name,)
+    # of several inputs the variant tells which
+    return [u for u in site.inputs if u in candidate.variant.split(",")] or site.inputs
 
 
 def _has_meaning(candidate: Candidate, model: Model) -> bool:
