@@ -23,7 +23,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
     holds leave nothing beside it that a test would find.  The held-out recording has to be one that
     could have refuted it.  And it has to speak for each of several: one is easily found that takes
     up what the others leave, whatever that is.  What happens once, of which it cannot speak, takes
-    up anything: there, what lasts must not do most of that as well.
+    up anything: there, what lasts must not do most of that as well and predict as well.
 
     Args:
         h: To prove.
@@ -65,19 +65,20 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             if len(h.effects) > 1 and not e.absent and not speaks(
                     h, o, predict, asks.needed * scale):
                 return f"the held-out recording does not need {e.name}"
-            if e.absent and (other := _lasting(rest, o, fits.values())) and smaller(
-                    asks.once * (o.minimum.chi2 - h.minimum.chi2),
-                    o.minimum.chi2 - other.minimum.chi2):
+            most = asks.once * (o.minimum.chi2 - h.minimum.chi2)
+            if e.absent and any(
+                    smaller(most, o.minimum.chi2 - other.minimum.chi2)
+                    and not speaks(h, other, predict, asks.needed * scale)
+                    for other in _lasting(rest, o, fits.values())):
                 return f"a lasting effect would take up most of what {e.name} does"
     return ""
 
 
 def _lasting(rest: frozenset[str], fewer: Hypothesis, fits: Iterable[Hypothesis]
-             ) -> Hypothesis | None:
-    """The closest hypothesis with one more effect than `rest`, which `fewer` holds, that lasts."""
-    return min((o for o in fits if rest < o.key and len(o.effects) == len(fewer.effects) + 1
-                and not any(e.absent for e in o.effects if e.key not in rest)),
-               key=lambda o: o.minimum.chi2, default=None)
+             ) -> list[Hypothesis]:
+    """The hypotheses with one more effect than `rest`, which `fewer` holds, that lasts."""
+    return [o for o in fits if rest < o.key and len(o.effects) == len(fewer.effects) + 1
+            and not any(e.absent for e in o.effects if e.key not in rest)]
 
 
 def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float = 0.0) -> bool:
