@@ -11,6 +11,7 @@ from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.catalogue.coupled_state import coupled_state
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
+from pikanid.mismatch.catalogue.fading_memory import fading_memory, without_store
 from pikanid.mismatch.catalogue.neighbouring_forms import neighbouring_forms
 from pikanid.mismatch.catalogue.own_effects import own_effects, with_twins
 from pikanid.mismatch.catalogue.reversed_signs import input_sign, sensor_sign
@@ -65,6 +66,7 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.clock_error, ("timing",)),
     (decoys.wobble, ("slow change",)),
     (decoys.rate_limit, ("timing",)),
+    (fading_memory, ("storage",)),
 )
 
 
@@ -95,6 +97,9 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     for entry in [*made.values()]:
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
     effects = tuple(effects)
+    stored = {state for effect in effects if effect.states for state in effect.add}
+    made = {key: without_store(c) if c.ids == ("fading_memory",) and c.site.v in stored else c
+            for key, c in made.items()}
     own = own_effects(effects, sites, made)
     model = sites[0].model
     measured = [*(s.unit for s in model.states), *(o.unit for o in model.outputs)]

@@ -40,6 +40,7 @@ FORMULAS = {
     "asymmetric_spring": r"Abs\((\w+ - )?theta\)|max\(-?theta(, 0)?\)",
     "warming_damping": r"d_theta\*\(1 \+ \w+\*exp\(-t/",
     "fluid_memory": r"\(theta_dot - wake\)",
+    "fading_memory": r"\(wake\w* - \w+\)|\(\w+ - wake\w*\)",
     "position_friction": r"theta\*\*2\*sign\(theta_dot\)",
     "cable_drag": r"max\(theta - \w+, 0\)\*\*2",
     "cogging": r"sin\([^)]*\*theta\b",

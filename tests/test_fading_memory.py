@@ -1,0 +1,61 @@
+"""A state that remembers where it was, and what is left of that where an entry is the store."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from tanks import tank
+
+import pikanid as pk
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import sites
+from pikanid.model import Effect, NewState
+from pikanid.model.parts import Parameter
+
+
+def run(seed: int, k: float, r: float = 0.2) -> pk.Recording:
+    """x' = u - x/2 + k (w - x), w' = r (x - w), both at rest: a linear system, by DOP853."""
+    rng = np.random.default_rng(seed)
+    u, x = np.repeat(rng.uniform(0.2, 2.0, 20), 40), np.zeros((800, 2))
+    for i in range(799):
+        x[i + 1] = solve_ivp(lambda _, y, push=u[i]: [
+            push - 0.5 * y[0] + k * (y[1] - y[0]), r * (y[0] - y[1])], (0, 0.1), x[i], "DOP853",
+            rtol=1e-9, atol=1e-11).y[:, -1]
+    return pk.Recording.from_arrays(
+        0.1 * np.arange(800), {"u": u, "x": x[:, 0] + rng.normal(0, 0.02, 800)},
+        {"u": "m/s", "x": "m"}, {"x": 0.02}, {"u": "zero"})
+
+
+def memory(*effects: Effect) -> Candidate:
+    model = tank()
+    [found] = [c for c in candidates(sites(model, (run(1, 0.0),)), effects)
+               if c.ids == ("fading_memory",)]
+    return found
+
+
+def test_it_exchanges_with_a_state_of_its_own() -> None:
+    model, law = tank(), memory()
+    made, x, w, k, r = law.applied(model), *map(symbol, ("x", "wake", "k_wake", "r_wake"))
+    assert (made.equations["x"] - model.equations["x"] - k * (w - x)).expand() == 0
+    assert (made.equations["wake"] - r * (x - w)).expand() == 0
+    assert not law.known and law.families == ("storage",)
+
+
+def test_where_an_entry_is_the_store_the_rest_drives_away() -> None:
+    own = Effect("store", "a store", (Parameter("k_s", 0.1, "1/s", (0.0, np.inf)),), ("k_s", 0.0),
+                 add={"x": "k_s*(z_s - x)"}, states={"z_s": NewState("m", "0", "0.2*(x - z_s)")})
+    assert memory(own).parameters[0].bounds == (-np.inf, 0.0)
+    assert memory().parameters[0].bounds == (-np.inf, np.inf)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("k", [0.4, -0.15])
+def test_an_unknown_memory_is_given_no_name(k: float) -> None:
+    """Of entries together some explain most of it: none of them acts."""
+    answer = pk.diagnose(tank(), run(1, k), run(2, k))
+    assert answer.mismatch and answer.verdict not in ("named", "partial")
+    assert answer.verdict != "set" or all(
+        i.startswith("symbolic:") for h in answer.hypotheses for e in h.effects for i in e.ids)
