@@ -60,10 +60,12 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
-    open, and an effect with a limit has that where it is narrow.
+    open, and an effect with a limit has that where it is narrow.  An entry in two shapes is one.
     """
     def group(e: Candidate) -> str:
-        return e.twin + e.site.suffix if e.twin else e.key
+        if e.twin:
+            return e.twin + e.site.suffix
+        return e.ids[0] + e.site.suffix if e.refines else e.key
 
     first: dict[frozenset[str], Hypothesis] = {}
     twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = {}
