@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from test_verdict import BASE, A, B, answered, effect, hypothesis
 
 import pikanid as pk
 from pikanid.formula.expressions import symbol
@@ -185,6 +187,19 @@ def test_without_a_rest_friction_has_no_next_form() -> None:
     assert not [c for c in candidates(sites(model, (run,)))
                 if c.next_to and c.channel == "dynamics"
                 and c.ids not in (("stiffening_wall",), ("saturating_loss",))]
+
+
+def test_the_next_form_stands_beside_several_names_that_it_explains_no_better_than() -> None:
+    """It keeps them away where it explains far better; a law that is next to none of them leaves
+    them unconfirmed where it explains a little better.
+    """
+    near = replace(effect("near", known=False), next_to="a")
+    names = [BASE, hypothesis(1000.0, A), hypothesis(1001.0, B)]
+    found = answered([*names, hypothesis(998.0, near)])
+    assert found.verdict == "set" and len(found.given) == 3
+    assert answered([*names, hypothesis(980.0, near)]).verdict == "unnamed"
+    other = effect("other", known=False)
+    assert answered([*names, hypothesis(998.0, other)]).verdict == "unconfirmed"
 
 
 def swings(seed: int, force: Callable[[float], float]) -> Recording:

@@ -153,10 +153,12 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         [h for h in outside if below(
             total(h) - (0.0 if h.next_form else _handicap(h, asks)), lowest + within)], tried, asks)
     merged, twins = merged + open_to, {**twins, **more}
-    # beside one name such a law may explain it as much better as is no evidence: it is given, too
-    margin = within if len(merged) == 2 else 0.0
+    # beside one name such a law, and a name's next form beside several, may explain it as much
+    # better as is no evidence: it is given, too
     if proves and not known[0].symbolic and any(
-            below(total(h) - _handicap(h, asks), lowest - margin) for h in outside):
+            below(total(h) - _handicap(h, asks),
+                  lowest - (within if len(merged) == 2 or h.next_form else 0.0))
+            for h in outside):
         doubt = "a law outside the catalogue explains it better"
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
