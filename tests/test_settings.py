@@ -6,6 +6,7 @@ import inspect
 import json
 import pkgutil
 import re
+import threading
 from dataclasses import fields, is_dataclass, replace
 from importlib import import_module
 from math import inf, log, nan
@@ -187,11 +188,12 @@ USUAL += [getattr(DEFAULTS, f.name) for f in fields(DEFAULTS)
 
 
 def watch(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, str]]:
-    """From now on: which field of which object is asked for, of all kinds of settings."""
+    """From now on: which field of which object this thread asks for, of all kinds of settings."""
     asked: list[tuple[int, str]] = []
+    here = threading.get_ident()  # another test's thread may still be at work
 
     def look(self: Any, name: str) -> Any:
-        if not name.startswith("__"):
+        if not name.startswith("__") and threading.get_ident() == here:
             asked.append((id(self), name))
         return object.__getattribute__(self, name)
 
