@@ -89,7 +89,6 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
                     "differences")
 
 
-@functools.lru_cache(maxsize=256)
 def decides(dof: int, settings: AdequacySettings = USUAL) -> bool:
     """Whether a χ² test with so many degrees of freedom sees a residual of twice the noise at least
     every other time.
@@ -97,10 +96,14 @@ def decides(dof: int, settings: AdequacySettings = USUAL) -> bool:
     >>> [dof for dof in range(-2, 20) if decides(dof)][0]
     7
     """
+    return _decides(dof, settings.alpha, settings.times, settings.power)
+
+
+@functools.lru_cache(maxsize=256)
+def _decides(dof: int, alpha: float, times: float, power: float) -> bool:
     from scipy.special import chdtrc, chdtri
 
-    return dof > 0 and float(chdtrc(
-        dof, chdtri(dof, settings.alpha) / settings.times**2)) >= settings.power
+    return dof > 0 and float(chdtrc(dof, chdtri(dof, alpha) / times**2)) >= power
 
 
 def difference_noise(y: np.ndarray, order: int = 4) -> float:
