@@ -74,7 +74,10 @@ def test_fits_and_trajectories_are_those_of_the_estimate(estimate: Estimate) -> 
 
 def test_fitted_model_simulates_the_fit(estimate: Estimate) -> None:
     again = pk.simulate(estimate.fitted_model, excitation.two_pulse())
-    np.testing.assert_allclose(again["theta"].values, estimate.fits[0].fitted, atol=1e-7)
+    fit = estimate.fits[0]
+    # a fit integrates as exactly as its noise asks, `simulate` as exactly as the signal does
+    np.testing.assert_allclose(again["theta"].values, fit.fitted, rtol=0,
+                               atol=0.01 * fit.sigma.min() / np.sqrt(len(fit.fitted)))
 
 
 def test_good_is_what_converged_and_is_no_misfit(estimate: Estimate) -> None:

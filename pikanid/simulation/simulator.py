@@ -21,7 +21,7 @@ from pikanid.simulation.input_paths import split, with_parts
 
 MethodChoice = Literal["auto", "explicit", "implicit"]
 _NOTHING = np.empty(0, np.int64)  # definition: an empty array
-SPARE = 4.0  # numerical: times less than is allowed, the error that steps are foretold for
+SPARE = 2.0  # numerical: times less than is allowed, the error that steps are foretold for
 FORETOLD = 64  # numerical: times finer: beyond that an error is far from what the order says
 CONVERGING = 0.2  # numerical: of the error, that half the step leaves at most where all is smooth
 FINEST = 4096  # limit: sub-steps of the median interval beyond which the explicit route gives up
