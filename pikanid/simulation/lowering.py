@@ -18,6 +18,9 @@ from sympy.core.function import AppliedUndef
 from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
 from pikanid.model import Model, Spline
 
+# numerical: power of a positive part from which on a method of order 4 keeps its order across zero
+CONTINUOUS = 3
+
 
 class positive_power(sp.Function):
     """bⁿ for b >= 0, zero at b = 0 whatever the (real) exponent."""
@@ -78,6 +81,9 @@ class Lowering:
         if isinstance(expr, sp.Pow) and isinstance(expr.base, sp.Abs) and not (
                 expr.exp.is_integer or expr.exp.is_negative):
             return self.lower(abs_power(expr.base.args[0], expr.exp))
+        if isinstance(expr, sp.Pow) and (inner := positive_part(expr.base)) is not None and (
+                expr.exp.is_integer and expr.exp >= CONTINUOUS):
+            return positive_power(self.lower(inner), expr.exp)
         args = [self.lower(a) for a in expr.args]
         if isinstance(expr, AppliedUndef):
             names = [s.name for s in self.splines]
@@ -108,6 +114,17 @@ class Lowering:
             s = sense * self.switch(other - result)
             result = (result * (1 - s) + other * (1 + s)) / 2
         return result
+
+
+def positive_part(expr: sp.Expr) -> sp.Expr | None:
+    """The g of max(g, 0), or None.
+
+    >>> positive_part(sp.Max(sp.Symbol("x") - 1, 0))
+    x - 1
+    """
+    if not (isinstance(expr, sp.Max) and len(expr.args) == 2 and sp.S.Zero in expr.args):
+        return None
+    return expr.args[0] if expr.args[1] == 0 else expr.args[1]
 
 
 def switch_symbol(index: int) -> sp.Symbol:

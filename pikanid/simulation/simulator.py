@@ -23,7 +23,7 @@ MethodChoice = Literal["auto", "explicit", "implicit"]
 _NOTHING = np.empty(0, np.int64)  # definition: an empty array
 SPARE = 2.0  # numerical: times less than is allowed, the error that steps are foretold for
 FORETOLD = 64  # numerical: times finer: beyond that an error is far from what the order says
-CONVERGING = 0.2  # numerical: of the error, that half the step leaves at most where all is smooth
+CONVERGING = 0.1  # numerical: of the error, that half the step leaves at most where all is smooth
 FINEST = 4096  # limit: sub-steps of the median interval beyond which the explicit route gives up
 
 
@@ -182,7 +182,7 @@ class Simulator:
     def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
                      method: MethodChoice = "auto", known: Steps | None = None,
                      finest: float = 0.0, trial: Trial | None = None,
-                     scale: np.ndarray | None = None) -> Steps:
+                     scale: np.ndarray | None = None, enough: float = 0.0) -> Steps:
         """The longest sub-step whose error, by step doubling, is below `tolerance`.
 
         Runs with steps h and h/2 and takes |y_h - y_{h/2}|·16/15 as the error of h (order 4:
@@ -192,13 +192,13 @@ class Simulator:
         Args:
             tolerance: Of the outputs, in their own units or in those of `scale`; default 1e-8 of
                 the largest output.
-            known: Steps in use: shorter ones follow from the method's order, checked at p; these
-                where they are fine enough.
+            known: Steps in use, kept where fine enough; else others follow by the method's order.
             finest: Give up below this step [s]; at least 1/4096 of the median interval is tried.
             trial: The response at p for given steps and whether these are likely to be chosen; by
                 default simulated without sensitivities.
             scale: (rows,) in which the error of each sample is measured, as its σ: what outputs of
                 several units need; the error of the steps found is in it too.
+            enough: Error that does where halving gains less than it should: at kinks.
 
         Raises:
             SimulationFailed: The trajectory is not finite at p with any step.
@@ -234,9 +234,10 @@ class Simulator:
                     error, failure = np.inf, fine
                 # what is smooth is there soon; kinks, and what is stiff, may need another method
                 stuck, before = not error < CONVERGING * before, error
+                if stuck and best is not None and best.error <= enough:
+                    return best
                 rough, longest = fine, longest / 2
-                if stuck and candidate == "explicit" and method == "auto" and (
-                        longest < spacing / 64):
+                if stuck and method == "auto" and longest < spacing / 64:
                     break
         if best is None:
             raise errors.SimulationFailed(

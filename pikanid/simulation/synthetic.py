@@ -31,7 +31,8 @@ def simulate(model: Model, excitation: Recording, *,
         seed: Of the noise.
         t: Times of the outputs (N,); default: the time base of the excitation.
         parameters: Values that differ from the model's.
-        tolerance: Of the outputs; default 1e-10 of the largest output.
+        tolerance: Of the outputs; default 1e-10 of the largest output, or 1e-8 where formulas have
+            kinks that ever shorter steps hardly meet.
 
     Returns:
         Recording with the excitation's channels and one channel an output.
@@ -53,10 +54,12 @@ def simulate(model: Model, excitation: Recording, *,
         *(Channel(o.name, times, ramp, o.unit) for o in model.outputs))
     simulator = Simulator(model, bind(model, wanted))
     p = np.array(list(model.values.values()))
+    enough = 0.0
     if tolerance is None:
         rough = simulator.run(p, steps=simulator.choose_steps(p, method=method))
-        tolerance = 1e-10 * max(float(np.abs(rough.y).max(initial=0.0)), 1e-12)
-    steps = simulator.choose_steps(p, tolerance, method)
+        largest = max(float(np.abs(rough.y).max(initial=0.0)), 1e-12)
+        tolerance, enough = 1e-10 * largest, 1e-8 * largest
+    steps = simulator.choose_steps(p, tolerance, method, enough=enough)
     response = simulator.run(p, steps=steps)
     if not response.finished:
         raise errors.SimulationFailed(errors.not_finite(response.stopped_at, "these parameters"))

@@ -43,7 +43,8 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
     """
     visited = h.whitened.motion(h.minimum.theta)[argument]
     curve = FreeCurve(argument, float(visited.min()), float(visited.max()), h.model, FINE)
-    return fitted(nominal, [*effects, curve.candidate(site)], h.whitened.records, [h.point], 1)
+    return fitted(nominal, [*effects, curve.candidate(site)], h.whitened.records, [h.point], 1,
+                  settled=h.key)
 
 
 def with_free_input(nominal: Model, h: Hypothesis, name: str, site: Site) -> Hypothesis | None:
@@ -68,7 +69,8 @@ def _beside(nominal: Model, h: Hypothesis, name: str, visited: np.ndarray, unit:
     if low == high:
         return None
     curve = FreeCurve(name, low, high, h.model, FINE, unit)
-    return fitted(nominal, [*h.effects, effect(curve, site)], h.whitened.records, [h.point], 1)
+    return fitted(nominal, [*h.effects, effect(curve, site)], h.whitened.records, [h.point], 1,
+                  settled=h.key)
 
 
 def share_lacking(base: Hypothesis, argument: str, site: Site) -> float:

@@ -195,19 +195,18 @@ class Search:
                              self.settings.search.promising * gap, always, anyway)
 
     def closer(self, hypotheses: Sequence[Hypothesis]) -> bool:
-        """Fit hypotheses with one effect less, or another one in its place, on from where they
-        stand; whether that found anything.
-        """
+        """Fit neighbours of hypotheses on from where these stand; whether that found anything."""
         before = {h.fit for h in self.fits.values()}
         for h in hypotheses[:self.settings.budget.asked_again]:
-            self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates)))
+            self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates)),
+                        h.key)
             self._exchange(h, anyway=True)
         return {h.fit for h in self.fits.values()} != before
 
-    def refine(self, jobs: Iterable[Job]) -> bool:
+    def refine(self, jobs: Iterable[Job], settled: frozenset[str] = frozenset()) -> bool:
         """Fit these effects from these starts, known or not; whether that found anything."""
         before = {h.fit for h in self.fits.values()}
-        self._fit_all([*jobs], again=True, always=True)
+        self._fit_all([*jobs], again=True, always=True, settled=settled)
         return {h.fit for h in self.fits.values()} != before
 
     def offer(self, formulas: Sequence[Candidate]) -> None:

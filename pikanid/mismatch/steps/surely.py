@@ -59,6 +59,7 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
     noise = [{name: level.sigma for name, level in records.levels[0].items()}
              for records in (case.records, case.later)]
     search, settings = case.search, case.settings
+    search.spent = 0.0  # what is sure has a budget of its own
 
     def weighed() -> tuple[Explanations | None, Part | None]:
         found = explanations(search.ranked(), search.scale(), case.predicted, noise, settings,
@@ -78,7 +79,7 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
         explained, part = weighed()
     # nothing of an explanation is sure that was not left out of it, of the last one found neither
     while explained and explained.lead and search.refine(
-            _without_each_family(explained.lead.hypothesis)):
+            _without_each_family(lead := explained.lead.hypothesis), lead.key):
         explained, part = weighed()
     return explained, None if part is None else _against_curves(case, part, noise)
 
@@ -87,8 +88,9 @@ def _one_more(search: Search, lead: Hypothesis) -> None:
     """Fit the most promising effects that last beside an explanation's own."""
     if len(lead.effects) < search.settings.budget.effects:
         screen = Screen(lead, [c for c in beside(lead, search.candidates) if c.lasts])
-        search.refine(((*lead.effects, c), starts) for c, starts in screen.singles(
-            search.settings.budget.beside_one, search.settings.search.much * lead.minimum.chi2))
+        search.refine([((*lead.effects, c), starts) for c, starts in screen.singles(
+            search.settings.budget.beside_one,
+            search.settings.search.much * lead.minimum.chi2)], lead.key)
 
 
 def _compared(search: Search, lead: Hypothesis) -> bool:
@@ -97,8 +99,8 @@ def _compared(search: Search, lead: Hypothesis) -> bool:
     """
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
-        *with_next_form(lead, search.candidates), *_without_each_family(lead)])
-    return search.closer([lead]) or found
+        *with_next_form(lead, search.candidates), *_without_each_family(lead)], lead.key)
+    return (not search.budget_exhausted and search.closer([lead])) or found
 
 
 def _without_each_family(lead: Hypothesis) -> list[Job]:
