@@ -77,6 +77,10 @@ TERMS = {
     "stop": Term("-k*max(theta - wall, 0)", {"k": 2e4, "wall": 0.08},
                  lambda t, x, u, s, p: -p["k"] * (x[0] - p["wall"]) * (s[0] > 0),
                  at_angle("wall")),
+    # smooth enough to be stepped over
+    "stiffening stop": Term("-k*max(theta - wall, 0)**3", {"k": 2e6, "wall": 0.08},
+                            lambda t, x, u, s, p: -p["k"] * max(x[0] - p["wall"], 0.0) ** 3,
+                            at_angle("wall")),
     "stop with damper": Term(
         "-(k*(theta - wall) + c*theta_dot)*step(theta - wall)",
         {"k": 2e4, "wall": 0.08, "c": 20.0},

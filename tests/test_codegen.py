@@ -26,6 +26,13 @@ def test_outputs_that_show_a_sign_say_how_much(function: str, gain: str) -> None
     assert ("Hs[0, 0] = " in body) == bool(gain) and gain in body
 
 
+@pytest.mark.parametrize(("power", "stops"), [(1, 1), (2, 1), (3, 0), (4, 0)])
+def test_what_is_bent_little_enough_is_no_reason_to_stop(power: int, stops: int) -> None:
+    model = systems.sloshing().with_term("theta_dot", f"-c*max(theta - 0.1, 0)**{power}",
+                                         [Parameter("c", 1.0)])
+    assert generate(model)[1].lowered.n_dynamic == stops
+
+
 @pytest.mark.parametrize("method", ["explicit", "implicit"])
 @pytest.mark.parametrize("switching", [False, True])
 def test_what_parameters_alone_decide_is_evaluated_once_a_run(

@@ -120,7 +120,7 @@ def test_a_decoy_gives_no_name() -> None:
 def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
         monkeypatch: pytest.MonkeyPatch) -> None:
     """The last round of comparisons finds a better explanation, of which nothing was left out."""
-    first, better, without = (SimpleNamespace(effects=e, point={}) for e in (
+    first, better, without = (SimpleNamespace(effects=e, point={}, key=frozenset()) for e in (
         (COULOMB,), (COULOMB, DRAG), (DRAG,)))
     lead, tried = [first], []
 
@@ -128,7 +128,7 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
         lead[0] = better
         return True
 
-    def refine(jobs: Any) -> bool:
+    def refine(jobs: Any, settled: Any) -> bool:
         effects = [tuple(e.key for e in own) for own, _ in jobs]
         new = [e for e in effects if e not in tried]
         tried.extend(new)

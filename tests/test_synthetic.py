@@ -9,6 +9,8 @@ import pytest
 import pikanid as pk
 from pikanid.model import Model
 from pikanid.recording import Recording
+from pikanid.simulation import Simulator, Steps
+from pikanid.simulation.simulator import Response
 from pikanid.simulation.synthetic import with_outputs
 
 T = np.linspace(0.0, 2.0, 401)
@@ -57,3 +59,27 @@ def test_placeholders_only_where_an_output_is_missing() -> None:
     found = with_outputs(model(), own, T[::40])
     np.testing.assert_array_equal(found["x"].values, T[:5] + 1)
     np.testing.assert_array_equal(found["w"].time, T[::40])
+
+
+def test_kinks_are_not_met_with_ever_shorter_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    kinked = Model.from_dict({
+        "states": {"x": {"initial": 1.0}, "v": {}}, "inputs": {"u": {}}, "outputs": {
+            "y": {"expression": "x"}}, "equations": {"x": "v", "v": "-30*x - signed_power(v, n)"},
+        "parameters": {"n": {"guess": 1.1}}})
+    tried: list[float] = []
+    run = Simulator.run
+
+    def counted(self: Simulator, p: np.ndarray, active: np.ndarray | None = None,
+                steps: Steps | None = None, states: bool = False) -> Response:
+        assert steps is not None
+        tried.append(steps.longest)
+        return run(self, p, active, steps, states)
+
+    monkeypatch.setattr(Simulator, "run", counted)
+    few = Recording.from_arrays(T[::20], {"u": np.zeros(21)}, hold={"u": "zero"})
+    found = pk.simulate(kinked, few)["y"].values
+    shortest = min(tried)
+    exact = pk.simulate(kinked, few, tolerance=1e-11, method="explicit")["y"].values
+    # 1e-8 of the largest output is promised; 1e-10 had taken far shorter steps
+    assert 1e-10 < np.abs(found - exact).max() < 1e-8
+    assert min(tried) < 0.2 * shortest

@@ -23,13 +23,16 @@ CONTINUOUS = 3
 
 
 class positive_power(sp.Function):
-    """bⁿ for b >= 0, zero at b = 0 whatever the (real) exponent."""
+    """bⁿ for b > 0, zero for b <= 0 whatever the (real) exponent."""
 
     nargs = 2
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         base, n = self.args
-        return power_slope(base, n) if argindex == 1 else self * log_abs(base)
+        if argindex == 1:
+            return n * positive_power(base, n - 1) if n.is_integer and n > 1 else power_slope(
+                base, n)
+        return self * log_abs(base)
 
 
 class power_slope(sp.Function):
