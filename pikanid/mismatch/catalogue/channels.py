@@ -185,10 +185,9 @@ def _input(site: Site, u: str, identifier: str, name: str, parameters: tuple[Par
            expression: str, directions: Callable[[View], Sequence[TangentDirection]],
            twin: str = "",
            channel: Channel = "input", variant: str = "", **maps: object) -> Candidate:
-    several = len(site.inputs) > 1
     return Candidate((identifier,), name, expression, channel, site, parameters,
                      lambda m: m.map_input(u, **maps), directions,  # type: ignore[arg-type]  # all text
-                     ",".join([variant] * bool(variant) + [u] * several), twin)
+                     ",".join(filter(None, (variant, site.variant(u)))), twin)
 
 
 def input_gain(site: Site) -> list[Candidate]:

@@ -22,7 +22,6 @@ from pikanid.model.parts import Parameter
 from pikanid.problem.held import HeldInput, acting
 
 RISING = (0.025, 0.075, 0.25)  # numerical: of the usual speed, below which friction rises
-SLOWEST = 0.005  # numerical: of the usual speed, the least
 PARTS = 8  # numerical: of a step, at which a ramp within it is looked at
 Shape = Callable[[View], np.ndarray]
 
@@ -102,9 +101,7 @@ def stribeck_friction(site: Site) -> list[Candidate]:
     """Dry friction that is greater at low speed."""
     c = Parameter(site.name("c_s"), 0.0, site.force_unit, (0.0, INF))
     rise = Parameter(site.name("rise"), 0.5, "", (0.0, 20.0))
-    usual = site.usual_speed or 1.0
-    slow = Parameter(site.name("v_s"), RISING[1] * usual, site.speed_unit,
-                     (SLOWEST * usual, INF))
+    slow = site.slow_speed("v_s", RISING[1])
     text = f"-{c.name}*(1 + {rise.name}*exp(-({site.v}/{slow.name})**2))*sign({site.v})"
 
     def directions(view: View) -> list[TangentDirection]:
@@ -157,7 +154,7 @@ def velocity_coupled_drive(site: Site) -> list[Candidate]:
         found.append(term(
             site, "velocity_coupled_drive",
             f"a drive that depends on {'speed' if site.q else site.v}", f"{k.name}*{u}*{site.v}", k,
-            _product(u, site.v), one_sided=False, variant=_which(site, u), known=False))
+            _product(u, site.v), one_sided=False, variant=site.variant(u), known=False))
     return found
 
 
@@ -176,13 +173,8 @@ def soft_saturation(site: Site) -> list[Candidate]:
                 one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)] if top else []
 
         found.append(Candidate(("soft_saturation",), "an input limited softly", text, "input", site,
-                               (k,), _through(u, text), directions, _which(site, u), known=False))
+                               (k,), _through(u, text), directions, site.variant(u), known=False))
     return found
-
-
-def _which(site: Site, u: str) -> str:
-    """A variant for each of several inputs."""
-    return u if len(site.inputs) > 1 else ""
 
 
 def clock_error(site: Site) -> list[Candidate]:
@@ -242,7 +234,7 @@ def rate_limit(site: Site) -> list[Candidate]:
         found.append(Candidate(
             ("rate_limited_input",), "an input of limited rate",
             f"{u} changing by at most {most.name}", "input", site, (most,),
-            _limited(u, most.name), directions, _which(site, u), known=False))
+            _limited(u, most.name), directions, site.variant(u), known=False))
     return found
 
 

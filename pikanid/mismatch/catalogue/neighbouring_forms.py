@@ -30,7 +30,6 @@ MEMORIES = (0.3, 1.0, 3.0)  # numerical: of the time to swing, where fits of a m
 SETTLED = (0.1, 0.3, 1.0)  # numerical: of the recording, where fits of what settles begin
 ROUNDED = (1.0, 1.5)  # numerical: of a sensor's limit, where fits of a rounded one begin
 KNEES = (0.03, 0.2)  # numerical: of the half range, how wide these begin where one side is limited
-SLOWEST = 0.005  # numerical: of the usual speed, the least at which a loss is half of its bound
 STEEPEST = 0.05  # numerical: what a loss that saturates lacks of being in proportion, at least
 BENT = (2, 3)  # definition: powers of a curve beside its straight part
 Starts = list[dict[str, float]]
@@ -133,8 +132,7 @@ def _saturating(drag: Candidate) -> Candidate:
     """
     site, (size, exponent) = drag.site, drag.parameters
     c = Parameter(site.name("c_most"), 0.0, site.force_unit, (0.0, INF))
-    half = Parameter(site.name("v_half"), site.usual_speed or 1.0, site.speed_unit,
-                     (SLOWEST * (site.usual_speed or 1.0), INF))
+    half = site.slow_speed("v_half")
 
     def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
         v, n = np.abs(states[site.v]), values[exponent.name]

@@ -20,7 +20,7 @@ def input_sign(site: Site) -> list[Candidate]:
         return Candidate(
             ("input_sign",), f"{u} acts in the opposite direction", f"-{u}", "input", site, (),
             lambda m: m.map_input(u, function=f"-{u}"), directions,
-            u if len(site.inputs) > 1 else "", twin="sign")
+            site.variant(u), twin="sign")
 
     return [one(u) for u in site.inputs
             if not units.begins_elsewhere(site.model.input(u).unit)]

@@ -11,8 +11,10 @@ from pikanid import errors
 from pikanid.formula import units
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
-from pikanid.model.parts import Output
+from pikanid.model.parts import Output, Parameter
 from pikanid.recording import Recording
+
+SLOWEST = 0.005  # numerical: of the usual speed, the least at which a law changes its course
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,16 @@ class Site:
         """About the largest value of the rate, or of the state where that is seen; else 0."""
         shown = self.q or self.output.expression == symbol(self.v)
         return self.half_range * (self.rate or 1.0) if shown else 0.0
+
+    def slow_speed(self, wanted: str, share: float = 1.0) -> Parameter:
+        """A speed at which a law changes its course, from a share of the usual one on."""
+        usual = self.usual_speed or 1.0
+        return Parameter(self.name(wanted), share * usual, self.speed_unit,
+                         (SLOWEST * usual, np.inf))
+
+    def variant(self, u: str) -> str:
+        """What tells an effect of one input from that of others; empty where it is the only one."""
+        return u if len(self.inputs) > 1 else ""
 
     @property
     def force_unit(self) -> str:
