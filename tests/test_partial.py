@@ -20,7 +20,7 @@ from pikanid.mismatch.report.findings import Where, values_of
 from pikanid.mismatch.report.part import Remainder, Value
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import surely
-from pikanid.mismatch.steps.surely import _without_scale
+from pikanid.mismatch.steps.surely import _without_shares
 from pikanid.reporting.diagnosis_page import page
 
 RULE = DEFAULTS.part
@@ -175,7 +175,7 @@ def test_a_curve_without_a_name_has_a_slope_of_its_own(names: tuple[str, ...], s
     present = tuple(Present(e.families[0], e, own, {}, 1.0, 1.0, 9.0, 1.0, 0.95)
                     for e, own in ((curve, names), (scale, ("sensor_gain",))))
     h: Any = SimpleNamespace(effects=(curve, scale), blurred=frozenset())
-    found = _without_scale(Part(present, (), h, 1.0, 0.95))
+    found = _without_shares(Part(present, (), h, 1.0, 0.95))
     assert {p.family for p in found.present} == sure
     assert {d.family for d in found.doubtful} == {"sensor curve", "gain"} - sure
 

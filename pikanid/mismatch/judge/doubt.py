@@ -20,7 +20,8 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
     """Why a hypothesis is not proved on other data; empty where it is.
 
     Each effect has to be strong.  What is weak can be a facet of anything: laws that no catalogue
-    holds leave nothing beside it that a test would find.  The held-out recording has to be one that
+    holds leave nothing beside it that a test would find; a minor one beside what explains most can
+    be whatever else the rig has that nobody modelled.  The held-out recording has to be one that
     could have refuted it.  And it has to speak for each of several: one is easily found that takes
     up what the others leave, whatever that is.  What happens once, of which it cannot speak, takes
     up anything: there, what lasts must not do most of that as well and predict as well.
@@ -40,6 +41,13 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
         return "as it stands it predicts the held-out recording far worse than the nominal model"
     spread = min(h.whitened.records.spread, settings.noise.order_only)
     louder = float(np.exp(settings.louder * spread))
+
+    def gained(over: Hypothesis) -> float:
+        a, b = predict(h), predict(over)
+        later = 0.0 if a is None or b is None else max(b.deviance - a.deviance, 0.0)
+        return (over.minimum.chi2 - h.minimum.chi2 + later) / scale
+
+    minor = asks.minor * gained(fits[frozenset()])
     for e in h.effects:
         rest = h.key - {e.key}
         count = max(len(h.effects), len(e.covers) if h.symbolic else 1)
@@ -49,16 +57,17 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             o = fits.get(fewer)
             if o is None:
                 continue
-            a, b = predict(h), predict(o)
-            later = 0.0 if a is None or b is None else max(b.deviance - a.deviance, 0.0)
-            first = (o.minimum.chi2 - h.minimum.chi2) / scale
-            if below(first, asks.shown):
+            if below((o.minimum.chi2 - h.minimum.chi2) / scale, asks.shown):
                 return f"the recording itself hardly shows {e.name}"
-            power = worth(e, a, b) / scale
+            power = worth(e, predict(h), predict(o)) / scale
             if below(power, least_proof):
                 return (f"the held-out recording could not have refuted {e.name} (it is worth "
                         f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
-            gain = first + later / scale
+            gain = gained(o)
+            if below(gain, minor) and below(gain, asks.minor_strong):
+                return (f"{e.name} explains so little beside the rest that it may stand for "
+                        f"anything of its size (it lowers chi-squared by {gain:.0f} of "
+                        f"{minor / asks.minor:.0f}, {asks.minor_strong:.0f} are asked)")
             if below(gain, asked):
                 return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
                         f"{asked:.0f} are asked)")

@@ -32,6 +32,10 @@ class VerdictSettings:
         strong: [χ² in all recordings] that one effect must gain, and each of two, of three, of
             four: 4.5 standard deviations in each of two recordings; several together can take up
             most of anything.
+        minor: Share of what an explanation gains below which an effect of it is minor: a tenth
+            of the misfit's size, as what nobody has modelled often is.
+        minor_strong: [χ² in all recordings] that a minor effect must gain: 10 standard deviations
+            in each of two recordings tell it from most laws of that size.
         shown: [χ²] that it must gain in the recording it was found in: the other one is the proof.
         needed: [criterion] that each of several effects must gain on held-out recordings.
         once: Share of what an effect that happens once takes away beside others that one that lasts
@@ -58,6 +62,8 @@ class VerdictSettings:
     part: Share = 0.5
     alike: Factor = 1.1
     strong: tuple[Amount, Amount, Amount, Amount] = (40.0, 45.0, 90.0, 135.0)
+    minor: Share = 0.01
+    minor_strong: Amount = 200.0
     shown: Amount = 12.0
     needed: Amount = 4.0
     once: Share = 0.5

@@ -146,20 +146,25 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
             if not smaller(own_left / max(beside, rule.floor), rule.form):
                 p = replace(p, names=())
         present.append(replace(p, dominance=min(p.dominance, float(kappa))))
-    return _without_scale(replace(part, present=tuple(present), doubtful=tuple(doubtful)))
+    return _without_shares(replace(part, present=tuple(present), doubtful=tuple(doubtful)))
 
 
-def _without_scale(part: Part) -> Part:
-    """The part without errors of scale beside a curve of an input or sensor whose form is not sure:
-    it has a slope of its own.
+def _without_shares(part: Part) -> Part:
+    """The part without what a law beside it does itself whose form is not sure: a curve of an input
+    or sensor has a slope of its own, and a wall takes energy out.
     """
-    curves = [p for p in part.present if p.family in CURVES and not p.names]
-    scales = [p for p in part.present if p.family == "gain" and curves]
+    unsure = [p for p in part.present if not p.names]
+    curve = next((p for p in unsure if p.family in CURVES), None)
+    wall = next((p for p in unsure if p.family == "restoring force" and p.effect.other_minima),
+                None)
+    shares = {"gain": curve and f"the {curve.family}, whose form is not sure, has a slope of its "
+                                "own",
+              "drag": wall and f"{wall.effect.name}, whose form is not sure, takes energy out"}
+    taken = {p.family: why for p in part.present if (why := shares.get(p.family))}
     return replace(
-        part, present=tuple(p for p in part.present if p not in scales),
-        doubtful=(*part.doubtful, *(Doubtful(
-            p.family, p.effect, f"the {curves[0].family}, whose form is not sure, has a slope of "
-            "its own") for p in scales)))
+        part, present=tuple(p for p in part.present if p.family not in taken),
+        doubtful=(*part.doubtful, *(Doubtful(p.family, p.effect, taken[p.family])
+                                    for p in part.present if p.family in taken)))
 
 
 def _argument(p: Present) -> str:
