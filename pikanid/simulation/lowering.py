@@ -18,8 +18,7 @@ from sympy.core.function import AppliedUndef
 from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
 from pikanid.model import Model, Spline
 
-# numerical: power of a positive part from which on a method of order 4 keeps its order across zero
-CONTINUOUS = 3
+CONTINUOUS = 3  # numerical: least power of a positive part that methods of order 4 may step over
 
 
 class positive_power(sp.Function):
