@@ -135,6 +135,22 @@ def with_relatives(h: Hypothesis, effect: Candidate, candidates: Sequence[Candid
             yield (*_rest(h, effect), other), [h.point]
 
 
+def with_walls(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With each wall in the place of a limit of the sensor, at that limit: where a reading stops,
+    the motion may.
+    """
+    for effect in h.effects:
+        if not {*effect.ids, effect.next_to.partition("[")[0]} & {"sensor_saturation"}:
+            continue
+        limit = abs(h.values[effect.parameters[0].name])
+        for wall in (c for c in candidates if c.levels and c.fits and c.key not in h.key
+                     and c.site.output.name == effect.site.output.name):
+            place, stiffness, *_ = (p.name for p in wall.parameters)
+            yield (*_rest(h, effect), wall), [
+                {**h.point, place: limit, stiffness: at}
+                for at in sorted({level[stiffness] for level in wall.levels})]
+
+
 def leading(ranked: Iterable[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses to extend, best first: none that only adds effects to a better one."""
     found: list[Hypothesis] = []

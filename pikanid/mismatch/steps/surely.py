@@ -31,7 +31,13 @@ from pikanid.mismatch.judge.partial import (
     surely_there,
 )
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.search.neighbours import Job, beside, with_next_form, with_relatives
+from pikanid.mismatch.search.neighbours import (
+    Job,
+    beside,
+    with_next_form,
+    with_relatives,
+    with_walls,
+)
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.search.search import Search
 from pikanid.model import Model
@@ -99,7 +105,8 @@ def _compared(search: Search, lead: Hypothesis) -> bool:
     """
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
-        *with_next_form(lead, search.candidates), *_without_each_family(lead)], lead.key)
+        *with_next_form(lead, search.candidates), *with_walls(lead, search.candidates),
+        *_without_each_family(lead)], lead.key)
     return (not search.budget_exhausted and search.closer([lead])) or found
 
 
