@@ -15,7 +15,7 @@ __all__ = ["case"]  # the fixture
 
 
 @pytest.mark.parametrize("limit", ["sensor_saturation[above]", "sensor_saturation"])
-def test_where_a_reading_stops_the_motion_may(case: Case, limit: str) -> None:  # noqa: F811
+def test_where_a_reading_stops_the_motion_may(case: Case, limit: str) -> None:
     h = hypothesis(case, limit, limit=0.05)
     jobs = [*with_walls(h, case.candidates)]
     found = set[str]().union(*(keys(effects) for effects, _ in jobs))
