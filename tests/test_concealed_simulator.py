@@ -14,6 +14,7 @@ from pikanid import errors
 from pikanid.validation.concealed import equations
 from pikanid.validation.concealed.excitations import two_pulse
 from pikanid.validation.concealed.experiment import Experiment
+from pikanid.validation.concealed.fisher import refit
 from pikanid.validation.concealed.rig import DYNAMIC, Rig
 from pikanid.validation.concealed.simulate import measured, motion
 
@@ -115,3 +116,21 @@ def test_samples_between_the_knots_do_not_matter() -> None:
 def test_divergence_is_a_sentence() -> None:
     with pytest.raises(errors.SimulationFailed, match="finite"):
         measured(Rig(cubic=-1e5), push(5.0, 3.0))
+
+
+def test_a_rig_that_rests_nowhere_is_refused() -> None:
+    with pytest.raises(errors.SimulationFailed):
+        measured(Rig(bias=400.0), push(5.0, 3.0))
+    with pytest.raises(errors.SimulationFailed):
+        measured(Rig(bias=-400.0, cogging=0.1, cogging_pitch=20.0), push(5.0, 3.0))
+
+
+def test_a_rival_that_rests_nowhere_where_its_fit_begins_is_infinitely_far() -> None:
+    def response(v: np.ndarray) -> np.ndarray:
+        if v[0] > 1.0:
+            raise errors.SimulationFailed("")
+        return v * np.ones(3)
+
+    free, one = np.array([-9.0]), np.ones(1)
+    assert refit(response, np.ones(3), 2 * one, free, -free, one).distance == np.inf
+    assert refit(response, np.ones(3), 0 * one, free, -free, one).distance <= 0.01

@@ -42,7 +42,8 @@ class Refit:
 
 def refit(response: Response, target: Array, start: Array, low: Array, high: Array,
           scale: Array, steps: int = MOST_STEPS) -> Refit:
-    """Levenberg and Marquardt's iteration within bounds.
+    """Levenberg and Marquardt's iteration within bounds; infinitely far where it begins with what
+    cannot be simulated.
 
     Args:
         response: Values (p,) -> whitened response (N,).
@@ -59,10 +60,10 @@ def refit(response: Response, target: Array, start: Array, low: Array, high: Arr
     2.0
     """
     v = np.clip(start, low, high)
-    r = target - response(v)
+    r = _residual(response, target, v)
     cost, damping = float(np.sum(r**2)), 1e-6
     jacobian = np.zeros((len(r), len(v)))
-    for _ in range(steps):
+    for _ in range(steps if np.isfinite(cost) else 0):
         jacobian = sensitivities(response, v, target - r, high, scale)
         # einsum sums in a fixed order; a BLAS might not, and then bits depend on its threads.
         normal = np.einsum("ni,nj->ij", jacobian, jacobian)

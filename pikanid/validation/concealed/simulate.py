@@ -19,6 +19,7 @@ from pikanid.validation.concealed.tank import Tank
 
 TURBULENCE_STEP = 0.05  # definition: [s] between the corners of the random force
 LARGEST_JITTER = 0.45 / RATE  # definition: [s]: samples keep their order
+FARTHEST = 1.2  # limit: [rad] of an angle at rest
 REST_STEP = 1e-3  # numerical: [rad] in the search for the angle at rest
 
 
@@ -186,7 +187,9 @@ def _angle_at_rest(rig: Rig) -> float:
                 - rig.quintic * theta**5)
 
     if not (rig.cogging or rig.cable or rig.magnet or rig.asymmetry):
-        return float(brentq(force, -1.2, 1.2, xtol=1e-15))
+        if force(-FARTHEST) * force(FARTHEST) >= 0.0:
+            raise errors.SimulationFailed(errors.conceal_diverged())
+        return float(brentq(force, -FARTHEST, FARTHEST, xtol=1e-15))
     p = np.array(rig[: len(DYNAMIC)], dtype=float)
 
     def every_force(theta: float) -> float:
@@ -196,8 +199,8 @@ def _angle_at_rest(rig: Rig) -> float:
     # Of several places to rest, the first that the bias pushes it to.
     way = REST_STEP if rig.bias > 0.0 else -REST_STEP
     last = 0.0
-    while every_force(last + way) * way > 0.0 and abs(last) < 1.2:
+    while every_force(last + way) * way > 0.0 and abs(last) < FARTHEST:
         last += way
-    if abs(last) >= 1.2:
+    if abs(last) >= FARTHEST:
         raise errors.SimulationFailed(errors.conceal_diverged())
     return float(brentq(every_force, last, last + way, xtol=1e-15))
