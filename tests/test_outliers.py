@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+import pikanid as pk
 from pikanid import Model, Recording
 from pikanid.mismatch.catalogue.friction import coulomb_friction
 from pikanid.mismatch.catalogue.site import sites
@@ -156,3 +157,19 @@ def test_a_setting_says_from_how_many_samples_on_one_can_be_alone() -> None:
     few[9] += 50.0
     assert not lone(few, DEFAULTS.noise).any()
     assert lone(few, replace(DEFAULTS.noise, least_alone=19))[9]
+
+
+def test_outliers_of_the_held_out_recording_are_no_mismatch() -> None:
+    """Pairs of them during the motion show only beside a fit."""
+    model = pk.systems.sloshing()
+    train, later = (pk.simulate(model, pk.excitation.two_pulse(), sigma=0.00175, seed=seed)
+                    for seed in (11, 12))
+    rng, bad = np.random.default_rng(1), later["theta"].values.copy()
+    at = rng.choice(np.arange(30, 300, 6), 7, replace=False)
+    bad[np.concatenate([at, at + 1])] += 0.00175 * np.tile(
+        rng.choice([-1, 1], 7), 2) * rng.uniform(5, 8, 14)
+    found = pk.diagnose(
+        model, *(rec.with_channels(replace(rec["theta"], values=values, sigma=None))
+                 for rec, values in ((train, train["theta"].values), (later, bad))), workers=1)
+    assert found.verdict == "none"
+    assert any("of the held-out recording can be seen" in note for note in found.notes)

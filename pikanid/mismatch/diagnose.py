@@ -120,6 +120,7 @@ def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recordin
 
 def _nothing_left(case: Case, detection: Detection) -> Diagnosis:
     """Nothing is missing, unless the held-out recordings say so."""
+    case.clear_later(case.base)
     refuted = case.refuted()
     answer = Answer("unnamed" if refuted else "none", (), ())
     return reported(case, refuted or detection, answer, case.sites[0], None)
