@@ -52,7 +52,9 @@ def _setting() -> str:
             continue
     return (f"Written by `make bench`. Python {platform.python_version()}, {os.cpu_count()} cores, "
             f"one thread; {', '.join(versions)}. Times are medians; machines differ, so read the "
-            "ratios, which come from one run.")
+            "ratios, which come from one run. \"In turn\" is the median of the ratios to the "
+            "reference timed in the same round, which a machine that changes its speed between two "
+            "benchmarks does not bend.")
 
 
 def _table(name: str, entries: list[dict[str, Any]]) -> list[str]:
