@@ -121,6 +121,7 @@ class Candidate:
             off: no first step leads to them.
         other: Adds it in another reading, which makes a difference beside other effects only.
         instead_of: Ids of effects in whose place it is tried, once they are given.
+        stops_like: Ids of effects whose first parameter may be the place where it stops the motion.
         beside: Ids of effects, one of which has to be there: without them it is a twin of another
             entry.
         probes: Values of its parameters but the size, at each of which its sign is derived from
@@ -156,6 +157,7 @@ class Candidate:
     other_minima: tuple[float, ...] = ()
     levels: tuple[Mapping[str, float], ...] = ()
     instead_of: tuple[str, ...] = ()
+    stops_like: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     other: Callable[[Model], Model] | None = None
     probes: tuple[Mapping[str, float], ...] = ()

@@ -136,7 +136,8 @@ def dissipating_wall(site: Site) -> list[Candidate]:
         found.append(Candidate(
             ("dissipating_wall",), "impact on a wall that takes energy out", text, "dynamics",
             site, (*wall.parameters, a), _with_term(site.v, text), lambda view: [], wall.variant,
-            known=False, other_minima=wall.other_minima, levels=wall.levels, covers={wall.key: {}}))
+            known=False, other_minima=wall.other_minima, levels=wall.levels, covers={wall.key: {}},
+            stops_like=wall.stops_like))
     return found
 
 

@@ -148,6 +148,7 @@ def wall_impact(site: Site) -> list[Candidate]:
 
         return Candidate(("wall_impact",), name, text, "dynamics", site, (w, k),
                          lambda m: m.with_term(site.v, text), directions, variant, static=True,
+                         stops_like=("sensor_saturation",),
                          other_minima=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))

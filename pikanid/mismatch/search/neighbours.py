@@ -140,11 +140,10 @@ def with_walls(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     the motion may.
     """
     for effect in h.effects:
-        if not {*effect.ids, effect.next_to.partition("[")[0]} & {"sensor_saturation"}:
-            continue
-        limit = abs(h.values[effect.parameters[0].name])
-        for wall in (c for c in candidates if c.levels and c.fits and c.key not in h.key
+        ids = {*effect.ids, effect.next_to.partition("[")[0]}
+        for wall in (c for c in candidates if ids & set(c.stops_like) and c.key not in h.key
                      and c.site.output.name == effect.site.output.name):
+            limit = abs(h.values[effect.parameters[0].name])
             place, stiffness, *_ = (p.name for p in wall.parameters)
             yield (*_rest(h, effect), wall), [
                 {**h.point, place: limit, stiffness: at}
