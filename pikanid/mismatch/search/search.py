@@ -183,7 +183,8 @@ class Search:
 
     def _exchange(self, best: Hypothesis, anyway: bool = False) -> None:
         """Put others in the place of each effect: rivals that no path led to."""
-        for effect in best.effects if len(best.effects) > 1 else ():
+        # each effect alone was tried in the beginning, but with another noise perhaps
+        for effect in best.effects if len(best.effects) > 1 or anyway else ():
             rest = tuple(e for e in best.effects if e is not effect)
             without = self._fit(rest, [best.point])
             if without.key == frozenset(e.key for e in rest):

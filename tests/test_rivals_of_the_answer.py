@@ -1,4 +1,4 @@
-"""Where a reading stops, the sensor does or the motion: both are tried before one is sure."""
+"""What an answer is compared with before it is sure, whatever the search has passed by."""
 
 from __future__ import annotations
 
@@ -25,3 +25,12 @@ def test_where_a_reading_stops_the_motion_may(case: Case, limit: str) -> None:
     assert {start["wall"] for start in starts} == {h.values["limit"]}
     assert len({start["k_wall"] for start in starts}) > 1
     assert not list(with_walls(hypothesis(case, "cubic_stiffness"), case.candidates))
+
+
+def test_one_effect_has_others_for_rivals_though_the_noise_was_read_anew(case: Case) -> None:
+    search = case.begin_search().carried_over(case.records)
+    assert set(search.fits) == {frozenset()}
+    alone = hypothesis(case, "sensor_offset", offset=0.001)
+    assert search.refine([(alone.effects, [alone.point])])
+    assert search.closer([search.fits[alone.key]])
+    assert {frozenset({"cubic_stiffness"}), frozenset({"sensor_gain"})} & set(search.fits)
