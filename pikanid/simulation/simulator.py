@@ -194,8 +194,7 @@ class Simulator:
                 the largest output.
             known: Steps in use, kept where fine enough; else others follow by the method's order.
             finest: Give up below this step [s]; at least 1/4096 of the median interval is tried.
-            trial: The response at p for given steps and whether these are likely to be chosen; by
-                default simulated without sensitivities.
+            trial: The response at p for steps, likely chosen or not; default: no sensitivities.
             scale: (rows,) in which the error of each sample is measured, as its σ: what outputs of
                 several units need; the error of the steps found is in it too.
             enough: Error that does where halving gains less than it should: at kinks.
@@ -237,7 +236,8 @@ class Simulator:
                 if stuck and best is not None and best.error <= enough:
                     return best
                 rough, longest = fine, longest / 2
-                if stuck and method == "auto" and longest < spacing / 64:
+                if stuck and candidate == "explicit" and method == "auto" and (
+                        longest < spacing / 64):
                     break
         if best is None:
             raise errors.SimulationFailed(
