@@ -10,6 +10,7 @@ import pytest
 from test_partial import effect as member
 from test_verdict import A, B, answered, hypothesis
 
+from pikanid.mismatch.judge.kinds import Kind
 from pikanid.mismatch.judge.partial import Part, Present
 from pikanid.mismatch.steps.surely import _without_shares
 
@@ -42,8 +43,8 @@ def test_a_wall_without_a_name_takes_energy_out_itself(
     wall: Any = SimpleNamespace(**vars(member("wall_impact", "restoring force")),
                                 other_minima=other_minima)
     drag: Any = SimpleNamespace(**vars(member("quadratic_drag", "drag")), other_minima=())
-    present = (Present("restoring force", wall, names, {}, 1.0, 1.0, 200.0, 1.0, 0.95),
-               Present("drag", drag, ("quadratic_drag",), {}, 1.0, 1.0, 40.0, 1.3, 0.95))
+    present = (Present(Kind("restoring force", "v"), wall, names, {}, 1.0, 1.0, 200.0, 1.0, 0.95),
+               Present(Kind("drag", "v"), drag, ("quadratic_drag",), {}, 1.0, 1.0, 40.0, 1.3, 0.95))
     h: Any = SimpleNamespace(effects=(wall, drag), blurred=frozenset())
     found = _without_shares(Part(present, (), h, 1.0, 0.95))
     assert {p.family for p in found.present} == sure

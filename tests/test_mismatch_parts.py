@@ -25,7 +25,7 @@ from pikanid.mismatch.detect.tangent import _middle
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.progressive_horizon import lost
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside
-from pikanid.mismatch.judge.partial import families_of
+from pikanid.mismatch.judge.kinds import families_of
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import systems
 from pikanid.noise.level import NoiseModel

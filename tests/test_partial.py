@@ -13,6 +13,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.as_estimate import widened
+from pikanid.mismatch.judge.kinds import Kind, kinds_of
 from pikanid.mismatch.judge.partial import Doubtful, Part, Present, Weighed, _examined
 from pikanid.mismatch.report import part as reported_as
 from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -31,7 +32,8 @@ def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool 
     return cast(Candidate, SimpleNamespace(
         key=name, name=name, ids=(name,), families=families,
         covers={key: {} for key in covers}, known=known, twin=twin,
-        parts=parts, parameters=(), exponent=None, absent=False))
+        parts=parts, parameters=(), exponent=None, absent=False, alike=twin,
+        site=SimpleNamespace(v="v")))
 
 
 COULOMB = effect("coulomb_friction", "dry friction")
@@ -46,11 +48,11 @@ def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: f
     predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
                                      inert=frozenset())
     return Weighed(h, predicted, left, 0.0, weight, share,
-                    frozenset(f for e in effects for f in e.families))
+                   frozenset(k for e in effects for k in kinds_of(e, h, RULE.dry)))
 
 
 def examined(*found: Weighed, family: Any = "dry friction") -> Present | Doubtful:
-    return _examined(family, found[0], found, RULE, DEFAULTS.least_proof)
+    return _examined(Kind(family, "v"), found[0], found, RULE, DEFAULTS.least_proof)
 
 
 def test_a_family_that_dominates_is_there_and_has_a_name() -> None:
@@ -120,8 +122,9 @@ def test_a_decoy_gives_no_name() -> None:
 def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
         monkeypatch: pytest.MonkeyPatch) -> None:
     """The last round of comparisons finds a better explanation, of which nothing was left out."""
-    first, better, without = (SimpleNamespace(effects=e, point={}, key=frozenset()) for e in (
-        (COULOMB,), (COULOMB, DRAG), (DRAG,)))
+    first, better, without = (
+        SimpleNamespace(effects=e, point={}, key=frozenset(), blurred=frozenset())
+        for e in ((COULOMB,), (COULOMB, DRAG), (DRAG,)))
     lead, tried = [first], []
 
     def compared(search: Any, of: Any) -> bool:
@@ -172,7 +175,7 @@ def test_a_law_that_contains_another_does_not_take_its_name(wider: Candidate) ->
 def test_a_curve_without_a_name_has_a_slope_of_its_own(names: tuple[str, ...], sure: set[str]
                                                        ) -> None:
     curve, scale = effect("sensor_saturation", "sensor curve"), effect("sensor_gain", "gain")
-    present = tuple(Present(e.families[0], e, own, {}, 1.0, 1.0, 9.0, 1.0, 0.95)
+    present = tuple(Present(Kind(e.families[0]), e, own, {}, 1.0, 1.0, 9.0, 1.0, 0.95)
                     for e, own in ((curve, names), (scale, ("sensor_gain",))))
     h: Any = SimpleNamespace(effects=(curve, scale), blurred=frozenset())
     found = _without_shares(Part(present, (), h, 1.0, 0.95))

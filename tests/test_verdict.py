@@ -21,7 +21,7 @@ from pikanid.model.parts import Parameter
 from pikanid.model.systems import sloshing
 from pikanid.optimise.levenberg_marquardt import Minimum
 
-SITE = SimpleNamespace(suffix="", swing=1.0)
+SITE = SimpleNamespace(suffix="", swing=1.0, v="v")
 ROWS = 1000
 
 

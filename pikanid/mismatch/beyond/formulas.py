@@ -75,7 +75,7 @@ def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entr
     alone = named.get((fit.form.name, edge.argument))
     covers: dict[str, dict[str, float]] = {alone: {}, named[CONSTANT]: {}} if alone else {}
     return Candidate((SYMBOLIC + text,), f"a law {text}", text, "dynamics", site, parameters,
-                     lambda m: m.with_parameters(*distance.zeros).with_term(site.v, expression),
+                     lambda m: site.pushed(m.with_parameters(*distance.zeros), expression),
                      lambda view: (),
                      covers=covers, static=True)
 

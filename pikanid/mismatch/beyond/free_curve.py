@@ -75,9 +75,10 @@ def _beside(nominal: Model, h: Hypothesis, name: str, visited: np.ndarray, unit:
 
 def share_lacking(base: Hypothesis, argument: str, site: Site) -> float:
     """Share of what the nominal equation lacks that a free curve of a state leaves, both beside the
-    free parameters; one where the output is not the coordinate itself, or too short.
+    free parameters; one where the output is not the coordinate itself, or too short, or where
+    forces act through a lever.
     """
-    if site.output.expression != symbol(site.moving[0]):
+    if site.lever or site.output.expression != symbol(site.moving[0]):
         return 1.0
     pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
     theta, problem = base.minimum.theta, base.whitened.problem

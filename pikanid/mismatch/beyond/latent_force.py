@@ -183,7 +183,7 @@ class _Motion:
         name, records = site.name("delta"), base.whitened.records
         model = base.model.replace(inputs=(*base.model.inputs, Input(name, hold="first")))
         pushed = records.recordings[0].with_channels(Channel(name, t, force))
-        whitened = Whitened(model.with_term(site.v, name), Records(
+        whitened = Whitened(site.pushed(model, name), Records(
             (pushed,), records.levels[:1], records.settings))
         theta = np.array([base.values[f.name] for f in whitened.problem.free])
         whitened.steps = base.whitened.steps[:1]

@@ -192,8 +192,8 @@ class LocalForce:
                     (site.force_unit, 1), (unit or "1", -k))))
         text = " + ".join(terms)
         return Candidate(("local",), "a force in a region", text, "dynamics", site,
-                         tuple(parameters), lambda m: m.with_parameters(
-                             *self.difference.zeros).with_term(site.v, text), lambda view: (),
+                         tuple(parameters), lambda m: site.pushed(
+                             m.with_parameters(*self.difference.zeros), text), lambda view: (),
                          known=False)
 
     def ends(self, values: Mapping[str, float]) -> tuple[float, float]:

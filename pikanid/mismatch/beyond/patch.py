@@ -11,10 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 from scipy.interpolate import BSpline
 
 from pikanid.approximators.bspline import knots_from_breakpoints
 from pikanid.formula import units
+from pikanid.formula.expressions import symbol
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.site import Site
@@ -158,7 +160,7 @@ class FreeCurve:
     def candidate(self, site: Site) -> Candidate:
         """The edge as a force whose coefficients are estimated."""
         return self._effect(site, "dynamics", site.force_unit,
-                            lambda m: m.with_term(site.v, self.formula))
+                            lambda m: site.pushed(m, self.formula))
 
     def of_input(self, site: Site) -> Candidate:
         """The edge as what an input does beside what is recorded of it."""
@@ -205,7 +207,9 @@ class FreeCurve:
         spline = Spline(self.name, DEGREE, tuple(map(float, knots)))
         model = nominal.with_values({n: v for n, v in found.values.items()
                                      if n in nominal.parameter_names})
-        return model.with_edge(site.v, self.argument, spline).fix(
+        model = model.with_spline(spline, site.force_unit)
+        edge = sp.Function(spline.name, real=True)(symbol(self.argument))
+        return site.pushed(model, edge).fix(
             **dict(zip(spline.coefficient_names, map(float, coefficients), strict=True)))
 
 

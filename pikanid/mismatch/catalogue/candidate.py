@@ -51,6 +51,7 @@ class TangentDirection:
     starts at `null + amplitude * size`, with the amplitude that suits the residual best, and the
     parameter's own value as null unless given.
     `one_sided`: the amplitude must be positive.
+    `push` holds changes of inputs over each step (L,), or at its ends and its middle (3, L).
     `forces` (L, n) are added to the rates of all states.
     """
 
@@ -169,6 +170,11 @@ class Candidate:
         if self.absent and any(e.absent and e.key != self.key for e in others):
             return False
         return not self.beside or any(i in self.beside for e in others for i in e.ids)
+
+    @property
+    def alike(self) -> str:
+        """What it shares with those that small motions of its state cannot tell from it, if any."""
+        return self.twin and f"{self.twin} of {self.site.v}"
 
     @property
     def lasts(self) -> bool:

@@ -68,6 +68,13 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.rate_limit, ("timing",)),
     (fading_memory, ("storage",)),
 )
+# what acts on a coordinate as a force, which a lever hands on to others
+FORCES: frozenset[Make] = frozenset((
+    friction.coulomb_friction, friction.quadratic_drag, friction.power_drag,
+    friction.amplitude_damping, friction.boundary_layer, friction.hysteresis,
+    forces.cubic_stiffness, forces.free_spring, forces.static_bias, forces.wall_impact,
+    decoys.even_stiffness, decoys.quintic_stiffness, decoys.linear_stiffness,
+    decoys.one_way_friction, decoys.stribeck_friction, decoys.dissipating_wall))
 
 
 def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[Candidate, ...]:
@@ -91,9 +98,13 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     for table in (ENTRIES, DECOYS):
         for site in sites:
             for make, families in table:
+                if site.lever and make not in FORCES:
+                    continue
                 for candidate in make(site):
                     if all(first[name] == site.v for name in _channels(candidate)):
-                        made.setdefault(candidate.key, replace(candidate, families=families))
+                        told = _on(site) if site.suffix and make in FORCES else ""
+                        made.setdefault(candidate.key, replace(
+                            candidate, name=candidate.name + told, families=families))
     for entry in [*made.values()]:
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
     effects = tuple(effects)
@@ -106,6 +117,11 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     if any(map(units.begins_elsewhere, measured)):
         made = {key: c for key, c in made.items() if _has_meaning(c, model)}
     return tuple(with_twins([*own, *made.values()], effects))
+
+
+def _on(site: Site) -> str:
+    """Which of several equations a law stands in, for people."""
+    return f" on {site.q or site.v}" + (f" as {site.along} acts" if site.lever else "")
 
 
 def _channels(candidate: Candidate) -> Sequence[str]:

@@ -160,8 +160,8 @@ def lags(site: Site) -> list[Candidate]:
         from pikanid.mismatch.catalogue.recurrences import lagged
 
         return [TangentDirection(
-            {tau.name: float(s)}, seen=lagged(view.t, view.y[o], s) - view.y[o], one_sided=True,
-            null=0.0) for s in step * np.array(LAGS)]
+            {tau.name: float(s)}, seen=lagged(view.t, view.y[o], view.y_rate[o], s) - view.y[o],
+            one_sided=True, null=0.0) for s in step * np.array(LAGS)]
 
     found = [Candidate(("sensor_lag",), "a lag of the sensor", f"{o} behind a lag {tau.name}",
                        "sensor", site, (tau,), lambda m: m.map_output(o, lag=tau.name), seen,
@@ -170,10 +170,10 @@ def lags(site: Site) -> list[Candidate]:
         t_u = Parameter(site.name("tau_a"), 0.5 * step, "s", within)
 
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[TangentDirection]:
-            from pikanid.mismatch.catalogue.recurrences import lagged
+            from pikanid.mismatch.catalogue.recurrences import lag_of_held
 
             return [TangentDirection(
-                {t_u.name: float(s)}, push={u: lagged(view.t, view.u[u], s, True) - view.u[u]},
+                {t_u.name: float(s)}, push={u: lag_of_held(view.t, view.u[u], s)},
                 one_sided=True, null=0.0) for s in step * np.array(LAGS)]
 
         found.append(_input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),

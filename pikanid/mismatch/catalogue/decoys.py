@@ -116,7 +116,7 @@ def stribeck_friction(site: Site) -> list[Candidate]:
         return np.asarray(1 + rise * np.exp(-(speed / slow) ** 2))
 
     return [Candidate(("stribeck_friction",), "friction that rises at low speed", text, "dynamics",
-                      site, (c, rise, slow), lambda m: m.with_term(site.v, text), directions,
+                      site, (c, rise, slow), lambda m: site.pushed(m, text), directions,
                       known=False, covers={"coulomb_friction" + site.suffix: {}},
                       resistance=resistance)]
 
@@ -135,14 +135,14 @@ def dissipating_wall(site: Site) -> list[Candidate]:
         text = f"({wall.expression})*(1 {'-' if wall.variant else '+'} {a.name}*{site.v})"
         found.append(Candidate(
             ("dissipating_wall",), "impact on a wall that takes energy out", text, "dynamics",
-            site, (*wall.parameters, a), _with_term(site.v, text), lambda view: [], wall.variant,
+            site, (*wall.parameters, a), _pushing(site, text), lambda view: [], wall.variant,
             known=False, other_minima=wall.other_minima, levels=wall.levels, covers={wall.key: {}},
             stops_like=wall.stops_like))
     return found
 
 
-def _with_term(v: str, text: str) -> Callable[[Model], Model]:
-    return lambda m: m.with_term(v, text)
+def _pushing(site: Site, text: str) -> Callable[[Model], Model]:
+    return lambda m: site.pushed(m, text)
 
 
 def velocity_coupled_drive(site: Site) -> list[Candidate]:

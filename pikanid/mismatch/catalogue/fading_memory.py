@@ -34,7 +34,8 @@ def fading_memory(site: Site) -> list[Candidate]:
 
         return [TangentDirection(
             {k.name: 1.0, r.name: 1 / (share * span)},
-            force=lagged(view.t, view.x[x], share * span) - view.x[x]) for share in MEMORIES]
+            force=lagged(view.t, view.x[x], view.rates[x], share * span) - view.x[x])
+            for share in MEMORIES]
 
     return [Candidate(("fading_memory",), "a memory that fades", text, "dynamics", site, (k, r),
                       extend, directions, known=False)]

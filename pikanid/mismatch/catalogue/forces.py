@@ -32,7 +32,7 @@ def term(site: Site, identifier: str, name: str, expression: str, size: Paramete
         return [TangentDirection({size.name: 1.0}, force=shape(view), one_sided=one_sided)]
 
     return Candidate((identifier,), name, expression, "dynamics", site, (size,),
-                     lambda m: m.with_term(site.v, expression), directions, variant, twin,
+                     lambda m: site.pushed(m, expression), directions, variant, twin,
                      known=known,
                      other_minima=other_minima)
 
@@ -70,7 +70,7 @@ def static_bias(site: Site) -> list[Candidate]:
     balanced = site.rest and site.rate > 0 and site.alone
 
     def extend(model: Model) -> Model:
-        model = model.with_term(site.v, b.name)
+        model = site.pushed(model, b.name)
         if not balanced:
             return model
         still = {symbol(n): sp.Integer(0) for n in (*model.state_names, *model.input_names)
@@ -90,7 +90,7 @@ def static_bias(site: Site) -> list[Candidate]:
     free = Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site, (b,),
                      extend, directions, twin="offset", static=True, form="constant")
     held = replace(
-        free, variant="held", extend=lambda m: m.with_term(site.v, b.name),
+        free, variant="held", extend=lambda m: site.pushed(m, b.name),
         directions=lambda view: [TangentDirection({b.name: 1.0}, force=np.ones(len(view.t)))],
         beside=("coulomb_friction", "hysteresis"))
     return [free, held] if balanced else [free]
@@ -147,7 +147,7 @@ def wall_impact(site: Site) -> list[Candidate]:
                 for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5)] if min(tops) else []
 
         return Candidate(("wall_impact",), name, text, "dynamics", site, (w, k),
-                         lambda m: m.with_term(site.v, text), directions, variant, static=True,
+                         lambda m: site.pushed(m, text), directions, variant, static=True,
                          stops_like=("sensor_saturation",),
                          other_minima=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
@@ -199,7 +199,7 @@ def disturbance(site: Site) -> list[Candidate]:
         return found
 
     hump = Candidate(("disturbance",), "a force local in time", text, "dynamics", site, (a, at, w),
-                     lambda m: m.with_term(site.v, text), directions, per_recording=True,
+                     lambda m: site.pushed(m, text), directions, per_recording=True,
                      absent=True)
     s = Parameter(site.name("skew"), 0.0, "", (-SKEWEST, SKEWEST))
     n = Parameter(site.name("n_peak"), USUAL_PEAK, "", (1.0, 20.0))
@@ -208,7 +208,7 @@ def disturbance(site: Site) -> list[Candidate]:
     course = f"{a.name}*exp(-log(2)*((4/{w.name}*({sides}))**2 + {NEXT_TO_NONE})**({n.name}/2))"
     return [hump, replace(
         hump, name="a force local in time, its course open", expression=course, variant="open",
-        parameters=(a, at, w, s, n), extend=lambda m: m.with_term(site.v, course),
+        parameters=(a, at, w, s, n), extend=lambda m: site.pushed(m, course),
         directions=lambda view: [], covers={hump.key: {}})]
 
 

@@ -48,7 +48,7 @@ def coulomb_friction(site: Site) -> list[Candidate]:
     text = f"-{c.name}*tanh({site.v}/{width.name})"
     rounded = Candidate(
         sharp.ids, "Coulomb friction with a rounded reversal", text, "dynamics", site, (c, width),
-        lambda m: m.with_term(site.v, text), lambda view: [], "rounded", sharp.twin,
+        lambda m: site.pushed(m, text), lambda view: [], "rounded", sharp.twin,
         covers={sharp.key: {}}, static=True, resistance=lambda v, w: np.asarray(np.tanh(v / w)))
     return [sharp, rounded]
 
@@ -76,7 +76,7 @@ def power_drag(site: Site) -> list[Candidate]:
                 for e in (0.2, 0.35, 0.5, 0.7, 1.3, 1.5, 1.75, 2.3, 2.7, 3.2)]
 
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
-                      (c, n), lambda m: m.with_term(site.v, text), directions,
+                      (c, n), lambda m: site.pushed(m, text), directions,
                       covers={"coulomb_friction" + site.suffix: {n.name: 0.3},
                               "quadratic_drag" + site.suffix: {n.name: 1.8}},
                       static=True, resistance=np.power, exponent=n, form="signed power",
@@ -106,7 +106,7 @@ def hysteresis(site: Site) -> list[Candidate]:
 
     def extend(model: Model) -> Model:
         loop = f"({site.v} - (abs({site.v})*{z} + {site.v}*abs({z}))/2)/{d.name}"
-        return model.with_state(State(z), loop).with_term(site.v, f"-{b.name}*{z}")
+        return site.pushed(model.with_state(State(z), loop), f"-{b.name}*{z}")
 
     def directions(view: View) -> list[TangentDirection]:
         from pikanid.mismatch.catalogue.recurrences import bouc_wen
@@ -139,7 +139,7 @@ def boundary_layer(site: Site) -> list[Candidate]:
 
     def extend(model: Model) -> Model:
         model, half = model.with_half_derivative(site.v, site.name("layer"), band, 6)
-        return model.with_term(site.v, -symbol(b.name) * half)
+        return site.pushed(model, -symbol(b.name) * half)
 
     def directions(view: View) -> list[TangentDirection]:
         return [TangentDirection({b.name: 1.0}, force=-_half_derivative(view.t, view.x[site.v]),

@@ -157,7 +157,7 @@ def _fading(layer: Candidate) -> Candidate:
     def extend(model: Model) -> Model:
         state = State(wake, unit=site.speed_unit)
         model = model.with_state(state, f"({site.v} - {wake})/{tau.name}")
-        return model.with_term(site.v, f"-{kappa.name}*({site.v} - {wake})")
+        return site.pushed(model, f"-{kappa.name}*({site.v} - {wake})")
 
     def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
         strength = values[layer.parameters[0].name] * site.rate**0.5
@@ -251,6 +251,6 @@ def _decoy(entry: Candidate, name: str, text: str, parameters: tuple[Parameter, 
            starts: Begin, families: tuple[Family, ...]) -> Candidate:
     site: Site = entry.site
     return Candidate((name,), f"a form next to {entry.name}", text, "dynamics", site, parameters,
-                     lambda m: m.with_term(site.v, text), lambda view: [], entry.variant,
+                     lambda m: site.pushed(m, text), lambda view: [], entry.variant,
                      families=families, known=False, static=True,
                      other_minima=entry.other_minima, next_to=entry.key, starts=starts)

@@ -70,23 +70,42 @@ def follow(A: np.ndarray, F: np.ndarray, h: np.ndarray, start: np.ndarray, parts
 
 
 @cached_jit()
-def lagged(t: np.ndarray, y: np.ndarray, tau: float, held: bool = False) -> np.ndarray:
-    """A first-order lag tau of y (L,) at times t; of a held signal the mean over each step."""
+def lagged(t: np.ndarray, y: np.ndarray, rate: np.ndarray, tau: float) -> np.ndarray:
+    """A first-order lag tau of y (L,) with its rate (L,) at times t.
+
+    Exact for parabolas through values and the rate that a step begins with (the next one may jump,
+    as an input does); for straight lines where the lag is longer than a step.
+    """
     out = np.empty(len(y))
     state = y[0]
     out[0] = state
     for k in range(len(t) - 1):
         h = t[k + 1] - t[k]
-        keep = np.exp(-h / tau)
-        if held:
-            out[k] = y[k] + (state - y[k]) * (1 - keep) * tau / h
-            state = y[k] + (state - y[k]) * keep
-        else:
-            slope = (y[k + 1] - y[k]) / h
-            state = (state - y[k] + slope * tau) * keep + y[k + 1] - slope * tau
-            out[k + 1] = state
-    if held:
-        out[-1] = state
+        slope = (y[k + 1] - y[k]) / h
+        left = rate[k] if tau < h else slope
+        bend = 2 * (slope - left) / h
+        before = y[k] - tau * (left - tau * bend)
+        after = y[k + 1] - tau * (left + h * bend - tau * bend)
+        state = after + (state - before) * np.exp(-h / tau)
+        out[k + 1] = state
+    return out
+
+
+@cached_jit()
+def lag_of_held(t: np.ndarray, u: np.ndarray, tau: float) -> np.ndarray:
+    """What a first-order lag tau takes from a held signal u (L,), in each step as the straight line
+    of the same mean and moment: (3, L) at its left end, its middle and its right end.
+    """
+    out = np.zeros((3, len(u)))
+    state = u[0]
+    for k in range(len(t) - 1):
+        h = t[k + 1] - t[k]
+        keep, off = np.exp(-h / tau), state - u[k]
+        mean = off * tau / h * (1 - keep)
+        moment = off * (tau / h) * (tau / h * (1 - keep) - keep)
+        tilt = 6 * moment - 3 * mean
+        out[0, k], out[1, k], out[2, k] = mean - tilt, mean, mean + tilt
+        state = u[k] + off * keep
     return out
 
 

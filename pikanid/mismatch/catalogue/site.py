@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import sympy as sp
@@ -10,8 +11,9 @@ import sympy as sp
 from pikanid import errors
 from pikanid.formula import units
 from pikanid.formula.expressions import TIME, symbol
+from pikanid.mismatch.catalogue.lever import lever
 from pikanid.model import Model
-from pikanid.model.parts import Output, Parameter
+from pikanid.model.parts import Formula, Output, Parameter
 from pikanid.recording import Recording
 
 SLOWEST = 0.005  # numerical: of the usual speed, the least at which a law changes its course
@@ -39,6 +41,9 @@ class Site:
         interval: Between its samples, as a rule [s].
         suffix: Distinguishes names where a model has several coordinates.
         taken: Names that users' own effects have.
+        lever: By names of states, what a force adds to their rates for each that it adds to v';
+            empty where it acts on v' alone.
+        along: The parameter whose damping acts so.
     """
 
     model: Model
@@ -56,6 +61,17 @@ class Site:
     interval: float
     suffix: str = ""
     taken: frozenset[str] = frozenset()
+    lever: Mapping[str, sp.Expr] = field(default_factory=dict, hash=False)
+    along: str = ""
+
+    def pushed(self, model: Model, force: Formula) -> Model:
+        """A model with a force on the coordinate [force_unit]."""
+        if not self.lever:
+            return model.with_term(self.v, force)
+        term = model.formula(force, f"the force on '{self.moving[0]}'")
+        for state, share in self.lever.items():
+            model = model.with_term(state, share * term)
+        return model
 
     @property
     def acceleration(self) -> sp.Expr:
@@ -129,8 +145,9 @@ class Site:
 
 
 def sites(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
-    """The coordinates that an output shows, one site each; without any, the equations of all states
-    that reach an output.
+    """The coordinates that an output shows, one site each, and after them another one for each
+    coordinate on which forces act through a lever; without any coordinate, the equations of all
+    states that reach an output.
 
     Raises:
         BadModel: If no state reaches an output.
@@ -143,8 +160,16 @@ def sites(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
     if not chosen:
         return _of_first_order(model, recordings)
     ordered = [chosen[q] for q, _ in pairs if q in chosen]
-    return tuple(_site(model, recordings, q, v, o, f"_{q}" if len(ordered) > 1 else "")
-                 for q, v, o in ordered)
+    found = [_site(model, recordings, q, v, o, f"_{q}" if len(ordered) > 1 else "")
+             for q, v, o in ordered]
+    return (*found, *(_along_lever(site, *how) for site in found if (
+        how := lever(model, site.v, [v for _, v in pairs])) is not None))
+
+
+def _along_lever(site: Site, along: str, shares: Mapping[str, sp.Expr]) -> Site:
+    # forces on others' rates leave no balance in this coordinate alone
+    return replace(site, lever=shares, along=along, alone=False,
+                   suffix=f"{site.suffix}_{along}")
 
 
 def _of_first_order(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:

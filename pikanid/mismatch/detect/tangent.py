@@ -15,6 +15,7 @@ import numpy as np
 
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
+from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.own_signs import (
     added_forces,
@@ -22,6 +23,7 @@ from pikanid.mismatch.detect.own_signs import (
     simulated_signs,
 )
 from pikanid.model import Model
+from pikanid.model.parts import Parameter
 from pikanid.problem.evaluated import paths
 from pikanid.problem.held import HeldInput
 from pikanid.recording import Recording
@@ -121,6 +123,7 @@ class Tangent:
         self.stop[seen.row] = np.repeat(np.arange(len(self.t)), counts)
         self.output = np.empty(grid.rows, int)
         self.output[seen.row] = seen.output
+        self.levers: dict[str, np.ndarray] = {}
         self.view = self._view(field, whitened.records.recordings[r], experiment.held)
 
     def _thirds(self, field: VectorField, slopes: np.ndarray
@@ -194,7 +197,9 @@ class Tangent:
         places = {s: i for i, s in enumerate(self.model.state_names)}
         inputs = {i: j for j, i in enumerate(self.model.input_names)}
         for k, (candidate, sign) in enumerate(listed):
-            if sign.force is not None:
+            if sign.force is not None and candidate.site.lever:
+                force[:, :, k] += sign.force[:, None] * self._lever(candidate.site)
+            elif sign.force is not None:
                 force[:, places[candidate.site.v], k] += sign.force
             if sign.forces is not None:
                 force[:, :, k] += sign.forces
@@ -206,12 +211,23 @@ class Tangent:
         F = np.empty((3, L - 1, n, m))
         F[0], F[1], F[2] = force[:-1], _middle(force), force[1:]
         for k, (_, sign) in enumerate(listed):
-            for name, du in sign.push.items():
-                for block, (_, fu) in zip(F, self.thirds, strict=True):
+            for name, pushed in sign.push.items():
+                for block, (_, fu), du in zip(F, self.thirds, np.broadcast_to(
+                        pushed, (3, L)), strict=True):
                     block[:, :, k] += fu[:, :, inputs[name]] * du[:-1, None]
         state = self._integrated(F, start)
         y = np.einsum("lqn,lnm->lqm", self.hx, state) + seen
         return y[self.stop, self.output]
+
+    def _lever(self, site: Site) -> np.ndarray:
+        """What a force of 1 adds to the rates of all states (L, n)."""
+        if site.suffix not in self.levers:
+            one = Parameter(site.name("unit_force"), 0.0, site.force_unit)
+            pushed = self.model.with_parameters(one)
+            slopes = VectorField(site.pushed(pushed, one.name)).rhs_jacobians(
+                self.t, self.x, self.u, np.append(self.p, 0.0))[1]
+            self.levers[site.suffix] = slopes[:, :, -1]
+        return self.levers[site.suffix]
 
     def _integrated(self, F: np.ndarray, start: np.ndarray) -> np.ndarray:
         """δx (L, n, m) by the classical Runge-Kutta method: over dozens of periods small errors of

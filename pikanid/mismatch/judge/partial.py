@@ -8,7 +8,7 @@ best one with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -19,6 +19,7 @@ from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import needed
 from pikanid.mismatch.judge.doubt import Predict, worth
+from pikanid.mismatch.judge.kinds import Kind, holds, kinds_in, kinds_of, members
 from pikanid.mismatch.judge.left_over import left_over
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.search.overdispersion import repeated
@@ -32,7 +33,7 @@ class Present:
     """A family that is surely there, and its name where that is sure as well.
 
     Attributes:
-        family: Of physics.
+        kind: Family of physics, and where.
         effect: The best explanation's member of it.
         names: The effect's ids, where no other member does as well; else empty.
         alternatives: Other members that were compared: names by key.
@@ -41,7 +42,7 @@ class Present:
         share: Of the held-out misfit's square that the best explanation with it explains.
     """
 
-    family: Family
+    kind: Kind
     effect: Candidate
     names: tuple[str, ...]
     alternatives: Mapping[str, str]
@@ -51,20 +52,30 @@ class Present:
     dominance_within: float
     share: float
 
+    @property
+    def family(self) -> Family:
+        """Of physics."""
+        return self.kind.family
+
 
 @dataclass(frozen=True)
 class Doubtful:
     """A family in the best explanation that is not surely there.
 
     Attributes:
-        family: Of physics.
+        kind: Family of physics, and where.
         effect: The best explanation's member of it.
         why: It is not sure, in words.
     """
 
-    family: Family
+    kind: Kind
     effect: Candidate
     why: str
+
+    @property
+    def family(self) -> Family:
+        """Of physics."""
+        return self.kind.family
 
 
 @dataclass(frozen=True)
@@ -98,7 +109,7 @@ class Weighed:
     score: float = 0.0
     weight: float = 0.0
     share: float = 0.0
-    families: frozenset[Family] = field(default_factory=frozenset)
+    kinds: frozenset[Kind] = field(default_factory=frozenset)
 
 
 @dataclass(frozen=True)
@@ -110,15 +121,6 @@ class Explanations:
     weighed: tuple[Weighed, ...]
     overdispersion: float
     lead: Weighed | None
-
-
-def families_of(effect: Candidate, h: Hypothesis, dry: float) -> tuple[Family, ...]:
-    """Of an effect as it was fitted: dry friction is what hardly rises with speed."""
-    if effect.key in h.blurred:
-        return ("drag",)
-    if isinstance(effect.exponent, Parameter) and h.values[effect.exponent.name] <= dry:
-        return ("dry friction",)
-    return effect.families
 
 
 def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
@@ -138,8 +140,8 @@ def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
     rule = settings.part
     pool = _pool(ranked, rule)
     ahead([partial(predict, h) for h in pool])
-    found = [Weighed(h, p, left_over(h, p, noise), families=frozenset(
-                 f for e in h.effects for f in families_of(e, h, rule.dry)))
+    found = [Weighed(h, p, left_over(h, p, noise), kinds=frozenset(
+                 k for e in h.effects for k in kinds_of(e, h, rule.dry)))
              for h in pool if (p := predict(h)) is not None]
     nominal = next((w for w in found if not w.hypothesis.effects), None)
     if nominal is None or len(found) < 2 or below(nominal.predicted.chi2 - len(
@@ -162,21 +164,30 @@ def surely_there(explained: Explanations, scale: float, settings: Settings) -> P
     rule, found, lead = settings.part, explained.weighed, explained.lead
     if lead is None:
         return None
-    examined = [_examined(family, lead, found, rule, scale * settings.least_proof)
-                for family in sorted(lead.families)]
+    examined = [_examined(kind, lead, found, rule, scale * settings.least_proof)
+                for kind in kinds_in(lead.hypothesis, rule.dry)]
     present = [p for p in examined if isinstance(p, Present)]
+    # that a family is there somewhere says no more where a place of it is sure
+    present = [p for p in present if not _elsewhere(p.kind, [o.kind for o in present])]
     if not present:
         return None
-    sure = {p.family for p in present}
+    sure = {p.kind for p in present}
     named = {p.effect.key for p in present if p.names}
     # the fewest effects that hold all of it and leave about as much
-    enough = [w for w in found if sure <= w.families and named <= w.hypothesis.key
+    enough = [w for w in found if all(k.among(w.kinds) for k in sure) and named <= w.hypothesis.key
               and not smaller(w.share, rule.share)
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     return Part(tuple(sorted(present, key=lambda p: -p.dominance)),
-                tuple(d for d in examined if isinstance(d, Doubtful)), fewest.hypothesis,
+                tuple(
+                    d for d in examined if isinstance(d, Doubtful)
+                    and not _elsewhere(d.kind, lead.kinds)), fewest.hypothesis,
                 explained.overdispersion, fewest.share)
+
+
+def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:
+    """Whether others of the family say in which place."""
+    return not kind.place and any(k.place and k.family == kind.family for k in kinds)
 
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -191,10 +202,8 @@ def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
     left = lasting(ranked)
     chosen = left[: rule.pool]
     first = next((h for h in left if h.effects), None)
-    for family in sorted({f for e in first.effects for f in families_of(e, first, rule.dry)}
-                         if first else ()):
-        apart = {h.fit: [e for e in h.effects if family in families_of(e, h, rule.dry)]
-                 for h in left}
+    for kind in kinds_in(first, rule.dry) if first else ():
+        apart = {h.fit: members(kind, h, rule.dry) for h in left}
         own = {e.key for e in apart[first.fit]} if first else set()
         chosen += [h for h in left if not apart[h.fit]][: rule.rivals]
         chosen += [h for h in left if any(e.key not in own for e in apart[h.fit])][: rule.rivals]
@@ -225,41 +234,39 @@ def _weighed(found: list[Weighed], nominal: Weighed, scale: float,
     return sorted(made, key=lambda w: (w.score, w.hypothesis.place())), counts
 
 
-def _examined(family: Family, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
+def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
               proof: float) -> Present | Doubtful:
     """A family of the leading explanation: surely there, or why not.
 
     Args:
-        family: Of an effect of it.
+        kind: Of an effect of it.
         lead: The best explanation that predicts.
         found: All explanations, best first.
         rule: What is asked.
         proof: χ² that the family must be worth in the held-out recordings.
     """
-    holders = [w for w in found if family in w.families]
-    others = [w for w in found if family not in w.families]
-    members = [e for e in lead.hypothesis.effects
-               if family in families_of(e, lead.hypothesis, rule.dry)]
-    effect = members[0]
+    holders = [w for w in found if kind.among(w.kinds)]
+    others = [w for w in found if not kind.among(w.kinds)]
+    own_effects = members(kind, lead.hypothesis, rule.dry)
+    effect = own_effects[0]
     total = sum(w.weight for w in holders)
     kappa = dominance(lead, others, rule)
     if smaller(total, 1 - rule.rate):
-        return Doubtful(family, effect, f"its probability is {total:.3g}")
+        return Doubtful(kind, effect, f"its probability is {total:.3g}")
     if smaller(kappa, rule.dominance):
-        return Doubtful(family, effect, "without it the best explanation leaves "
+        return Doubtful(kind, effect, "without it the best explanation leaves "
                         f"{kappa:.2g} times as much, {rule.dominance:.2g} are asked")
     if smaller(max((dominance(w, others, rule) for w in holders if any(
-            e.known and family in families_of(e, w.hypothesis, rule.dry)
-            for e in w.hypothesis.effects)), default=0.0), rule.dominance):
-        return Doubtful(family, effect, "only a law outside the catalogue explains so much of it")
+            e.known for e in members(kind, w.hypothesis, rule.dry))), default=0.0), rule.dominance):
+        return Doubtful(kind, effect, "only a law outside the catalogue explains so much of it")
     # what does less than a law that is in no catalogue may be a facet of what that stands for
-    if smaller(kappa, max((dominance(lead, [w for w in found if not _holds(w.hypothesis, e)], rule)
+    if smaller(kappa, max((dominance(lead, [w for w in found if not holds(w.hypothesis, e)], rule)
                            for e in lead.hypothesis.effects if not e.known), default=0.0)):
-        return Doubtful(family, effect, "beside it a law outside the catalogue explains more")
+        return Doubtful(kind, effect, "beside it a law outside the catalogue explains more")
     if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof):
-        return Doubtful(family, effect, "the held-out recording could not have refuted it (it is "
+        return Doubtful(kind, effect, "the held-out recording could not have refuted it (it is "
                         f"worth {power:.2g} of chi-squared there, {proof:.2g} are asked)")
-    same = [w for w in holders if _holds(w.hypothesis, effect)]
+    same = [w for w in holders if holds(w.hypothesis, effect)]
     # a law that contains the effect is no rival of it
     rivals = [w for w in holders if w not in same and not any(
         _contains(e, effect) for e in w.hypothesis.effects)]
@@ -268,19 +275,14 @@ def _examined(family: Family, lead: Weighed, found: Sequence[Weighed], rule: Par
     # what needs a law outside the catalogue beside it has no name of its own, and a free exponent
     # takes up what other laws leave
     asked = rule.dominance if isinstance(effect.exponent, Parameter) else rule.within
-    exact = all(e.known for e in members) and effect.key not in lead.hypothesis.blurred and not (
-        smaller(own, 1 - rule.rate) or smaller(within, asked)
+    blurred = effect.key in lead.hypothesis.blurred
+    exact = all(e.known for e in own_effects) and not (
+        blurred or smaller(own, 1 - rule.rate) or smaller(within, asked)
         or smaller(lead.share, rule.exact))
-    compared = {e.key: e.name for w in holders for e in w.hypothesis.effects
-                if e.key != effect.key and family in families_of(e, w.hypothesis, rule.dry)}
-    return Present(family, effect, effect.ids if exact else (),
+    compared = {e.key: e.name for w in holders for e in members(kind, w.hypothesis, rule.dry)
+                if e.key != effect.key}
+    return Present(kind, effect, effect.ids if exact else (),
                    compared, own, total, kappa, within, lead.share)
-
-
-def _holds(h: Hypothesis, effect: Candidate) -> bool:
-    """Whether a hypothesis holds an effect, another variant of it, or a twin."""
-    return any(set(e.ids) & set(effect.ids) or (e.twin and e.twin == effect.twin)
-               for e in h.effects)
 
 
 def _contains(law: Candidate, effect: Candidate) -> bool:

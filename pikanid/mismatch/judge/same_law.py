@@ -63,8 +63,8 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
     open, and an effect with a limit has that where it is narrow.  An entry in two shapes is one.
     """
     def group(e: Candidate) -> str:
-        if e.twin:
-            return e.twin + e.site.suffix
+        if e.alike:
+            return e.alike
         return e.ids[0] + e.site.suffix if e.refines else e.key
 
     first: dict[frozenset[str], Hypothesis] = {}

@@ -24,9 +24,9 @@ def without_one(h: Hypothesis) -> Iterator[Job]:
 
 def beside(h: Hypothesis, candidates: Sequence[Candidate]) -> list[Candidate]:
     """What may be added to a hypothesis."""
-    groups = {e.twin for e in h.effects if e.twin}
+    groups = {e.alike for e in h.effects if e.alike}
     return [c for c in candidates if c.fits and c.suits(h.effects) and c.key not in h.key
-            and (not c.twin or c.twin not in groups) and not (c.absent and h.far)]
+            and c.alike not in groups and not (c.absent and h.far)]
 
 
 def afresh(h: Hypothesis, guess: Mapping[str, float]) -> Iterator[Job]:
@@ -117,7 +117,7 @@ def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """
     for effect in h.effects:
         for other in candidates:
-            alike = (effect.twin and other.twin == effect.twin) or (
+            alike = (effect.alike and other.alike == effect.alike) or (
                 set(effect.ids) & set(other.instead_of))
             if alike and other.fits and other.key not in h.key:
                 sizes = zip(effect.parameters[:1], other.parameters[:1], strict=False)

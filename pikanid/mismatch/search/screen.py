@@ -247,7 +247,7 @@ class Screen:
             a, b = (self.found.candidates[k] for k in pair)
             if gain[i, j] < 2 * self.faint or len(listed) == count:
                 break
-            if pair in taken or (a.twin and a.twin == b.twin):
+            if pair in taken or (a.alike and a.alike == b.alike):
                 continue
             taken.add(pair)
             start = self._start(a, int(good[i]), first[i, j])

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.signal import periodogram
 
 from pikanid.mismatch.case import Case
+from pikanid.mismatch.judge.partial import Doubtful
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Proof, values_of
 from pikanid.mismatch.report.locate import loud_windows
@@ -40,7 +41,13 @@ def remainder(case: Case, answer: Answer, proof: Proof | None) -> Remainder | No
         proof.rmse_before, proof.rmse_after, proof.rmse_moved, proof.noise, proof.unit,
         proof.p_value, counts, rows * max(after / rows, 1.0) / counts,
         median_frequency(first.t, first.measured - first.after), loud_windows(h),
-        tuple((d.family, d.why) for d in answer.part.doubtful))
+        tuple((d.family, _where(d) + d.why) for d in answer.part.doubtful))
+
+
+def _where(doubtful: Doubtful) -> str:
+    """In which of several coordinates a law of a state is not sure."""
+    site = doubtful.effect.site
+    return f"on {site.moving[0]}: " if site.suffix and doubtful.kind.place else ""
 
 
 def median_frequency(t: np.ndarray, values: np.ndarray) -> float:

@@ -19,6 +19,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.kinds import kinds_in, members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over
 from pikanid.mismatch.judge.partial import (
     Doubtful,
@@ -26,7 +27,6 @@ from pikanid.mismatch.judge.partial import (
     Part,
     Present,
     explanations,
-    families_of,
     lasting,
     surely_there,
 )
@@ -85,7 +85,7 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
         explained, part = weighed()
     # nothing of an explanation is sure that was not left out of it, of the last one found neither
     while explained and explained.lead and search.refine(
-            _without_each_family(lead := explained.lead.hypothesis), lead.key):
+            _without_each_family(lead := explained.lead.hypothesis, settings.part.dry), lead.key):
         explained, part = weighed()
     return explained, None if part is None else _against_curves(case, part, noise)
 
@@ -106,14 +106,13 @@ def _compared(search: Search, lead: Hypothesis) -> bool:
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
         *with_next_form(lead, search.candidates), *with_walls(lead, search.candidates),
-        *_without_each_family(lead)], lead.key)
+        *_without_each_family(lead, search.settings.part.dry)], lead.key)
     return (not search.budget_exhausted and search.closer([lead])) or found
 
 
-def _without_each_family(lead: Hypothesis) -> list[Job]:
-    families = sorted({f for e in lead.effects for f in e.families})
-    return [(tuple(e for e in lead.effects if f not in e.families), [lead.point])
-            for f in families]
+def _without_each_family(lead: Hypothesis, dry: float) -> list[Job]:
+    return [(tuple(e for e in lead.effects if e not in own), [lead.point])
+            for k in kinds_in(lead, dry) if (own := members(k, lead, dry))]
 
 
 def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -> Part:
@@ -130,23 +129,23 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
     own_left, nominal = left_over(h, before, noise), left_over(case.base, without, noise)
     present, doubtful = [], list(part.doubtful)
     for p in part.present:
-        members = [e for e in h.effects if p.family in families_of(e, h, rule.dry)]
+        own = members(p.kind, h, rule.dry)
         argument = _argument(p)
-        rest = [e for e in h.effects if e not in members]
+        rest = [e for e in h.effects if e not in own]
         others = [s for s in p.effect.site.moving if s != argument]
         # a curve holds a constant, too
         enough = p.dominance * max(own_left, rule.floor)
-        rivals = [] if p.family == "constant force" or not members else [
+        rivals = [] if p.family == "constant force" or not own else [
             _left_with_curve(case, h, rest, s, p.effect.site, noise, enough) for s in others]
         if h.far and rivals:  # no fit may get there
             rivals += [nominal * share_lacking(case.base, s, p.effect.site) for s in others]
         kappa = min(rivals, default=np.inf) / max(own_left, rule.floor)
         if smaller(kappa, rule.dominance):
-            doubtful.append(Doubtful(p.family, p.effect, "a free curve of a state it does not "
+            doubtful.append(Doubtful(p.kind, p.effect, "a free curve of a state it does not "
                                      f"depend on leaves {kappa:.2g} times as much in its place, "
                                      f"{rule.dominance:.2g} are asked"))
             continue
-        if p.names and members:
+        if p.names and own:
             beside = min((_left(case, found, noise, own_left / rule.form)
                           for found in _with_its_form_free(case.model, h, p, argument)),
                          default=np.inf)
@@ -162,16 +161,20 @@ def _without_shares(part: Part) -> Part:
     """
     unsure = [p for p in part.present if not p.names]
     curve = next((p for p in unsure if p.family in CURVES), None)
-    wall = next((p for p in unsure if p.family == "restoring force" and p.effect.other_minima),
-                None)
-    shares = {"gain": curve and f"the {curve.family}, whose form is not sure, has a slope of its "
-                                "own",
-              "drag": wall and f"{wall.effect.name}, whose form is not sure, takes energy out"}
-    taken = {p.family: why for p in part.present if (why := shares.get(p.family))}
-    return replace(
-        part, present=tuple(p for p in part.present if p.family not in taken),
-        doubtful=(*part.doubtful, *(Doubtful(p.family, p.effect, taken[p.family])
-                                    for p in part.present if p.family in taken)))
+    walls = {p.kind.place: p for p in unsure
+             if p.family == "restoring force" and p.effect.other_minima}
+
+    def why_not(p: Present) -> str:
+        if p.family == "gain" and curve:
+            return f"the {curve.family}, whose form is not sure, has a slope of its own"
+        if p.family == "drag" and p.kind.place in walls:
+            wall = walls[p.kind.place].effect
+            return f"{wall.name}, whose form is not sure, takes energy out"
+        return ""
+
+    return replace(part, present=tuple(p for p in part.present if not why_not(p)), doubtful=(
+        *part.doubtful, *(Doubtful(p.kind, p.effect, why) for p in part.present
+                          if (why := why_not(p)))))
 
 
 def _argument(p: Present) -> str:
