@@ -21,7 +21,8 @@ def fading_memory(site: Site) -> list[Candidate]:
         return []
     span, x, w = site.span[1] - site.span[0], site.v, site.name("wake")
     k = Parameter(site.name("k_wake"), 0.0, "1/s")
-    r = Parameter(site.name("r_wake"), 10 / span, "1/s", (0.5 / span, 0.5 / site.interval))
+    slow, fast = 0.5 / span, max(0.5 / site.interval, 2 / span)
+    r = Parameter(site.name("r_wake"), min(10 / span, 0.5 * (slow + fast)), "1/s", (slow, fast))
     text = f"{k.name}*({w} - {x})"
 
     def extend(model: Model) -> Model:
