@@ -34,20 +34,26 @@ def test_held_out_recordings_count_as_well() -> None:
     assert answered(fits, {"": 99.0, "a": 60.0, "b": 99.0}).verdict == "named"
 
 
-@pytest.mark.parametrize(("names", "other_minima", "sure"), [
-    ((), (1.003,), {"restoring force"}),
-    (("wall_impact",), (1.003,), {"restoring force", "drag"}),
-    ((), (), {"restoring force", "drag"})])
-def test_a_wall_without_a_name_takes_energy_out_itself(
-        names: tuple[str, ...], other_minima: tuple[float, ...], sure: set[str]) -> None:
+@pytest.mark.parametrize(("names", "other_minima", "lossy", "sure"), [
+    ((), (1.003,), True, {"restoring force"}),
+    ((), (1.003,), False, {"restoring force", "drag"}),
+    (("wall_impact",), (1.003,), True, {"restoring force", "drag"}),
+    ((), (), True, {"restoring force", "drag"})])
+def test_a_wall_without_a_name_may_take_energy_out_itself(
+        names: tuple[str, ...], other_minima: tuple[float, ...], lossy: bool, sure: set[str]
+) -> None:
     wall: Any = SimpleNamespace(**vars(member("wall_impact", "restoring force")),
                                 other_minima=other_minima)
     drag: Any = SimpleNamespace(**vars(member("quadratic_drag", "drag")), other_minima=())
     present = (Present(Kind("restoring force", "v"), wall, names, {}, 1.0, 1.0, 200.0, 1.0, 0.95),
                Present(Kind("drag", "v"), drag, ("quadratic_drag",), {}, 1.0, 1.0, 40.0, 1.3, 0.95))
     h: Any = SimpleNamespace(effects=(wall, drag), blurred=frozenset())
-    found = _without_shares(Part(present, (), h, 1.0, 0.95))
+    other: Any = SimpleNamespace(**vars(member("dissipating_wall", "restoring force")),
+                                 other_minima=(1.003,))
+    other.covers = {wall.key: {}}
+    likely = [drag, other] if lossy else [drag, wall]
+    found = _without_shares(Part(present, (), h, 1.0, 0.95), likely)
     assert {p.family for p in found.present} == sure
     assert {d.family for d in found.doubtful} == {"restoring force", "drag"} - sure
-    again = _without_shares(replace(found, doubtful=()))
+    again = _without_shares(replace(found, doubtful=()), likely)
     assert again.present == found.present

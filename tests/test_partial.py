@@ -140,9 +140,9 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
         return bool(new)
 
     monkeypatch.setattr(surely, "explanations", lambda *_: SimpleNamespace(
-        lead=SimpleNamespace(hypothesis=lead[0])))
-    monkeypatch.setattr(surely, "surely_there", lambda found, *_: SimpleNamespace(
-        hypothesis=found.lead.hypothesis))
+        lead=SimpleNamespace(hypothesis=lead[0]), weighed=()))
+    monkeypatch.setattr(surely, "surely_there", lambda found, *_: Part(
+        (), (), found.lead.hypothesis, 1.0, 0.95))
     monkeypatch.setattr(surely, "_compared", compared)
     monkeypatch.setattr(surely, "_one_more", lambda *_: None)
     monkeypatch.setattr(surely, "lasting", lambda _: [first])
@@ -178,9 +178,18 @@ def test_a_curve_without_a_name_has_a_slope_of_its_own(names: tuple[str, ...], s
     present = tuple(Present(Kind(e.families[0]), e, own, {}, 1.0, 1.0, 9.0, 1.0, 0.95)
                     for e, own in ((curve, names), (scale, ("sensor_gain",))))
     h: Any = SimpleNamespace(effects=(curve, scale), blurred=frozenset())
-    found = _without_shares(Part(present, (), h, 1.0, 0.95))
+    found = _without_shares(Part(present, (), h, 1.0, 0.95), [])
     assert {p.family for p in found.present} == sure
     assert {d.family for d in found.doubtful} == {"sensor curve", "gain"} - sure
+
+
+@pytest.mark.parametrize(("share", "within", "names"), [
+    (0.85, 5.0, ("coulomb_friction",)), (0.85, 1.5, ()), (0.95, 1.5, ("coulomb_friction",))])
+def test_a_name_is_as_sure_as_its_family_where_no_other_member_does_nearly_as_well(
+        share: float, within: float, names: tuple[str, ...]) -> None:
+    found = examined(weighed((COULOMB,), 1.0, 0.995, share), weighed((HYSTERESIS,), within, 0.003),
+                     weighed((DRAG,), 9.0, 0.002))
+    assert isinstance(found, Present) and found.names == names
 
 
 def test_what_noise_hides_is_no_remainder() -> None:

@@ -278,7 +278,8 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     blurred = effect.key in lead.hypothesis.blurred
     exact = all(e.known for e in own_effects) and not (
         blurred or smaller(own, 1 - rule.rate) or smaller(within, asked)
-        or smaller(lead.share, rule.exact))
+        # as sure as the family itself, whatever is left
+        or (smaller(lead.share, rule.exact) and smaller(within, rule.dominance)))
     compared = {e.key: e.name for w in holders for e in members(kind, w.hypothesis, rule.dry)
                 if e.key != effect.key}
     return Present(kind, effect, effect.ids if exact else (),

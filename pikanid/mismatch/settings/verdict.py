@@ -123,7 +123,8 @@ class PartSettings:
         share: Of the held-out misfit's square that must be explained.
         within: κ of an effect among explanations that hold the same family; of a law with a free
             exponent `dominance` is asked.
-        exact: Share of the held-out misfit's square that a name must explain.
+        exact: Share of the held-out misfit's square that a name must explain, unless it dominates
+            among members of its family as the family does.
         form: κ of a free curve of the same state beside a named effect: from there on the form is
             another one, and only the family is sure.
         floor: Of σ²: less than that is not told from nothing.

@@ -87,7 +87,17 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
     while explained and explained.lead and search.refine(
             _without_each_family(lead := explained.lead.hypothesis, settings.part.dry), lead.key):
         explained, part = weighed()
-    return explained, None if part is None else _against_curves(case, part, noise)
+    if explained is None or part is None:
+        return explained, None
+    return explained, _without_shares(_against_curves(case, part, noise),
+                                      _likely(explained, settings.part.rate))
+
+
+def _likely(explained: Explanations, rate: float) -> list[Candidate]:
+    """The effects that explanations hold whose weights are at least `rate` together."""
+    held = {e.key: e for w in explained.weighed for e in w.hypothesis.effects}
+    return [e for key, e in held.items() if not smaller(sum(
+        w.weight for w in explained.weighed if key in w.hypothesis.key), rate)]
 
 
 def _one_more(search: Search, lead: Hypothesis) -> None:
@@ -152,24 +162,24 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
             if not smaller(own_left / max(beside, rule.floor), rule.form):
                 p = replace(p, names=())
         present.append(replace(p, dominance=min(p.dominance, float(kappa))))
-    return _without_shares(replace(part, present=tuple(present), doubtful=tuple(doubtful)))
+    return replace(part, present=tuple(present), doubtful=tuple(doubtful))
 
 
-def _without_shares(part: Part) -> Part:
+def _without_shares(part: Part, likely: Sequence[Candidate]) -> Part:
     """The part without what a law beside it does itself whose form is not sure: a curve of an input
-    or sensor has a slope of its own, and a wall takes energy out.
+    or sensor has a slope of its own, and a wall that may be a lossy one takes energy out.
     """
     unsure = [p for p in part.present if not p.names]
     curve = next((p for p in unsure if p.family in CURVES), None)
-    walls = {p.kind.place: p for p in unsure
+    walls = {p.kind.place: p.effect.name for p in unsure
              if p.family == "restoring force" and p.effect.other_minima}
+    lossy = {e.site.v for e in likely if e.covers and e.other_minima}
 
     def why_not(p: Present) -> str:
         if p.family == "gain" and curve:
             return f"the {curve.family}, whose form is not sure, has a slope of its own"
-        if p.family == "drag" and p.kind.place in walls:
-            wall = walls[p.kind.place].effect
-            return f"{wall.name}, whose form is not sure, takes energy out"
+        if p.family == "drag" and p.kind.place in walls.keys() & lossy:
+            return f"{walls[p.kind.place]}, whose form is not sure, takes energy out"
         return ""
 
     return replace(part, present=tuple(p for p in part.present if not why_not(p)), doubtful=(
