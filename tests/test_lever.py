@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -82,10 +85,26 @@ def test_the_same_law_may_be_missing_in_two_coordinates() -> None:
     model, recording = systems.double_pendulum(), linkage((0.0, 0.0), 1, 0.2)
     entries = candidates(sites(model, (recording,)))
     own = next(c for c in entries if c.key == "coulomb_friction_q1_b1")
-    h = type("H", (), {"effects": (own,), "key": frozenset({own.key}), "far": False})()
+    h: Any = SimpleNamespace(effects=(own,), key=frozenset({own.key}), far=False)
     keys = {c.key for c in beside(h, entries)}
     assert "coulomb_friction_q2_b2" in keys and "coulomb_friction_q1" not in keys
     assert own.name == "Coulomb friction on q1 as b1 acts"
+
+
+def test_forces_on_a_coordinate_act_through_the_lever_or_do_not() -> None:
+    """Some of each together would be a coupling of the other equation to this coordinate."""
+    model, recording = systems.double_pendulum(), linkage((0.0, 0.0), 1, 0.2)
+    entries = candidates(sites(model, (recording,)))
+    forces = [c for c in entries if c.pushes and c.site.v == "v1"]
+    direct = next(c for c in forces if c.key == "quadratic_drag_q1")
+    h: Any = SimpleNamespace(effects=(direct,), key=frozenset({direct.key}), far=False)
+    keys = {c.key for c in beside(h, entries)}
+    assert {"cubic_stiffness_q1", "quadratic_drag_q2_b2", "parameter_drift[b1]"} <= keys
+    along = {c.key for c in forces if c.site.along}
+    assert {"cubic_stiffness_q1_b1", "cubic_stiffness_q4_v0_q1_b1", "wall_impact_q1_b1"} <= along
+    assert not along & keys
+    walls = [c for c in forces if c.ids == ("wall_impact",)]
+    assert len({c.alike for c in walls}) == 3  # one side, the other one, both
 
 
 @pytest.mark.slow

@@ -107,6 +107,7 @@ class Candidate:
             further parameters from where a fit in that one's place begins; none: from several.
         parts: From its parameter values to sums that are the same law: by key of each candidate in
             the sum, that one's values.
+        pushes: Whether it is a force on its coordinate, which a lever would hand on to others.
         static: Whether it is a force that the state at the same instant determines.
         resistance: The force against the motion at size 1, where it is no more than that.
         exponent: Of the speed, where that force is a power of it: a number, or the parameter.
@@ -141,6 +142,7 @@ class Candidate:
     twin: str = ""
     families: tuple[Family, ...] = ()
     per_recording: bool = False
+    pushes: bool = False
     absent: bool = False
     known: bool = True
     fits: bool = True
@@ -165,9 +167,13 @@ class Candidate:
 
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these.  Of two that act once each may be
-        what the shape of the other lacks.
+        what the shape of the other lacks.  Forces on a coordinate act through a lever or do not:
+        some of each together would be any coupling.
         """
         if self.absent and any(e.absent and e.key != self.key for e in others):
+            return False
+        if self.pushes and any(e.pushes and e.site.v == self.site.v
+                               and e.site.along != self.site.along for e in others):
             return False
         return not self.beside or any(i in self.beside for e in others for i in e.ids)
 

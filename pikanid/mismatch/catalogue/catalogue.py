@@ -94,6 +94,7 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     """
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, or moved by one input: each is one channel
+    levered = {s.v for s in sites if s.lever}
     first = {name: s.v for s in reversed(sites) for name in (*s.inputs, s.output.name)}
     for table in (ENTRIES, DECOYS):
         for site in sites:
@@ -102,9 +103,10 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
                     continue
                 for candidate in make(site):
                     if all(first[name] == site.v for name in _channels(candidate)):
-                        told = _on(site) if site.suffix and make in FORCES else ""
+                        if site.suffix and make in FORCES:
+                            candidate = _placed(candidate, site.v in levered)
                         made.setdefault(candidate.key, replace(
-                            candidate, name=candidate.name + told, families=families))
+                            candidate, families=families, pushes=make in FORCES))
     for entry in [*made.values()]:
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
     effects = tuple(effects)
@@ -119,9 +121,14 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     return tuple(with_twins([*own, *made.values()], effects))
 
 
-def _on(site: Site) -> str:
-    """Which of several equations a law stands in, for people."""
-    return f" on {site.q or site.v}" + (f" as {site.along} acts" if site.lever else "")
+def _placed(law: Candidate, levered: bool) -> Candidate:
+    """A law of one of several coordinates: its name says of which one.  Where there is a lever the
+    same law along it is its twin.
+    """
+    site = law.site
+    name = f"{law.name} on {site.q or site.v}" + (f" as {site.along} acts" if site.lever else "")
+    own = f"{law.ids[0]}[{law.variant}]" if levered else ""
+    return replace(law, name=name, twin=law.twin or own)
 
 
 def _channels(candidate: Candidate) -> Sequence[str]:

@@ -22,7 +22,7 @@ def lever(model: Model, v: str, rates: Sequence[str]) -> tuple[str, Mapping[str,
 
     >>> from pikanid.model import systems
     >>> by, found = lever(systems.cart_pole(), "x_dot", ["x_dot", "theta_dot"])
-    >>> by, sorted(found), found["x_dot"].subs("theta", 0)
+    >>> by, sorted(found), found["x_dot"].subs(symbol("theta"), 0)
     ('b', ['theta_dot', 'x_dot'], 1)
     """
     at_rest = {symbol(n): sp.S.Zero for n in (*model.state_names, *model.input_names)}

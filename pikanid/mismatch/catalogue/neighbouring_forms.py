@@ -252,5 +252,5 @@ def _decoy(entry: Candidate, name: str, text: str, parameters: tuple[Parameter, 
     site: Site = entry.site
     return Candidate((name,), f"a form next to {entry.name}", text, "dynamics", site, parameters,
                      lambda m: site.pushed(m, text), lambda view: [], entry.variant,
-                     families=families, known=False, static=True,
+                     families=families, known=False, pushes=entry.pushes, static=True,
                      other_minima=entry.other_minima, next_to=entry.key, starts=starts)
