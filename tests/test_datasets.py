@@ -223,3 +223,38 @@ def test_tanks_are_those_of_the_benchmark(recordings_folder: Path) -> None:
     assert train["h"].values.max() <= 10.0 and recordings_folder.is_dir()
     with pytest.raises(BadSetting, match="train"):
         datasets.cascaded_tanks("all")  # type: ignore[arg-type]  # what is no part
+
+
+def test_runs_of_the_double_pendulum_have_torques_of_their_own(recordings_folder: Path) -> None:
+    runs = [datasets.double_pendulum(part) for part in ("train", "held_out", "held_out_2")]
+    for run in runs:
+        assert {"q1", "q2", "tau1", "tau2"} == {*run.names} and 4990 < len(run.t) <= 5000
+        assert run.t[0] == 0 and np.median(np.diff(run.t)) == pytest.approx(0.002, rel=1e-3)
+        assert run["tau1"].hold == "zero" and run["q1"].unit == "rad"
+        assert np.abs(run["q1"].values[0]) < 0.02  # hanging
+    assert len({float(run["tau2"].values.max()) for run in runs}) == 3
+    assert recordings_folder.is_dir()
+
+
+def test_a_building_is_cut_in_two(recordings_folder: Path) -> None:
+    train, other = (datasets.building(part) for part in ("train", "held_out"))
+    assert (len(train.t), len(other.t)) == (4143, 2762) and train.t[1] == 900.0
+    assert (train["T_a"].values[0], other["T_a"].values[0]) == (7.6, 4.8)
+    assert other["T"].values[0] == pytest.approx(17.5708333)
+    assert (train["T"].unit, train["P"].hold, recordings_folder.is_dir()) == ("degC", "zero", True)
+
+
+def test_twelve_subjects_have_doses_of_their_own(recordings_folder: Path) -> None:
+    subjects = datasets.theophylline()
+    assert [len(s.t) for s in subjects] == [11] * 12 and recordings_folder.is_dir()
+    assert all(np.ptp(s["dose"].values) == 0 for s in subjects)
+    first = subjects[0]
+    assert (first["dose"].values[0], first["c"].values[1], first.t[1]) == (4.02, 2.84, 900.0)
+
+
+def test_populations_are_counted_by_year_and_by_day(recordings_folder: Path) -> None:
+    pelts, boys = datasets.lynx_hare(), datasets.boarding_school()
+    assert (len(pelts.t), pelts["prey"].values[1], pelts["predators"].values[1]) == (21, 47.2, 6.1)
+    assert pelts.t[1] == 365.25 * 86400
+    assert (len(boys.t), boys.t[1], boys["I"].values[0]) == (14, 86400.0, 3.4)
+    assert recordings_folder.is_dir()

@@ -160,7 +160,7 @@ def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(origin: object) -> bytes:
         raise errors.DatasetUnavailable("The recording is not here.")
 
-    monkeypatch.setattr(datasets, "_content", nothing)
+    monkeypatch.setattr(datasets, "content", nothing)
 
 
 @pytest.mark.slow

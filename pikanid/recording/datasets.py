@@ -11,33 +11,33 @@ The recordings belong to their authors: cite the papers named in the functions.
 
 from __future__ import annotations
 
-import gzip
-import hashlib
-import io
-import os
-import zlib
 from dataclasses import replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from pikanid import errors
 from pikanid.recording import alignment, kinematics, origins
 from pikanid.recording.channel import Channel
 from pikanid.recording.excerpts import falling_balls_excerpt, single_pendulum_excerpt
-from pikanid.recording.origins import Origin
+from pikanid.recording.fetched import FOLDER, content
 from pikanid.recording.reading import csv, mat, spreadsheet
 from pikanid.recording.reading.table import Options
 from pikanid.recording.recording import Recording
+from pikanid.recording.system_datasets import (
+    boarding_school,
+    building,
+    cascaded_tanks,
+    double_pendulum,
+    lynx_hare,
+    theophylline,
+)
 
 __all__ = [
-    "BALLS", "SLOSH_MOTIONS", "cascaded_tanks", "falling_balls", "falling_balls_excerpt",
-    "silverbox", "single_pendulum", "single_pendulum_excerpt", "single_pendulum_free_swing",
-    "slosh_lar", "slosh_lar_forced",
+    "BALLS", "FOLDER", "SLOSH_MOTIONS", "boarding_school", "building", "cascaded_tanks",
+    "double_pendulum", "falling_balls", "falling_balls_excerpt", "lynx_hare", "silverbox",
+    "single_pendulum", "single_pendulum_excerpt", "single_pendulum_free_swing", "slosh_lar",
+    "slosh_lar_forced", "theophylline",
 ]
-
-FOLDER = "PIKANID_DATA"
 
 # Silverbox: 10^7/2^14 Hz, and the ranges (0-based, stop excluded) of the benchmark's official
 # split; the held-out part is the last quarter of the first range.
@@ -49,9 +49,6 @@ _SILVERBOX_PARTS = {
     "arrow_no_extrapolation": (100, 32100),
     "all": (0, 131072),
 }  # definition: official split of the benchmark
-
-_TANKS_INTERVAL = 4.0  # definition: [s], of the benchmark
-_TANKS_PARTS = {"train": (0, 2), "held_out": (1, 3)}  # definition: columns of input and output
 
 BALLS = origins.BALLS
 SLOSH_MOTIONS = tuple(origins.SLOSH_CHECKSUMS)
@@ -74,7 +71,7 @@ def single_pendulum(part: Literal["train", "held_out", "all"] = "train") -> tupl
     kinds = {"train": ("id",), "held_out": ("vad",), "all": ("id", "vad")}
     origins.check_known("part", part, tuple(kinds))
     origin = origins.SINGLE_PENDULUM
-    arrays = mat.arrays(_content(origin), origin.name)
+    arrays = mat.arrays(content(origin), origin.name)
     pieces = []
     for kind in kinds[part]:
         for k in range(1, (4 if kind == "id" else 2) + 1):
@@ -99,7 +96,7 @@ def single_pendulum_free_swing() -> Recording:
         DatasetUnavailable: If the file is neither at hand nor to be had.
     """
     origin = origins.FREE_SWING
-    arrays = mat.arrays(_content(origin), origin.name)
+    arrays = mat.arrays(content(origin), origin.name)
     return Recording.from_arrays(arrays["Theta1.time"].ravel(),
                                  {"theta": arrays["Theta1.signals.values"].ravel() - np.pi},
                                  {"theta": "rad"}, name="single pendulum, free swing")
@@ -124,33 +121,11 @@ def silverbox(
     origins.check_known("part", part, tuple(_SILVERBOX_PARTS))
     start, stop = _SILVERBOX_PARTS[part]
     origin = origins.SILVERBOX
-    arrays = mat.arrays(_content(origin), origin.name)
+    arrays = mat.arrays(content(origin), origin.name)
     return Recording.from_arrays(
         np.arange(stop - start) / _SILVERBOX_RATE,
         {"u": arrays["V1"].ravel()[start:stop], "y": arrays["V2"].ravel()[start:stop]},
         {"u": "V", "y": "V"}, name=f"Silverbox, {part.replace('_', ' ')}")
-
-
-def cascaded_tanks(part: Literal["train", "held_out"] = "train") -> Recording:
-    """Two tanks above each other and a pump, which run over at times; 1024 samples, one in 4 s.
-
-    Channels: ``u`` [V], the pump, held from sample to sample, and ``h`` [V], the sensor of the
-    lower level, which is clipped at 10 V.  Both parts begin in the same unknown state.
-    M. Schoukens and J. P. Noël, Three benchmarks addressing open challenges in nonlinear system
-    identification, IFAC-PapersOnLine 50-1 (2017).
-
-    Args:
-        part: Of the benchmark's split.
-
-    Raises:
-        DatasetUnavailable: If the file is neither at hand nor to be had.
-    """
-    origins.check_known("part", part, tuple(_TANKS_PARTS))
-    content = _content(origins.CASCADED_TANKS)
-    columns = np.loadtxt(io.BytesIO(content), delimiter=",", skiprows=1, usecols=_TANKS_PARTS[part])
-    return Recording.from_arrays(
-        _TANKS_INTERVAL * np.arange(len(columns)), {"u": columns[:, 0], "h": columns[:, 1]},
-        {"u": "V", "h": "V"}, hold={"u": "zero"}, name=f"cascaded tanks, {part.replace('_', ' ')}")
 
 
 def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:
@@ -172,7 +147,7 @@ def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:
     origins.check_known("drop", str(drop), ("1", "2"))
     origin = origins.FALLING_BALLS
     # The workbook ends in .xls and is of the newer kind inside.
-    rows, _ = spreadsheet.cells(_content(origin), origin.name, name)
+    rows, _ = spreadsheet.cells(content(origin), origin.name, name)
     table = np.array(rows[1:], dtype=float)
     t, h, v = table[table[:, 0] == drop, 1:4].T
     return Recording.from_arrays(t, {"h": h, "v": v}, {"h": "m", "v": "m/s"},
@@ -196,10 +171,10 @@ def slosh_lar(name: str = "LE_2D_0m_5s_900deg") -> Recording:
     """
     origins.check_known("motion", name, SLOSH_MOTIONS)
     motion, heights = origins.slosh(name)
-    table = csv.read(_content(motion), motion.name, Options(delimiter=";", decimal="."))
+    table = csv.read(content(motion), motion.name, Options(delimiter=";", decimal="."))
     t, *pose = (column.values for column in table.columns)
     names = ("x", "y", "z", "qx", "qy", "qz", "qw")
-    arrays = mat.arrays(_content(heights), heights.name)
+    arrays = mat.arrays(content(heights), heights.name)
     h = Channel("h", arrays["slosh_times"].ravel(), arrays["slosh_heights"].ravel(), "mm")
     carried = Recording.from_arrays(t, dict(zip(names, pose, strict=True)),
                                     {key: "m" for key in names[:3]},
@@ -233,41 +208,3 @@ def slosh_lar_forced(name: str = "LE_2D_0m_5s_900deg") -> Recording:
     kept = raw.without("x", "y", "z", *kinematics.QUATERNION, "heading").shift("h", -late)
     note = f"The heights lagged {late:.3f} s behind the motion, by the energies of both."
     return replace(kept.window(begin, end), notes=(note,))
-
-
-def _content(origin: Origin) -> bytes:
-    """The checked bytes of a file, wherever it is found."""
-    folder = os.environ.get(FOLDER)
-    if folder:
-        for local in (Path(folder) / origin.local, Path(folder) / f"{origin.local}.gz"):
-            if local.is_file():
-                return _checked(local, origin)
-    return _checked(_downloaded(origin), origin)
-
-
-def _downloaded(origin: Origin) -> Path:
-    """The file in the cache folder, fetched if it is not there yet."""
-    import pooch
-    from requests.exceptions import RequestException
-
-    cache = Path(pooch.os_cache("pikanid")) / Path(origin.local).parent
-    try:
-        return Path(
-            pooch.retrieve(origin.url, known_hash=f"sha256:{origin.sha256}", fname=origin.name,
-                           path=cache, downloader=pooch.HTTPDownloader(timeout=(5, 60)))
-        )
-    except (RequestException, OSError, ValueError):
-        raise errors.DatasetUnavailable(
-            errors.dataset_missing(origin.local, origin.url, FOLDER)) from None
-
-
-def _checked(path: Path, origin: Origin) -> bytes:
-    try:
-        content = path.read_bytes()
-        if path.suffix == ".gz":
-            content = gzip.decompress(content)
-    except (OSError, EOFError, zlib.error):
-        content = b""
-    if hashlib.sha256(content).hexdigest() != origin.sha256:
-        raise errors.DatasetUnavailable(errors.dataset_altered(str(path), origin.url))
-    return content

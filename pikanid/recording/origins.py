@@ -59,6 +59,29 @@ CASCADED_TANKS = Origin("forgi86/sysid-neural-continuous",
                         "956aa7ecd73061b0321c6f6098d74c9e4a7ce67a",
                         "examples/CTS/data/dataBenchmark.csv", "cascaded_tanks/dataBenchmark.csv",
                         "ef2388ed822f3aef4aa80d6b0f2b466dd80b361786b3eafc7a2957c31ea323a7")
+_RUNS = {
+    "train": ("143601", "e028c1d7a6a45cfe1b96b7cb33aae412b8888f022677d392f6f9cd4d4f63886d"),
+    "held_out": ("143524", "03fc5e18915e80afabb3e2674b627f9d849d43675aeacbf586ccd24b3ebd7ca5"),
+    "held_out_2": ("143339", "94f17287b53187dfe8f4ce131f4e7c49918309fcc915cbae2f64ed3101e7c23b")}
+DOUBLE_PENDULUM = {part: Origin(
+    "dfki-ric-underactuated-lab/double_pendulum", "1e8544e67f3da72a51ee52fbbb278e131ce2a43f",
+    f"data/experiment_records/design_C.1/sys_id/20230629/{run}/trajectory.csv",
+    f"double_pendulum/20230629-{run}/trajectory.csv", sha256)
+    for part, (run, sha256) in _RUNS.items()}
+BUILDING = Origin("JulienLeprince/fiftyshadesofgrey", "0e670018c93aeccc973ca38701c96d204818b352",
+                  "data/in/blg_3.csv", "buildings/blg_3.csv",
+                  "c423c64051869280621880e4ceabc8dcc48cbf683e9c0512654a82ac03a6769b")
+THEOPHYLLINE = Origin("vincentarelbundock/Rdatasets", "1dcc2bf5f955cc1224a3e1307256e1fe86b68dae",
+                      "csv/datasets/Theoph.csv", "theophylline/Theoph.csv",
+                      "f9b77033090644cf38c83056c25c8137bca71cf629d7c0159a72ef18095726b0")
+LYNX_HARE = Origin("stan-dev/example-models", "2847a61097354785ceda9fba40c7f761d6664491",
+                   "knitr/lotka-volterra/hudson-bay-lynx-hare.csv",
+                   "populations/lynx_hare/hudson-bay-lynx-hare.csv",
+                   "66d3b24d30221a5654ab48cc461ea1d3f725f8f5719016f702cfb56610b4ee63")
+BOARDING_SCHOOL = Origin("benmaier/boarding_school_SIR", "6bac1711253b3b5b4397ccca31b739a0c06a0fd1",
+                         "british_boarding_school.txt",
+                         "populations/boarding_school_flu/british_boarding_school.txt",
+                         "56f9a828253e758f741f31db6650d48d4ce7aa7d3fc45ed68352451924a1c744")
 FALLING_BALLS = Origin("briandesilva/discovery-of-physics-from-data",
                        "b79c34317f049c9b47aaf2cc4c54c5ec7219f3d7", "data/Ball_drops_data.xls",
                        "falling_balls/Ball_drops_data.xls",
