@@ -13,8 +13,15 @@ import sympy as sp
 from pikanid.formula.expressions import symbol
 from pikanid.model import Input, Model, Output
 
-# what NumPy lacks of the formula language, where an initial value needs it
+
+def _step(x: float, at: float) -> float:
+    return at if x == 0 else float(x > 0)
+
+
+# what NumPy lacks of the formula language, where an initial value needs it; SymPy solves for where
+# a step of its own is, which takes it minutes where the formula is long
 _TOOLS = {
+    "Heaviside": _step,
     "abs_power": lambda x, n: 0.0 if x == 0 else abs(x) ** n,
     "signed_power": lambda x, n: 0.0 if x == 0 else np.sign(x) * abs(x) ** n,
     "log_abs": lambda x: 0.0 if x == 0 else np.log(abs(x)),
