@@ -13,9 +13,8 @@ from pikanid.recording.recording import Recording
 
 _TANKS_INTERVAL = 4.0  # definition: [s], of the benchmark
 _TANKS_PARTS = {"train": (0, 2), "held_out": (1, 3)}  # definition: columns of input and output
-_QUARTER, _HOUR, _DAY, _YEAR = 900.0, 3600.0, 86400.0, 31557600.0  # definition: [s]
+_QUARTER, _HOUR, _DAY, _YEAR = 900.0, 3600.0, 86400.0, 31557600.0  # definition: seconds of each
 _FIRST_DAYS = 4143  # definition: quarters of an hour of a building that are for fitting
-
 
 
 def cascaded_tanks(part: Literal["train", "held_out"] = "train") -> Recording:
