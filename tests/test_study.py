@@ -15,7 +15,7 @@ from pikanid import errors
 from pikanid.model import systems
 from pikanid.pieces.html import text as printed
 from pikanid.pieces.sheet import Sheet
-from pikanid.recording import datasets
+from pikanid.recording import fetched
 from pikanid.reporting import study_report, study_sheets
 from pikanid.validation.study import pendulum, run, slosh
 
@@ -160,7 +160,7 @@ def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(origin: object) -> bytes:
         raise errors.DatasetUnavailable("The recording is not here.")
 
-    monkeypatch.setattr(datasets, "content", nothing)
+    monkeypatch.setattr(fetched, "content", nothing)
 
 
 @pytest.mark.slow

@@ -16,10 +16,10 @@ from typing import Literal
 
 import numpy as np
 
-from pikanid.recording import alignment, kinematics, origins
+from pikanid.recording import alignment, fetched, kinematics, origins
 from pikanid.recording.channel import Channel
 from pikanid.recording.excerpts import falling_balls_excerpt, single_pendulum_excerpt
-from pikanid.recording.fetched import FOLDER, content
+from pikanid.recording.fetched import FOLDER
 from pikanid.recording.reading import csv, mat, spreadsheet
 from pikanid.recording.reading.table import Options
 from pikanid.recording.recording import Recording
@@ -71,7 +71,7 @@ def single_pendulum(part: Literal["train", "held_out", "all"] = "train") -> tupl
     kinds = {"train": ("id",), "held_out": ("vad",), "all": ("id", "vad")}
     origins.check_known("part", part, tuple(kinds))
     origin = origins.SINGLE_PENDULUM
-    arrays = mat.arrays(content(origin), origin.name)
+    arrays = mat.arrays(fetched.content(origin), origin.name)
     pieces = []
     for kind in kinds[part]:
         for k in range(1, (4 if kind == "id" else 2) + 1):
@@ -96,7 +96,7 @@ def single_pendulum_free_swing() -> Recording:
         DatasetUnavailable: If the file is neither at hand nor to be had.
     """
     origin = origins.FREE_SWING
-    arrays = mat.arrays(content(origin), origin.name)
+    arrays = mat.arrays(fetched.content(origin), origin.name)
     return Recording.from_arrays(arrays["Theta1.time"].ravel(),
                                  {"theta": arrays["Theta1.signals.values"].ravel() - np.pi},
                                  {"theta": "rad"}, name="single pendulum, free swing")
@@ -121,7 +121,7 @@ def silverbox(
     origins.check_known("part", part, tuple(_SILVERBOX_PARTS))
     start, stop = _SILVERBOX_PARTS[part]
     origin = origins.SILVERBOX
-    arrays = mat.arrays(content(origin), origin.name)
+    arrays = mat.arrays(fetched.content(origin), origin.name)
     return Recording.from_arrays(
         np.arange(stop - start) / _SILVERBOX_RATE,
         {"u": arrays["V1"].ravel()[start:stop], "y": arrays["V2"].ravel()[start:stop]},
@@ -147,7 +147,7 @@ def falling_balls(ball: str = "Baseball", drop: Literal[1, 2] = 1) -> Recording:
     origins.check_known("drop", str(drop), ("1", "2"))
     origin = origins.FALLING_BALLS
     # The workbook ends in .xls and is of the newer kind inside.
-    rows, _ = spreadsheet.cells(content(origin), origin.name, name)
+    rows, _ = spreadsheet.cells(fetched.content(origin), origin.name, name)
     table = np.array(rows[1:], dtype=float)
     t, h, v = table[table[:, 0] == drop, 1:4].T
     return Recording.from_arrays(t, {"h": h, "v": v}, {"h": "m", "v": "m/s"},
@@ -171,10 +171,10 @@ def slosh_lar(name: str = "LE_2D_0m_5s_900deg") -> Recording:
     """
     origins.check_known("motion", name, SLOSH_MOTIONS)
     motion, heights = origins.slosh(name)
-    table = csv.read(content(motion), motion.name, Options(delimiter=";", decimal="."))
+    table = csv.read(fetched.content(motion), motion.name, Options(delimiter=";", decimal="."))
     t, *pose = (column.values for column in table.columns)
     names = ("x", "y", "z", "qx", "qy", "qz", "qw")
-    arrays = mat.arrays(content(heights), heights.name)
+    arrays = mat.arrays(fetched.content(heights), heights.name)
     h = Channel("h", arrays["slosh_times"].ravel(), arrays["slosh_heights"].ravel(), "mm")
     carried = Recording.from_arrays(t, dict(zip(names, pose, strict=True)),
                                     {key: "m" for key in names[:3]},
