@@ -6,6 +6,7 @@ import json
 import os
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -164,3 +165,26 @@ def test_paper_protocol_on_slosh() -> None:
     assert time.process_time() - begun < 60.0
     assert abs(est.value("l_theta") / 0.045 - 1) < 0.1 and 0.1 < est.value("d_theta") < 0.3
     assert any(w.startswith("The loss is low") for w in est.warnings)
+
+
+@pytest.mark.parametrize(("options", "excess", "seeds", "kept"), [
+    ({}, [3.0], [7], 7),
+    ({}, [400.0, np.inf, 3.0], [7, 8, 9], 9),
+    ({}, [400.0, np.inf, 90.0, 100.0], [7, 8, 9, 10], 9),
+    ({"lam": 1.0}, [400.0], [7], 7),
+    ({"protocol": "paper"}, [400.0], [7], 7)])
+def test_what_a_simulation_contradicts_is_started_anew_where_lambda_climbs(
+        monkeypatch: pytest.MonkeyPatch, options: dict[str, object], excess: list[float],
+        seeds: list[int], kept: int) -> None:
+    asked = []
+
+    def fit_network(problem: object, settings: PINN) -> tuple[SimpleNamespace, None]:
+        asked.append(settings.seed)
+        return SimpleNamespace(excess=excess[len(asked) - 1], settings={"seed": settings.seed},
+                               history=()), None
+
+    monkeypatch.setattr("pikanid.strategies.pinn.fit_network", fit_network)
+    monkeypatch.setattr("pikanid.strategies.pinn.assemble",
+                        lambda name, fit, settings, history, begun, curves: settings)
+    found = PINN(seed=7, **options).fit(decay(), recorded())
+    assert asked == seeds and found["seed"] == kept

@@ -45,8 +45,8 @@ def test_what_counts_as_settled_decides_how_far_a_kan_is_refined() -> None:
 def test_how_far_a_curve_may_mislead() -> None:
     problem = Problem(MODEL, RUN)
     theta = 1.3 * np.array(problem.guess)
-    assert against_simulation(problem, theta, 0.0)
-    assert not against_simulation(problem, theta, 0.0, far=1e6)
+    assert against_simulation(problem, theta, 0.0).notes
+    assert not against_simulation(problem, theta, 0.0, far=1e6).notes
 
 
 def test_as_many_starts_are_added_as_asked_for() -> None:

@@ -4,22 +4,22 @@ The approximator of Table I is a multi-layer perceptron.  Table II's protocol de
 Adam with λ rising, then L-BFGS.  The default gives the network what it lacks (the initial state and
 the kinks at input switches, exactly) and takes damped Gauss-Newton steps, λ climbing as far as the
 network can follow.  Either way the result is held against a simulation, because a low loss says
-little about the parameters.
+little about the parameters; a network that it contradicts is started anew from other weights.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 from pikanid.estimate import Estimate
 from pikanid.model import Model
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
-from pikanid.strategies.pinn_fit import fit_network
-from pikanid.strategies.pinn_settings import PinnSettings, check
+from pikanid.strategies.pinn_fit import PinnFit, fit_network
+from pikanid.strategies.pinn_settings import PinnSettings, check, uses_newton
 from pikanid.strategies.relaxed_estimate import assemble
 from pikanid.strategies.settings import recorded
 
@@ -44,7 +44,8 @@ class PINN(PinnSettings):
         collocation: Number of evenly spaced points for the physics; None: Gauss nodes.
         steps: Of Gauss-Newton in all, or of (Adam, L-BFGS).
         learning_rate: Of Adam.
-        seed: Of the starting weights.
+        seed: Of the starting weights; where λ climbs and a simulation contradicts the network, the
+            next seeds are tried (`settings.starts` in all) and the best of them is kept.
         device: "cpu", or "cuda" where present.
         progress: Called with step, lam, data and physics (the two parts of the loss).
         settings: When λ has climbed far enough, and when the curve misleads.
@@ -75,6 +76,16 @@ class PINN(PinnSettings):
         """
         begun = time.perf_counter()
         check(self)
-        fit, curves = fit_network(Problem(model, recordings), self)
+        fit, curves = self._best(Problem(model, recordings))
         return assemble(self.name, fit, {**recorded(self), **fit.settings}, list(fit.history),
                         begun, curves)
+
+    def _best(self, problem: Problem) -> tuple[PinnFit, Any]:
+        """Of networks from different weights the first that a simulation confirms, or the best."""
+        climbs = uses_newton(self) and self.lam is None
+        tried: list[tuple[PinnFit, Any]] = []
+        for k in range(self.settings.starts if climbs else 1):
+            tried.append(fit_network(problem, replace(self, seed=self.seed + k)))
+            if tried[-1][0].excess <= self.settings.far**2:
+                break
+        return min(tried, key=lambda one: one[0].excess)

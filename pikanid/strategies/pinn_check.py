@@ -6,6 +6,8 @@ Gauss-Newton steps of Eq. (1) from the estimate do: they cost milliseconds.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pikanid import errors
@@ -19,9 +21,24 @@ from pikanid.uncertainty import covariance
 VISIBLE = 1e-3  # numerical: relative: on clean data every difference is many standard errors
 
 
+@dataclass(frozen=True)
+class Verdict:
+    """What a simulation says of a curve's parameters.
+
+    Attributes:
+        excess: By how much refining them lowers the weighted sum of squares of Eq. (1), in units of
+            what is left per degree of freedom, or of the noise where that is more; infinite where
+            the model cannot be simulated at them.
+        notes: A sentence on the parameter that is furthest outside what the data allow, or none.
+    """
+
+    excess: float
+    notes: tuple[str, ...]
+
+
 def against_simulation(problem: Problem, theta: Array, residual: float,
-                       far: float = CLIMB.far) -> list[str]:
-    """A sentence on the parameter that is furthest outside what the data allow, or none.
+                       far: float = CLIMB.far) -> Verdict:
+    """Hold θ against a simulation refined from it.
 
     `residual` is the root mean square distance of the curve from the data, for the sentence; `far`
     is how many standard errors are too many.
@@ -30,22 +47,24 @@ def against_simulation(problem: Problem, theta: Array, residual: float,
     try:
         shooting.choose_steps(theta, "fine")
     except errors.SimulationFailed:
-        return []
+        return Verdict(np.inf, ())
     before = _square(shooting.residual(theta))
     found = minimise(shooting.residual, shooting.jacobian, theta, problem.lower, problem.upper)
     after = _square(shooting.residual(found.theta))
-    scale = 1.0
-    if shooting.adequacy(found.theta).source != "given":
-        scale = after / max(shooting.rows - theta.size, 1)
+    left = after / max(shooting.rows - theta.size, 1)
+    given = shooting.adequacy(found.theta).source == "given"
+    scale = 1.0 if given else left
+    excess = (before - after) / max(left, float(given), 1e-300)
     std = np.sqrt(np.diag(covariance(shooting.jacobian(found.theta),
                                      np.ones(theta.size, bool))) * scale)
     gap = np.abs(theta - found.theta)
     apart = (gap > far * std) & (gap > VISIBLE * np.abs(found.theta)) & np.isfinite(std)
     if not np.any(apart) or not before - after > far**2 * scale or not found.converged:
-        return []
+        return Verdict(excess, ())
     k = int(np.argmax(np.where(apart, gap / np.maximum(std, 1e-300), -1.0)))
     f = problem.free[k]
-    return [errors.curve_misleads(f.label, theta[k], found.theta[k], std[k], residual, f.unit)]
+    return Verdict(excess, (
+        errors.curve_misleads(f.label, theta[k], found.theta[k], std[k], residual, f.unit),))
 
 
 def _square(residual: Array) -> float:

@@ -21,7 +21,7 @@ from pikanid.problem.problem import Problem
 from pikanid.simulation.lowering import lower_model
 from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.pinn_check import against_simulation
-from pikanid.strategies.pinn_settings import PinnSettings
+from pikanid.strategies.pinn_settings import PinnSettings, uses_newton
 from pikanid.strategies.relaxation import start_is_estimated
 
 if TYPE_CHECKING:
@@ -46,7 +46,10 @@ LARGEST_STD = 1e3  # numerical: relative: beyond, a standard error says that the
 
 @dataclass(frozen=True, eq=False)
 class PinnFit:
-    """What a PINN found; the parts of the loss are sums over samples and nodes."""
+    """What a PINN found; the parts of the loss are sums over samples and nodes.
+
+    `excess` is that of `pinn_check.Verdict`.
+    """
 
     problem: Problem
     functional: Functional = field(repr=False)
@@ -57,6 +60,7 @@ class PinnFit:
     warnings: tuple[str, ...]
     history: tuple[dict[str, float], ...] = field(repr=False)
     settings: Mapping[str, Any]
+    excess: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +96,7 @@ def fit_network(problem: Problem, settings: PinnSettings) -> tuple[PinnFit, Any]
     with one_thread():
         loss = TorchFunctional(functional, settings.device)
         start = loss.pack(Point(networks.start(settings.seed), problem.guess))
-        newton = (settings.optimiser or ("gradient" if paper else "gauss_newton")) == "gauss_newton"
-        stop = (_newton if newton else _descend)(loss, start, settings, noise)
+        stop = (_newton if uses_newton(settings) else _descend)(loss, start, settings, noise)
         covariance, more = _uncertainty(loss, stop, noise)
     point = loss.unpack(stop.z)
     notes = [*networks.notes, *stop.notes]
@@ -105,8 +108,9 @@ def fit_network(problem: Problem, settings: PinnSettings) -> tuple[PinnFit, Any]
         (rows.residual / sites.weight).ravel() for r, c in enumerate(point.coefficients)
         for rows, sites in zip(functional.data_rows(r, c, point.theta), functional.parts[r].data,
                                strict=True)])
-    notes += against_simulation(problem, point.theta, float(np.sqrt(np.mean(residual**2))),
-                                settings.settings.far)
+    verdict = against_simulation(problem, point.theta, float(np.sqrt(np.mean(residual**2))),
+                                 settings.settings.far)
+    notes += verdict.notes
     coefficients = tuple(
         tuple(c[table.part] for table in part.physics.tops)
         for part, c in zip(functional.parts, point.coefficients, strict=True))
@@ -115,9 +119,9 @@ def fit_network(problem: Problem, settings: PinnSettings) -> tuple[PinnFit, Any]
             "kinks": [len(own[0].kinks) for own in networks.nets],
             "nodes": [part.physics.t.size for part in functional.parts],
             "physics_scale": [float(s) for s in functional.scale], "lam": float(stop.lam),
-            **stop.settings, **more}
+            "seed": settings.seed, **stop.settings, **more}
     return PinnFit(problem, functional, point.theta, covariance, point.coefficients,
-                   stop.converged, tuple(notes), stop.history, used), curves
+                   stop.converged, tuple(notes), stop.history, used, verdict.excess), curves
 
 
 def _newton(loss: TorchFunctional, start: Array, settings: PinnSettings, noise: float) -> _Stop:

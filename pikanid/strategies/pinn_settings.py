@@ -38,11 +38,16 @@ class PinnSettings:
     settings: ClimbSettings = CLIMB
 
 
+def uses_newton(settings: PinnSettings) -> bool:
+    """Whether Gauss-Newton fits the network, rather than Adam and L-BFGS."""
+    usual = "gradient" if settings.protocol == "paper" else "gauss_newton"
+    return (settings.optimiser or usual) == "gauss_newton"
+
+
 def check(settings: PinnSettings) -> None:
     """Raise `BadSetting` unless the settings can work."""
     of_kind(settings.settings, ClimbSettings)
-    paper = settings.protocol == "paper"
-    newton = settings.optimiser == "gauss_newton" or (settings.optimiser is None and not paper)
+    newton = uses_newton(settings)
     wanted = "a whole number" if newton else "two whole numbers, (Adam, L-BFGS)"
     steps = settings.steps
     if steps is not None and (isinstance(steps, int) is not newton or np.min(steps) < 1):

@@ -43,7 +43,9 @@ class ClimbSettings(Checked):
         share: Of what the noise costs, that the physics may cost.
         overfit: Share of the noise's cost below which the curve follows the noise.
         far: [standard errors] by which a simulation may be fitted elsewhere before the curve is
-            called misleading.
+            called misleading; in units of what is left, the same (squared) is what a network may
+            leave to a simulation before another start is tried.
+        starts: Starting weights tried at most.
     """
 
     settled: Amount = 0.05
@@ -52,6 +54,7 @@ class ClimbSettings(Checked):
     share: Amount = 0.1
     overfit: Share = 0.8
     far: Amount = 5.0
+    starts: Count = 4
 
 
 RELAXATION = RelaxationSettings()
