@@ -1,7 +1,8 @@
 """Diagnoses of real recordings, each with its nominal model alone; rows for a report.
 
     python benchmarks/diagnosis_real.py [single_pendulum free_swing silverbox falling_balls
-                                         slosh_lar]
+                                         slosh_lar tanks linkage building theophylline
+                                         populations]
 
 One function a recording; none is given anything but the nominal model and the data.
 """
@@ -11,10 +12,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from diagnosis_real_systems import SYSTEMS
+from diagnosis_rows import Row, laws, row, table
 
 import pikanid as pk
 from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -68,27 +71,11 @@ MODELS: dict[str, dict[str, Any]] = {
         "outputs": {"h": {"unit": "mm", "expression": "sqrt(q_x**2 + q_y**2 + 0.1**2)"}}}}
 
 
-@dataclass(frozen=True)
-class Row:
-    """One diagnosis: verdict, effects of each hypothesis, held-out RMSE before and after [unit],
-    further figures in words, and wall-clock seconds.
-    """
-
-    recording: str
-    verdict: str
-    hypotheses: tuple[str, ...]
-    before: float
-    after: float
-    unit: str
-    seconds: float
-    remark: str = ""
-
-
 def single_pendulum() -> list[Row]:
     """The large free swing: fitted to 36.7 s, held out to 55 s."""
     train, other = (_joined(part) for part in ("train", "held_out"))
     dx, seconds = _diagnosed("pendulum", train, other)
-    return [_row("single pendulum", dx, seconds, _run_on())]
+    return [row("single pendulum", dx, seconds, _run_on())]
 
 
 # Laws beside the viscous one, none of which may put energy in.
@@ -104,10 +91,10 @@ def _run_on() -> str:
     whole = datasets.single_pendulum_excerpt("all")
     nominal = pk.NLS(starts=1).fit(pendulum.guess(swing.train), swing.train).fitted_model
     told = []
-    for name, laws in (("nominal", ()), ("Coulomb + quadratic drag", (DRY, DRAG)),
-                       ("Coulomb + amplitude damping", (DRY, AMPLITUDE))):
-        new = [pk.Parameter(law[1], 0.001, "", (0.0, np.inf)) for law in laws]
-        model = nominal.with_term("theta_dot", " ".join(laws), new) if laws else nominal
+    for name, terms in (("nominal", ()), ("Coulomb + quadratic drag", (DRY, DRAG)),
+                        ("Coulomb + amplitude damping", (DRY, AMPLITUDE))):
+        new = [pk.Parameter(law[1], 0.001, "", (0.0, np.inf)) for law in terms]
+        model = nominal.with_term("theta_dot", " ".join(terms), new) if terms else nominal
         left = [pendulum.rms(pendulum.run_on(pk.NLS(starts=1).fit(model, seen).fitted_model, swing)
                              - swing.held_out["theta"].values) for seen in (swing.train, whole)]
         told.append(f"{name} {left[0]:.4f}, {left[1]:.4f}")
@@ -123,7 +110,7 @@ def free_swing() -> list[Row]:
                                       {"theta": "rad"}, name=name)
              for k, name in ((slice(0, cut), "first 4 s"), (slice(cut, None), "the rest"))]
     dx, seconds = _diagnosed("pendulum", *parts)
-    return [_row("free swing", dx, seconds)]
+    return [row("free swing", dx, seconds)]
 
 
 def silverbox(samples: int = 24000) -> list[Row]:
@@ -138,7 +125,7 @@ def silverbox(samples: int = 24000) -> list[Row]:
         test = _range(every, start, stop)
         gap = pk.simulate(begun, test)["y"].values - test["y"].values
         found.append(f"{name} {1e3 * np.sqrt(np.mean(gap[50:] ** 2)):.2f} mV")
-    return [_row("silverbox", dx, seconds, ", ".join(found))]
+    return [row("silverbox", dx, seconds, ", ".join(found))]
 
 
 def falling_balls(balls: Sequence[str] = datasets.BALLS) -> list[Row]:
@@ -152,7 +139,7 @@ def falling_balls(balls: Sequence[str] = datasets.BALLS) -> list[Row]:
                 recording["h"].time, {"h": recording["h"].values}, {"h": "m"},
                 name=recording.name))
         dx, seconds = _diagnosed("fall", *drops)
-        rows.append(_row(ball, dx, seconds))
+        rows.append(row(ball, dx, seconds))
     return rows
 
 
@@ -169,42 +156,14 @@ def slosh_lar(motions: Sequence[str] = datasets.SLOSH_MOTIONS) -> list[Row]:
     for runs in kinds.values():
         for train, other in zip(runs, [*runs[1:], runs[0]], strict=True):
             dx, seconds = _diagnosed("slosh", *map(datasets.slosh_lar_forced, (train, other)))
-            rows.append(_row(f"{train}, held out {other}", dx, seconds, _laws(dx)))
+            rows.append(row(f"{train}, held out {other}", dx, seconds, laws(dx)))
     return rows
-
-
-def table(rows: Sequence[Row]) -> str:
-    """Rows as a Markdown table."""
-    lines = ["| recording | verdict | hypotheses | held-out RMSE | seconds | |",
-             "| --- | --- | --- | --- | --- | --- |"]
-    lines += [f"| {r.recording} | {r.verdict} | {'; '.join(r.hypotheses) or '-'} | "
-              f"{r.before:.3g} → {r.after:.3g} {r.unit} | {r.seconds:.0f} | {r.remark} |"
-              for r in rows]
-    return "\n".join(lines)
 
 
 def _diagnosed(model: str, train: pk.Recording, other: pk.Recording) -> tuple[Diagnosis, float]:
     begun = time.perf_counter()
     dx = pk.diagnose(pk.Model.from_dict(MODELS[model]), train, other, workers=1)
     return dx, time.perf_counter() - begun
-
-
-def _row(recording: str, dx: Diagnosis, seconds: float, remark: str = "") -> Row:
-    names = tuple(" + ".join("/".join(e.ids) for e in h.effects) for h in dx.hypotheses)
-    if dx.present:
-        names = ("surely " + " and ".join("/".join(p.ids) or p.family for p in dx.present),)
-    proof = dx.held_out
-    before, after = (np.nan, np.nan) if proof is None else (proof.rmse_before, proof.rmse_after)
-    return Row(recording, dx.verdict, names, before, after, "" if proof is None else proof.unit,
-               seconds, remark)
-
-
-def _laws(dx: Diagnosis) -> str:
-    """What the first hypothesis adds, with its constants."""
-    effects = dx.hypotheses[0].effects if dx.hypotheses else ()
-    return ", ".join(" ".join([e.expression, *(f"({n} = {v.value:.3g} ± {v.std:.2g} {v.unit})"
-                                               for n, v in e.parameters.items())])
-                     for e in effects)
 
 
 def _joined(part: str) -> pk.Recording:
@@ -222,7 +181,7 @@ def _range(recording: pk.Recording, start: int, stop: int) -> pk.Recording:
 
 RECORDINGS: dict[str, Callable[[], list[Row]]] = {
     "single_pendulum": single_pendulum, "free_swing": free_swing, "silverbox": silverbox,
-    "falling_balls": falling_balls, "slosh_lar": slosh_lar}
+    "falling_balls": falling_balls, "slosh_lar": slosh_lar, **SYSTEMS}
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or RECORDINGS:

@@ -11,7 +11,6 @@ import pytest
 
 import pikanid as pk
 from pikanid.model import Model
-from pikanid.model.effects_file import read_effects
 
 pytestmark = pytest.mark.slow
 
@@ -65,8 +64,7 @@ def test_what_twelve_subjects_swallow_is_absorbed_from_a_store(recordings_folder
         "parameters": {"k": {"unit": "1/h", "guess": 0.08, "bounds": [1e-5, 100.0], **own},
                        "V": {"unit": "l/kg", "guess": 0.5, "bounds": [1e-3, 1e4], **own}},
         "equations": {"c": "-k*c"}, "outputs": {"c": {"unit": "mg/l", "expression": "c"}}})
-    dx = pk.diagnose(model.with_candidates(*read_effects("kinetics")), subjects[:8], subjects[8:],
-                     workers=1)
+    dx = pk.diagnose(model, subjects[:8], subjects[8:], workers=1)
     assert dx.verdict == "partial" and [p.family for p in dx.present] == ["storage"]
     assert dx.hypotheses[0].effects[0].ids == ("absorption",)
     each = dx.model.replace(parameters=tuple(

@@ -128,7 +128,9 @@ def test_a_model_keeps_forms(tanks: pk.Model, tmp_path: Path) -> None:
 
 
 SUITABLE = {"hydraulics": ["cascaded_tanks"], "thermal": ["thermal_rc"], "electrical": ["dc_motor"],
-            "kinetics": ["batch_reactor", "lotka_volterra", "one_compartment", "sir"]}
+            "kinetics": ["batch_reactor", "one_compartment", "sir"],
+            "populations": ["lotka_volterra", "sir"],
+            "mechanics": ["pendulum", "sloshing", "two_mass_drive", "double_pendulum"]}
 
 
 @pytest.mark.parametrize("name", catalogues())

@@ -51,11 +51,12 @@ def effects(
                   [*every_source(excitation), model, *catalogue])
     from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown
     from pikanid.model import systems
+    from pikanid.model.domains import candidates_of
     from pikanid.reporting.console import console
     from pikanid.reporting.tables import row, table
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
-    if not chosen.effects:
+    if not candidates_of(chosen):
         raise errors.BadModel(errors.no_effects(chosen.name))
     shown = effects_shown(chosen, excited(chosen, excitation, duration, files))
     if plot is not None and not all(one.failure for one in shown):

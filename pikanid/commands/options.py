@@ -26,8 +26,8 @@ Values = Annotated[list[str], typer.Option(
     help="guess of a free parameter, or value of a fixed one")]
 Catalogues = Annotated[list[str], typer.Option(
     "--catalogue", metavar="NAME|FILE.toml", show_default=False,
-    help="effects that the model may lack besides: hydraulics, thermal, kinetics, electrical, or a "
-    "file of your own")]
+    help="effects that the model may lack besides: hydraulics, thermal, kinetics, electrical, "
+    "mechanics, populations, or a file of your own")]
 Columns = Annotated[list[str], typer.Option(
     "--column", metavar="NAME=COLUMN", show_default=False,
     help="column, channel or topic of the file that holds a signal, by name, path or a pattern "

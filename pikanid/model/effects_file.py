@@ -32,7 +32,7 @@ def catalogues() -> tuple[str, ...]:
     """Names of the catalogues that come with the package.
 
     >>> catalogues()
-    ('electrical', 'hydraulics', 'kinetics', 'thermal')
+    ('electrical', 'hydraulics', 'kinetics', 'mechanics', 'populations', 'thermal')
     """
     return tuple(sorted(p.stem for p in FOLDER.glob("*.toml")))
 

@@ -1,7 +1,8 @@
 """The model file: TOML in, `Model` out, and back without loss.
 
-Sections: ``name``, ``[states]``, ``[inputs]``, ``[parameters]``, ``[equations]``, ``[outputs]``,
-for models with spline edges ``[splines]``, and ``[effects]`` (`pikanid.model.effects_file`).
+Sections: ``name``, ``domain`` (`pikanid.model.domains`), ``[states]``, ``[inputs]``,
+``[parameters]``, ``[equations]``, ``[outputs]``, for models with spline edges ``[splines]``, and
+``[effects]`` (`pikanid.model.effects_file`).
 Inputs and outputs also take the keys of `pikanid.model.channel_maps` (``delay``, ``gain``, ``lag``,
 ...), each a formula of parameters.
 """
@@ -18,11 +19,12 @@ from typing import Any, TypeVar
 import sympy as sp
 
 from pikanid import errors
+from pikanid.errors.wording import listed
 from pikanid.formula.expressions import check_name, parse, symbol, to_text
 from pikanid.formula.limits import Work
 from pikanid.model.channel_maps import INPUT_MAPS, OUTPUT_MAPS, map_input, map_output
 from pikanid.model.checks import MOST
-from pikanid.model.effects_file import from_table, to_table
+from pikanid.model.effects_file import catalogues, from_table, to_table
 from pikanid.model.lookup import Lookup
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
@@ -32,7 +34,7 @@ from pikanid.storage.limits import toml_content
 from pikanid.storage.outputs import atomically
 
 M = TypeVar("M", bound=Operations)
-SECTIONS = ("name", "states", "inputs", "parameters", "equations", "outputs", "splines",
+SECTIONS = ("name", "domain", "states", "inputs", "parameters", "equations", "outputs", "splines",
             "effects")
 KEYS = {
     "states": ("unit", "initial", "guess", "bounds", "scope", "description"),
@@ -107,7 +109,7 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
         parameters=tuple(parameters.values()),
         equations={n: formula(e, f"equation '{n}'") for n, e in equations.items()},
         outputs=tuple(_output(n, e, formula, source) for n, e in tables["outputs"].items()),
-        splines=splines)
+        splines=splines, domain=_domain(content.get("domain", []), source))
     for name, entry in tables["inputs"].items():
         if maps := _maps(entry, INPUT_MAPS, f"of input '{name}'", formula, ()):
             model = map_input(model, name, **maps)
@@ -120,6 +122,8 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
 def to_dict(model: Lookup) -> dict[str, Any]:
     """The content of the model file.  Maps of channels stand in the equations that they became."""
     content: dict[str, Any] = {"name": model.name}
+    if model.domain:
+        content["domain"] = [*model.domain]
     content["states"] = {s.name: _drop({"unit": s.unit, "initial": _plain(s.initial)})
                          for s in model.states}
     if model.inputs:
@@ -205,6 +209,14 @@ def _maps(entry: Mapping[str, Any], known: Sequence[str], where: str, formula: A
         else:
             maps[key] = read(entry[key], what)
     return maps
+
+
+def _domain(value: Any, source: str) -> tuple[str, ...]:
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, list | tuple) or len(names) > len(catalogues()) or any(
+            name not in catalogues() for name in names):
+        raise errors.BadModel(errors.bad_value(f"'{source}': domain", value, listed(catalogues())))
+    return tuple(names)
 
 
 def _bounds(entry: Mapping[str, Any]) -> Any:

@@ -39,6 +39,7 @@ class Lookup:
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...]
     effects: tuple[Effect | EffectForm, ...]
+    domain: tuple[str, ...]
 
     @property
     def symbols(self) -> frozenset[str]:

@@ -49,7 +49,8 @@ class Model(Operations):
     >>> model.with_term("x", "-q*x**2", [Parameter("q", 0.1)]).equations["x"]
     -k*x - q*x**2
 
-    `effects` are kinds of physics that it may lack, for `pikanid.diagnose` to look for.
+    `effects` are kinds of physics that it may lack, for `pikanid.diagnose` to look for, and
+    `domain` names catalogues of them: `pikanid.model.domains`.
 
     Raises:
         BadModel: Names used twice, unknown symbols, guesses outside their bounds.
@@ -63,6 +64,7 @@ class Model(Operations):
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...] = ()
     effects: tuple[Effect | EffectForm, ...] = ()
+    domain: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self.settle(Checked())
@@ -87,6 +89,7 @@ class Model(Operations):
             for o in self.outputs))
         put(self, "splines", tuple(self.splines))
         put(self, "effects", tuple(self.effects))
+        put(self, "domain", tuple(self.domain))
         order = [s.name for s in self.states]
         for name in self.equations:
             if name not in order:

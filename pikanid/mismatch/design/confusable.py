@@ -25,6 +25,7 @@ from pikanid.mismatch.fitting.hypothesis import fitted
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Model
+from pikanid.model.domains import candidates_of
 from pikanid.problem.arguments import a_model, one_recording
 from pikanid.recording import Recording
 
@@ -155,7 +156,7 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
     separated = settings.separated
     if not separated < strength < inf:
         raise errors.BadSetting(errors.bad_value("strength", strength, f"above {separated:g}"))
-    effects, model = a_model(model).effects, model.replace(effects=())
+    effects, model = candidates_of(a_model(model)), model.replace(effects=())
     nothing = recorded(model, one_recording(excitation), sigma, settings)
     found = sites(model, nothing.recordings)
     given = bound_to(effects, found, nothing.recordings, lambda: ranges_along(model, nothing))

@@ -14,6 +14,7 @@ from pikanid.mismatch.catalogue.bound_effects import Ranges, bound_to
 from pikanid.mismatch.catalogue.candidate import Array
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Effect, Model
+from pikanid.model.domains import candidates_of
 from pikanid.problem.arguments import a_model, one_recording
 from pikanid.problem.problem import bind
 from pikanid.recording import Recording
@@ -77,7 +78,7 @@ def effects_shown(model: Model, excitation: Recording) -> tuple[ShownEffect, ...
     >>> shown.derivative < 0.01
     True
     """
-    effects, model = a_model(model).effects, model.replace(effects=())
+    effects, model = candidates_of(a_model(model)), model.replace(effects=())
     drive = one_recording(excitation)
     nominal = simulate(model, drive)
     own = bound_to(effects, sites(model, (nominal,)), [nominal], lambda: _ranges(model, nominal))

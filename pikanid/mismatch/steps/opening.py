@@ -25,6 +25,7 @@ from pikanid.mismatch.fitting.repeats import repeats
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Effect, Model
+from pikanid.model.domains import candidates_of, taken
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
@@ -58,7 +59,9 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     train = beginnings(model, train, "the recording", notes, settings.budget)
     if later is None:
         train, later = set_aside(train, model, notes, settings.noise)
-    effects, model = model.effects, held_as_recorded(model.replace(effects=()), train)
+    effects, said = candidates_of(model), taken(model)
+    notes += [said] if said else []
+    model = held_as_recorded(model.replace(effects=()), train)
     # a model in which nothing can be looked for is refused before any fit, as a wrong effect is
     catalogue_of(sites(model, train), [e for e in effects if isinstance(e, Effect)])
     tell("nominal fit")

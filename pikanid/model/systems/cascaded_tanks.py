@@ -21,6 +21,7 @@ def cascaded_tanks() -> Model:
     """
     return Model.from_dict({
         "name": "cascaded_tanks",
+        "domain": "hydraulics",
         "states": {"x1": {"unit": "V", "initial": "free", "guess": 5.0, "bounds": [0.01, 80.0]},
                    "x2": {"unit": "V", "initial": "free", "guess": 5.2, "bounds": [0.01, 12.0]}},
         "inputs": {"u": {"unit": "V"}},

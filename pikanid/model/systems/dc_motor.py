@@ -18,6 +18,7 @@ def dc_motor() -> Model:
     """
     return Model.from_dict({
         "name": "dc_motor",
+        "domain": "electrical",
         "states": {"i": {"unit": "A"}, "omega": {"unit": "rad/s"}},
         "inputs": {"u": {"unit": "V"}, "tau": {"unit": "N*m", "default": 0.0}},
         "parameters": {

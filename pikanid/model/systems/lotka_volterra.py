@@ -18,6 +18,7 @@ def lotka_volterra() -> Model:
     """
     return Model.from_dict({
         "name": "lotka_volterra",
+        "domain": "populations",
         "states": {"prey": {"initial": "free", "guess": 30.0, "bounds": [1e-6, 1e12]},
                    "predators": {"initial": "free", "guess": 5.0, "bounds": [1e-6, 1e12]}},
         "parameters": {

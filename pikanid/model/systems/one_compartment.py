@@ -22,6 +22,7 @@ def one_compartment() -> Model:
     """
     return Model.from_dict({
         "name": "one_compartment",
+        "domain": "kinetics",
         "states": {"m": {"unit": "mg/kg", "initial": "dose"}, "c": {"unit": "mg/l"}},
         "inputs": {"dose": {"unit": "mg/kg"}},
         "parameters": {

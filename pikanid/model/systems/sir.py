@@ -18,6 +18,7 @@ def sir() -> Model:
     """
     return Model.from_dict({
         "name": "sir",
+        "domain": "populations",
         "states": {"S": {"initial": "N - I0"}, "I": {"initial": "I0"}, "R": {}},
         "parameters": {
             "beta": {"unit": "1/d", "guess": 1.7, "bounds": [1e-3, 1e3],

@@ -10,6 +10,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.model import Effect, EffectForm, Model
 from pikanid.model.binding import Surroundings
+from pikanid.model.domains import candidates_of
 from pikanid.recording import Recording
 from pikanid.validation.own_model.distance import Scene
 from pikanid.validation.own_model.law import Law, laws
@@ -95,7 +96,8 @@ class Rig:
              if np.ptp(self.train[n].values) > 0},
             {n: self.train[n].unit for n in extra}, self.train.stop - self.train.start,
             self.train[self.train.names[0]].interval)
-        return laws(nominal, around, (*self.model.effects, *self.own))
+        known = {e.key: e for e in (*candidates_of(self.model), *self.own)}
+        return laws(nominal, around, tuple(known.values()))
 
 
 def _equations(model: Model) -> tuple[str, ...]:
