@@ -123,7 +123,7 @@ def to_dict(model: Lookup) -> dict[str, Any]:
     """The content of the model file.  Maps of channels stand in the equations that they became."""
     content: dict[str, Any] = {"name": model.name}
     if model.domain:
-        content["domain"] = [*model.domain]
+        content["domain"] = [*model.domain] if len(model.domain) > 1 else model.domain[0]
     content["states"] = {s.name: _drop({"unit": s.unit, "initial": _plain(s.initial)})
                          for s in model.states}
     if model.inputs:

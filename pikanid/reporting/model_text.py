@@ -19,8 +19,9 @@ def toml(model: Model) -> str:
     True
     """
     content = model.to_dict()
-    lines = [f"name = {_value(content.pop('name'))}"]
-    for section, entries in content.items():
+    tables = {key: entry for key, entry in content.items() if isinstance(entry, Mapping)}
+    lines = [f"{key} = {_value(entry)}" for key, entry in content.items() if key not in tables]
+    for section, entries in tables.items():
         lines += ["", f"[{section}]"]
         width = max((len(key) for key in entries), default=0)
         lines += [f"{key:<{width}} = {_value(entry)}" for key, entry in entries.items()]
