@@ -82,7 +82,8 @@ def _set(name: str, noise: float) -> dict[str, Any]:
 def _code(*rooms: str) -> str:
     """Changes when the code in these rooms of the package does."""
     known, package = hashlib.sha256(), Path(pikanid.__file__).parent
-    for path in sorted(p for room in rooms for p in (package / room).rglob("*.py")):
+    for path in sorted(p for room in rooms for kind in ("*.py", "*.toml")
+                       for p in (package / room).rglob(kind)):
         known.update(path.read_bytes())
     return known.hexdigest()[:12]
 

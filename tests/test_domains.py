@@ -10,6 +10,8 @@ import pytest
 
 import pikanid as pk
 from pikanid import errors
+from pikanid.mismatch.catalogue.bound_effects import bound_to
+from pikanid.mismatch.catalogue.site import sites
 from pikanid.model.domains import candidates_of, catalogues_of, taken
 from pikanid.model.effects_file import read_effects
 
@@ -56,10 +58,74 @@ def test_a_domain_comes_before_units_and_stays_in_the_file(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("domain", [
-    "plumbing", ["thermal", 3], 3, {"thermal": 1}, ["thermal"] * 99])
+    "plumbing", ["thermal", 3], 3, {"thermal": 1}, ["thermal"] * 999, [["thermal"]]])
 def test_an_unknown_domain_is_refused(domain: object) -> None:
     with pytest.raises(errors.BadModel, match=r"domain.*thermal"):
         decay("K", domain=domain)
+    with pytest.raises(errors.BadModel, match=r"domain.*thermal"):
+        decay("K").replace(domain=domain)
+
+
+def test_an_empty_domain_takes_none(tmp_path: Path) -> None:
+    model = decay("degC", domain=[])
+    assert not catalogues_of(model) and not taken(model)
+    model.save(tmp_path / "model.toml")
+    assert pk.Model.load(tmp_path / "model.toml").domain == ()
+
+
+def test_states_of_several_kinds_tell_nothing() -> None:
+    one = decay("degC")
+    assert not catalogues_of(one.with_state(pk.State("v", "m/s", 0), "-v"))
+    assert catalogues_of(one.with_state(pk.State("wall", "K", 0), "-wall")) == ("thermal",)
+
+
+def test_catalogues_that_share_a_key_can_both_be_taken() -> None:
+    both = decay("", domain=["kinetics", "populations", "kinetics"])
+    assert both.domain == ("kinetics", "populations")
+    keys = [e.key for e in candidates_of(both)]
+    assert len(keys) == len({*keys}) and {"removal", "depot", "crowding"} <= {*keys}
+
+
+def effects_of(model: pk.Model, *names: str, **channels: tuple[str, float]) -> list[str]:
+    """Key and variant of what is bound to a model, with further columns recorded."""
+    t = np.linspace(0.0, 4.0, 50)
+    drive = pk.Recording.from_arrays(
+        t, {n: size * np.sin(t) for n, (_, size) in channels.items()} or {"u": 0 * t},
+        {n: unit for n, (unit, _) in channels.items()})
+    run = pk.simulate(model, drive, seed=0).with_channels(*(drive[n] for n in channels))
+    found = bound_to([e for n in names for e in read_effects(n)], sites(model, (run,)), [run],
+                     lambda: dict.fromkeys(model.state_names, (0.0, 2.0)))
+    return [f"{e.key}[{e.variant}]" for e in found]
+
+
+def test_heat_is_lost_to_temperatures_and_only_angles_hang() -> None:
+    room = decay("degC").with_values(k=0.5)
+    lost = [e for e in effects_of(room, "thermal", outside=("degC", 8.0), sun=("W/m^2", 500.0))
+            if e.startswith("loss_to")]
+    assert lost == ["loss_to[x,outside]"]
+    assert not any("gravity" in e for e in effects_of(pk.systems.linear_oscillator(), "mechanics"))
+    assert any("gravity" in e for e in effects_of(pk.systems.pendulum(), "mechanics"))
+
+
+def test_a_parameter_of_two_equations_is_changed_once() -> None:
+    """β of an epidemic stands in those of S and of I."""
+    found = effects_of(pk.systems.sir(), "populations")
+    assert "satiation[S,beta]" in found and "interference[I,beta,S]" not in found
+    assert len(found) == len({*found})
+
+
+def test_a_state_that_stays_at_zero_has_no_guesses() -> None:
+    model = pk.Model.from_dict({
+        "name": "two substances", "domain": "kinetics",
+        "states": {"a": {"unit": "mol/l", "initial": 1.0}, "b": {"unit": "mol/l", "initial": 0.0}},
+        "parameters": {"k": {"unit": "1/s", "guess": 0.5, "bounds": [0.0, 10.0]},
+                       "j": {"unit": "1/s", "value": 1.0}},
+        "equations": {"a": "-k*a", "b": "-j*b"},
+        "outputs": {"a": {"unit": "mol/l", "expression": "a"}}})
+    t = np.linspace(0.0, 4.0, 80)
+    run, other = (pk.simulate(model, pk.Recording.from_arrays(t, {"u": 0 * t}), seed=s,
+                              sigma={"a": 0.01}) for s in (1, 2))
+    assert pk.diagnose(model, run, other, workers=1).verdict == "none"
 
 
 def test_what_is_listed_already_is_not_listed_twice() -> None:

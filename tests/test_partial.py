@@ -13,8 +13,9 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.as_estimate import widened
+from pikanid.mismatch.judge.explanations import Weighed
 from pikanid.mismatch.judge.kinds import Kind, kinds_of
-from pikanid.mismatch.judge.partial import Doubtful, Part, Present, Weighed, _examined
+from pikanid.mismatch.judge.partial import Doubtful, Part, Present, _examined
 from pikanid.mismatch.report import part as reported_as
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.findings import Where, values_of
@@ -71,6 +72,26 @@ def test_what_is_missing_to_a_family_is_said(rivals: list[Any], why: str) -> Non
     found = examined(weighed((COULOMB,), 1.0, 1 - rivals[0][2]),
                      *(weighed(*rival) for rival in rivals))
     assert isinstance(found, Doubtful) and why in found.why
+
+
+@pytest.mark.parametrize("left, sure", [(12.0, False), (20.0, True)])
+def test_a_scale_error_has_to_dominate_far_more(left: float, sure: bool) -> None:
+    """Free stiffness and damping take up their share of what is missing, and nothing its gain."""
+    gain = effect("sensor_gain", "gain")
+    found = _examined(Kind("gain", ""), lead := weighed((gain,), 1.0, 0.999),
+                      [lead, weighed((DRAG,), left, 0.001)], RULE, DEFAULTS.least_proof)
+    assert isinstance(found, Present) is sure
+    other = examined(weighed((COULOMB,), 1.0, 0.999), weighed((DRAG,), left, 0.001))
+    assert isinstance(other, Present)
+
+
+@pytest.mark.parametrize("left, names", [(0.6, ("coulomb_friction",)), (0.4, ())])
+def test_a_law_that_contains_the_named_one_and_leaves_far_less_is_its_form(
+        left: float, names: tuple[str, ...]) -> None:
+    wider = effect("stribeck_friction", "dry friction", covers=("coulomb_friction",))
+    found = examined(weighed((COULOMB,), 1.0, 0.995), weighed((wider,), left, 0.003),
+                     weighed((DRAG,), 9.0, 0.002))
+    assert isinstance(found, Present) and found.names == names
 
 
 @pytest.mark.parametrize("left, sure", [(1.3, True), (3.0, False)])

@@ -167,6 +167,12 @@ def test_paper_protocol_on_slosh() -> None:
     assert any(w.startswith("The loss is low") for w in est.warnings)
 
 
+def test_clean_data_need_one_start() -> None:
+    """Whatever is left there is many standard errors of no noise."""
+    found = PINN(**SMALL).fit(decay(), recorded(sigma=None))
+    assert found.settings["starts"] == 1 and found.value("k") == pytest.approx(1.0, rel=1e-3)
+
+
 @pytest.mark.parametrize(("options", "excess", "seeds", "kept"), [
     ({}, [3.0], [7], 7),
     ({}, [400.0, np.inf, 3.0], [7, 8, 9], 9),
@@ -187,4 +193,4 @@ def test_what_a_simulation_contradicts_is_started_anew_where_lambda_climbs(
     monkeypatch.setattr("pikanid.strategies.pinn.assemble",
                         lambda name, fit, settings, history, begun, curves: settings)
     found = PINN(seed=7, **options).fit(decay(), recorded())
-    assert asked == seeds and found["seed"] == kept
+    assert asked == seeds and found["seed"] == kept and found["starts"] == len(seeds)

@@ -46,7 +46,7 @@ def effects(
         help="draw what each effect does at its guess (.png, .svg, .pdf)")] = None,
     quiet: Quiet = False,
 ) -> int:
-    """Check the effects that a model file lists: symbols, units, derivatives; show what they do."""
+    """Check the effects that a model may lack: symbols, units, derivatives; show what they do."""
     check_outputs({"--plot": (plot, ENDINGS)},
                   [*every_source(excitation), model, *catalogue])
     from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown

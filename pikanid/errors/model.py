@@ -73,8 +73,8 @@ def unknown_catalogue(name: str, known: Sequence[str]) -> str:
 
 
 def no_effects(model: str) -> str:
-    return (f"'{model}' lists no effects: write them under [effects] in its file, or name a file "
-            "of effects with --catalogue.")
+    return (f"'{model}' lists no effects: write them under [effects] in its file, give it a "
+            "domain, or name a catalogue with --catalogue.")
 
 
 def effect_name_taken(key: str, name: str, by: str) -> str:

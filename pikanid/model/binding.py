@@ -53,10 +53,14 @@ class Surroundings:
             "state": [*self.states],
             "other state": [n for n in self.model.state_names if n not in bound.values()],
             "coordinate": [q for q, v in rates.items() if v in self.states],
+            "angle": [q for q, v in rates.items() if v in self.states
+                      and self.unit(q) and units.convertible(self.unit(q), "rad")],
             "its rate": [rates[first]] if first in rates else [],
             "output": [n for n in self.model.output_names if n in self.seen],
             "input": [n for n in self.model.input_names if n in self.sizes],
             "channel": [*self.channels],
+            "channel like it": [n for n, unit in self.channels.items()
+                                if units.convertible(unit, self.unit(first))],
             "parameter": [p for p in self.model.free_names if first in self.model.equations
                           and symbol(p) in self.model.equations[first].free_symbols]}[kind]
 
@@ -90,7 +94,15 @@ def bound(form: EffectForm, around: Surroundings) -> Iterator[Effect]:
     for name, kind in form.places.items():
         bindings = [{**b, name: n} for b in bindings for n in around.choices(kind, b)]
     for binding in bindings:
-        yield _with(form, binding, around, alone=len(bindings) == 1)
+        try:
+            made = _with(form, binding, around, alone=len(bindings) == 1)
+        except errors.BadModel:
+            # a state that stays at zero has no size that a guess could follow from
+            if any(around.range_of(n, kind) == (0.0, 0.0) for n, kind in zip(
+                    binding.values(), form.places.values(), strict=True)):
+                continue
+            raise
+        yield made
 
 
 def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,

@@ -20,17 +20,18 @@ def catalogues_of(model: Lookup) -> tuple[str, ...]:
     >>> catalogues_of(pk.systems.thermal_rc()), catalogues_of(pk.systems.cascaded_tanks())
     (('thermal',), ('hydraulics',))
     """
-    if model.domain:
+    if model.domain is not None:
         return model.domain
     return tuple(name for name in catalogues() if name in STATES and all(
         any(units.convertible(s.unit, unit) for unit in STATES[name]) for s in model.states))
 
 
 def candidates_of(model: Lookup) -> tuple[Effect | EffectForm, ...]:
-    """The effects that a model lists, and those of the catalogues that it takes."""
-    own = {e.key for e in model.effects}
-    return (*model.effects, *(e for name in catalogues_of(model) for e in read_effects(name)
-                              if e.key not in own))
+    """The effects of the catalogues that a model takes, and those that it lists: of two with one
+    key the latter.
+    """
+    listed = (e for name in catalogues_of(model) for e in read_effects(name))
+    return tuple({e.key: e for e in (*listed, *model.effects)}.values())
 
 
 def taken(model: Lookup) -> str:
@@ -43,6 +44,6 @@ def taken(model: Lookup) -> str:
     names = catalogues_of(model)
     if not names:
         return ""
-    why = "the model's domain" if model.domain else "the units of the model's states"
+    why = "the model's domain" if model.domain is not None else "the units of the model's states"
     return (f"Effects of the catalogue{'s' * (len(names) > 1)} {' and '.join(names)} are looked "
             f"for as well, by {why}.")

@@ -13,7 +13,8 @@ bounds may be formulas of the range that a state or an output covers (``x_low``,
 largest size of an input or a channel (``u_size``), of a parameter's value (``p_value``), of the
 recordings' duration [s] and of the usual interval between samples [s]: what is gone within one is
 as good as gone at once.  A coordinate is a state whose rate is another state: ``"its rate"``, the
-place after it, is that one.  A parameter is one of the equation of the first place.
+place after it, is that one; an angle is a coordinate with a unit of angles.  A parameter is one of
+the equation of the first place, and a channel like it has a unit that converts to its own.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from pikanid.formula.expressions import check_name
 from pikanid.storage.entries import Entry
 
 MOST_PLACES = 4  # limit: of placeholders in one form
-FIRST = ("state", "coordinate", "input", "output")
-KINDS = ("state", "other state", "coordinate", "its rate", "input", "output", "channel",
-         "parameter")
+FIRST = ("state", "coordinate", "angle", "input", "output")
+KINDS = ("state", "other state", "coordinate", "angle", "its rate", "input", "output", "channel",
+         "channel like it", "parameter")
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from pikanid import errors
+from pikanid.errors.wording import listed
 from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm, form_of
 from pikanid.model.effect_table import content_of, effect_of
@@ -35,6 +36,21 @@ def catalogues() -> tuple[str, ...]:
     ('electrical', 'hydraulics', 'kinetics', 'mechanics', 'populations', 'thermal')
     """
     return tuple(sorted(p.stem for p in FOLDER.glob("*.toml")))
+
+
+def domain_of(value: Any) -> tuple[str, ...] | None:
+    """Names of catalogues, from one name or several; None is none given.
+
+    Raises:
+        BadModel: They are not.
+    """
+    names = [value] if isinstance(value, str) else value
+    if names is None:
+        return None
+    if not isinstance(names, list | tuple) or not all(
+            isinstance(n, str) and n in catalogues() for n in names[:MOST]) or len(names) > MOST:
+        raise errors.BadModel(errors.bad_value("The model's domain", value, listed(catalogues())))
+    return tuple(dict.fromkeys(names))
 
 
 def read_effects(path: str | os.PathLike[str]) -> tuple[Effect | EffectForm, ...]:

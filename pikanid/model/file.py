@@ -19,12 +19,11 @@ from typing import Any, TypeVar
 import sympy as sp
 
 from pikanid import errors
-from pikanid.errors.wording import listed
 from pikanid.formula.expressions import check_name, parse, symbol, to_text
 from pikanid.formula.limits import Work
 from pikanid.model.channel_maps import INPUT_MAPS, OUTPUT_MAPS, map_input, map_output
 from pikanid.model.checks import MOST
-from pikanid.model.effects_file import catalogues, from_table, to_table
+from pikanid.model.effects_file import from_table, to_table
 from pikanid.model.lookup import Lookup
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
@@ -109,7 +108,7 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
         parameters=tuple(parameters.values()),
         equations={n: formula(e, f"equation '{n}'") for n, e in equations.items()},
         outputs=tuple(_output(n, e, formula, source) for n, e in tables["outputs"].items()),
-        splines=splines, domain=_domain(content.get("domain", []), source))
+        splines=splines, domain=content.get("domain"))
     for name, entry in tables["inputs"].items():
         if maps := _maps(entry, INPUT_MAPS, f"of input '{name}'", formula, ()):
             model = map_input(model, name, **maps)
@@ -122,8 +121,8 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
 def to_dict(model: Lookup) -> dict[str, Any]:
     """The content of the model file.  Maps of channels stand in the equations that they became."""
     content: dict[str, Any] = {"name": model.name}
-    if model.domain:
-        content["domain"] = [*model.domain] if len(model.domain) > 1 else model.domain[0]
+    if model.domain is not None:
+        content["domain"] = model.domain[0] if len(model.domain) == 1 else [*model.domain]
     content["states"] = {s.name: _drop({"unit": s.unit, "initial": _plain(s.initial)})
                          for s in model.states}
     if model.inputs:
@@ -209,14 +208,6 @@ def _maps(entry: Mapping[str, Any], known: Sequence[str], where: str, formula: A
         else:
             maps[key] = read(entry[key], what)
     return maps
-
-
-def _domain(value: Any, source: str) -> tuple[str, ...]:
-    names = [value] if isinstance(value, str) else value
-    if not isinstance(names, list | tuple) or len(names) > len(catalogues()) or any(
-            name not in catalogues() for name in names):
-        raise errors.BadModel(errors.bad_value(f"'{source}': domain", value, listed(catalogues())))
-    return tuple(names)
 
 
 def _bounds(entry: Mapping[str, Any]) -> Any:

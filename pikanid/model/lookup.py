@@ -39,7 +39,7 @@ class Lookup:
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...]
     effects: tuple[Effect | EffectForm, ...]
-    domain: tuple[str, ...]
+    domain: tuple[str, ...] | None
 
     @property
     def symbols(self) -> frozenset[str]:

@@ -26,6 +26,7 @@ from pikanid.model import units as model_units
 from pikanid.model.checks import Checked, check_types, validate
 from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm
+from pikanid.model.effects_file import domain_of
 from pikanid.model.half_derivative import with_half_derivative
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Formula, Input, Output, Parameter, Spline, State
@@ -50,7 +51,8 @@ class Model(Operations):
     -k*x - q*x**2
 
     `effects` are kinds of physics that it may lack, for `pikanid.diagnose` to look for, and
-    `domain` names catalogues of them: `pikanid.model.domains`.
+    `domain` names catalogues of them; without it the units of the states tell which
+    (`pikanid.model.domains`).
 
     Raises:
         BadModel: Names used twice, unknown symbols, guesses outside their bounds.
@@ -64,7 +66,7 @@ class Model(Operations):
     outputs: tuple[Output, ...]
     splines: tuple[Spline, ...] = ()
     effects: tuple[Effect | EffectForm, ...] = ()
-    domain: tuple[str, ...] = ()
+    domain: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         self.settle(Checked())
@@ -89,7 +91,7 @@ class Model(Operations):
             for o in self.outputs))
         put(self, "splines", tuple(self.splines))
         put(self, "effects", tuple(self.effects))
-        put(self, "domain", tuple(self.domain))
+        put(self, "domain", domain_of(self.domain))
         order = [s.name for s in self.states]
         for name in self.equations:
             if name not in order:

@@ -76,16 +76,18 @@ class PINN(PinnSettings):
         """
         begun = time.perf_counter()
         check(self)
-        fit, curves = self._best(Problem(model, recordings))
-        return assemble(self.name, fit, {**recorded(self), **fit.settings}, list(fit.history),
-                        begun, curves)
+        fit, curves, starts = self._best(Problem(model, recordings))
+        return assemble(self.name, fit, {**recorded(self), **fit.settings, "starts": starts},
+                        list(fit.history), begun, curves)
 
-    def _best(self, problem: Problem) -> tuple[PinnFit, Any]:
-        """Of networks from different weights the first that a simulation confirms, or the best."""
+    def _best(self, problem: Problem) -> tuple[PinnFit, Any, int]:
+        """Of networks from different weights the first that a simulation confirms, or the best; its
+        curves, and how many were fitted.
+        """
         climbs = uses_newton(self) and self.lam is None
         tried: list[tuple[PinnFit, Any]] = []
         for k in range(self.settings.starts if climbs else 1):
             tried.append(fit_network(problem, replace(self, seed=self.seed + k)))
             if tried[-1][0].excess <= self.settings.far**2:
                 break
-        return min(tried, key=lambda one: one[0].excess)
+        return *min(tried, key=lambda one: one[0].excess), len(tried)

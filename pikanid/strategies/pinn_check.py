@@ -27,8 +27,9 @@ class Verdict:
 
     Attributes:
         excess: By how much refining them lowers the weighted sum of squares of Eq. (1), in units of
-            what is left per degree of freedom, or of the noise where that is more; infinite where
-            the model cannot be simulated at them.
+            what is left per degree of freedom, or of the noise where that is more; zero where the
+            noise is not known and no parameter is visibly elsewhere, infinite where the model
+            cannot be simulated.
         notes: A sentence on the parameter that is furthest outside what the data allow, or none.
     """
 
@@ -54,11 +55,12 @@ def against_simulation(problem: Problem, theta: Array, residual: float,
     left = after / max(shooting.rows - theta.size, 1)
     given = shooting.adequacy(found.theta).source == "given"
     scale = 1.0 if given else left
-    excess = (before - after) / max(left, float(given), 1e-300)
     std = np.sqrt(np.diag(covariance(shooting.jacobian(found.theta),
                                      np.ones(theta.size, bool))) * scale)
     gap = np.abs(theta - found.theta)
-    apart = (gap > far * std) & (gap > VISIBLE * np.abs(found.theta)) & np.isfinite(std)
+    visible = gap > VISIBLE * np.abs(found.theta)
+    excess = (before - after) / max(left, float(given), 1e-300) if given or visible.any() else 0.0
+    apart = (gap > far * std) & visible & np.isfinite(std)
     if not np.any(apart) or not before - after > far**2 * scale or not found.converged:
         return Verdict(excess, ())
     k = int(np.argmax(np.where(apart, gap / np.maximum(std, 1e-300), -1.0)))

@@ -23,7 +23,7 @@ from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import acts_in, needed
-from pikanid.mismatch.judge.partial import Explanations, dominance
+from pikanid.mismatch.judge.explanations import Explanations, dominance
 from pikanid.noise.projection import project
 
 INTERVALS, DEGREE = 24, 3  # numerical: fine enough for a few periods of cogging

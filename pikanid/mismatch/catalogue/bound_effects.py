@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import sympy as sp
 
 from pikanid import errors
+from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Effect, EffectForm, Model
@@ -43,9 +45,15 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
         {n: float(np.abs(first[n].values).max(initial=0.0)) for n in names},
         {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
         site.interval)
+    extended = {_extended(site.model, e) for e in own}
     for form in forms:
         around = replace(around, taken=frozenset(n for e in own for n in e.names))
-        own += [e for e in bound(form, around) if _fits(site.model, e)]
+        for effect in bound(form, around):
+            made = _extended(site.model, effect)
+            # of a parameter in two equations, the same may be said of each
+            if made is not None and made not in extended:
+                own.append(effect)
+                extended.add(made)
     return own
 
 
@@ -55,13 +63,19 @@ def _range(recording: Recording, name: str) -> tuple[float, float]:
     return (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
 
 
-def _fits(model: Model, effect: Effect) -> bool:
-    """Whether the units of an effect are those of a model."""
+def _extended(model: Model, effect: Effect) -> tuple[sp.Expr, ...] | None:
+    """The formulas of a model with an effect, whatever that one's names; None where its units are
+    not those of the model.
+    """
     try:
-        model.with_effect(effect)
+        found = model.with_effect(effect)
     except errors.BadUnit:
-        return False
-    return True
+        return None
+    plain = {symbol(n): symbol(f"own_{k}") for k, n in enumerate(effect.names)}
+    delays = (d for i in found.inputs for d in (i.delay, i.backlash, i.rate_limit))
+    return tuple(sp.S(e).xreplace(plain) for e in (
+        *found.equations.values(), *(s.initial for s in found.states), *delays,
+        *(formula for o in found.outputs for formula in (o.expression, o.delay))))
 
 
 def reserved(sites: Iterable[Site], effects: Iterable[Effect]) -> tuple[Site, ...]:

@@ -60,10 +60,10 @@ class ShownEffect:
 
 
 def effects_shown(model: Model, excitation: Recording) -> tuple[ShownEffect, ...]:
-    """Simulate each effect that a model lists, at its guess and about no effect.
+    """Simulate each effect that a model lists or takes from a catalogue, at its guess and without.
 
     Args:
-        model: With effects (`Model.with_candidates`, or ``[effects]`` in its file).
+        model: With effects (`Model.with_candidates`, or ``[effects]`` in its file) or a domain.
         excitation: The experiment.
 
     Raises:

@@ -120,13 +120,15 @@ class PartSettings:
         rate: Posterior probability that may be missing to one.
         chance: Rate at which a family that is not there may dominate.
         spread: Of ln κ of families that are not there, which is about half-normal.
+        gain_spread: The same of a scale error: the free parameters of a model take up the stiffness
+            and the damping of what is missing, and nothing its gain.
         share: Of the held-out misfit's square that must be explained.
         within: κ of an effect among explanations that hold the same family; of a law with a free
             exponent `dominance` is asked.
         exact: Share of the held-out misfit's square that a name must explain, unless it dominates
             among members of its family as the family does.
-        form: κ of a free curve of the same state beside a named effect: from there on the form is
-            another one, and only the family is sure.
+        form: κ of a free curve of the same state beside a named effect, or of a law that contains
+            it: from there on the form is another one, and only the family is sure.
         floor: Of σ²: less than that is not told from nothing.
         rivals: Explanations without a family that are compared with the best one with it.
         pool: Explanations that are looked at, the best first.
@@ -136,6 +138,7 @@ class PartSettings:
     rate: Rate = 0.01
     chance: Rate = 0.002
     spread: Amount = 0.45
+    gain_spread: Amount = 0.9
     share: Share = 0.8
     within: Factor = 1.2
     exact: Share = 0.9
@@ -149,3 +152,7 @@ class PartSettings:
     def dominance(self) -> float:
         """κ that is asked of a family: how many times more is left without it."""
         return dominance(self.chance, self.spread)
+
+    def dominance_of(self, family: str) -> float:
+        """The same of one family."""
+        return dominance(self.chance, self.gain_spread) if family == "gain" else self.dominance

@@ -19,17 +19,10 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.explanations import Explanations, explanations, lasting
 from pikanid.mismatch.judge.kinds import kinds_in, members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over
-from pikanid.mismatch.judge.partial import (
-    Doubtful,
-    Explanations,
-    Part,
-    Present,
-    explanations,
-    lasting,
-    surely_there,
-)
+from pikanid.mismatch.judge.partial import Doubtful, Part, Present, surely_there
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.neighbours import (
     Job,
@@ -150,10 +143,10 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
         if h.far and rivals:  # no fit may get there
             rivals += [nominal * share_lacking(case.base, s, p.effect.site) for s in others]
         kappa = min(rivals, default=np.inf) / max(own_left, rule.floor)
-        if smaller(kappa, rule.dominance):
+        if smaller(kappa, rule.dominance_of(p.family)):
             doubtful.append(Doubtful(p.kind, p.effect, "a free curve of a state it does not "
                                      f"depend on leaves {kappa:.2g} times as much in its place, "
-                                     f"{rule.dominance:.2g} are asked"))
+                                     f"{rule.dominance_of(p.family):.2g} are asked"))
             continue
         if p.names and own:
             beside = min((_left(case, found, noise, own_left / rule.form)

@@ -1,0 +1,132 @@
+"""Explanations that are compared with each other, weighed by what they predict and leave.
+
+Where nothing explains everything, the posterior over hypotheses is worth little by itself: all of
+them are wrong, and the least wrong one takes all the weight.  What counts beside it is dominance
+over the remainder, κ: how many times more the best explanation without something leaves than the
+best one with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from pikanid.mismatch.fitting.decisions import below, smaller
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.channels import needed
+from pikanid.mismatch.judge.doubt import Predict
+from pikanid.mismatch.judge.kinds import Kind, kinds_in, kinds_of, members
+from pikanid.mismatch.judge.left_over import left_over
+from pikanid.mismatch.judge.prediction import HeldOut
+from pikanid.mismatch.search.overdispersion import repeated
+from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.settings.verdict import PartSettings
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A hypothesis with what it predicts, its criterion S, posterior weight, and what it leaves of
+    σ² in all recordings.
+    """
+
+    hypothesis: Hypothesis
+    predicted: HeldOut
+    left: float
+    score: float = 0.0
+    weight: float = 0.0
+    share: float = 0.0
+    kinds: frozenset[Kind] = field(default_factory=frozenset)
+
+
+@dataclass(frozen=True)
+class Explanations:
+    """Explanations, the best first, what χ² is divided by, and the best one that predicts most of
+    what the nominal model misses, if there is one.
+    """
+
+    weighed: tuple[Weighed, ...]
+    overdispersion: float
+    lead: Weighed | None
+
+
+def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
+                 noise: Sequence[dict[str, float]], settings: Settings,
+                 ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None
+                 ) -> Explanations | None:
+    """Explanations to be compared, weighed; None where the held-out recordings prove nothing.
+
+    Args:
+        ranked: All hypotheses, best first, the nominal model among them.
+        scale: That divides χ², as far as the train recordings tell.
+        predict: What a hypothesis makes of the held-out recordings.
+        noise: σ of each output by name, in the train and in the held-out recordings.
+        settings: What is asked.
+        ahead: Given work that is all needed, before it is: to do it side by side.
+    """
+    rule = settings.part
+    pool = _pool(ranked, rule)
+    ahead([partial(predict, h) for h in pool])
+    found = [Weighed(h, p, left_over(h, p, noise), kinds=frozenset(
+                 k for e in h.effects for k in kinds_of(e, h, rule.dry)))
+             for h in pool if (p := predict(h)) is not None]
+    nominal = next((w for w in found if not w.hypothesis.effects), None)
+    if nominal is None or len(found) < 2 or below(nominal.predicted.chi2 - len(
+            nominal.predicted.rest), settings.least_proof):
+        return None
+    found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
+    # of the explanations that predict most of what the nominal model misses
+    return Explanations(tuple(found), counts,
+                        next((w for w in found if not smaller(w.share, rule.share)), None))
+
+
+def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Without those that hold a formula, or what happens once, which swallows remainders."""
+    return [h for h in ranked if not h.symbolic and all(e.lasts for e in h.effects)]
+
+
+def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
+    """The best lasting hypotheses, the best ones without each family of the first and those with
+    another member of it, those that need none of its channels, and the nominal model.
+    """
+    left = lasting(ranked)
+    chosen = left[: rule.pool]
+    first = next((h for h in left if h.effects), None)
+    for kind in kinds_in(first, rule.dry) if first else ():
+        apart = {h.fit: members(kind, h, rule.dry) for h in left}
+        own = {e.key for e in apart[first.fit]} if first else set()
+        chosen += [h for h in left if not apart[h.fit]][: rule.rivals]
+        chosen += [h for h in left if any(e.key not in own for e in apart[h.fit])][: rule.rivals]
+    for channel in sorted(needed(first)) if first else ():
+        chosen += [h for h in left if channel not in needed(h)][: rule.rivals]
+    chosen += [h for h in left if not h.effects]
+    return list({h.fit: h for h in chosen}.values())
+
+
+def _weighed(found: list[Weighed], nominal: Weighed, scale: float,
+             handicap: float) -> tuple[list[Weighed], float]:
+    """The same with criterion and weights, best first; and what divides χ².
+
+    That is the larger one of the overdispersions of the train recordings and of the best
+    prediction: a scale of the train recordings alone lets an overfit win.
+    """
+    closest = min(found, key=lambda w: w.predicted.chi2)
+    level = max(1.0, closest.predicted.chi2 / max(len(closest.predicted.rest), 1))
+    counts = max(scale, level * repeated(closest.predicted.rest) ** (1 - 1 / level))
+    scores = np.array([(w.hypothesis.minimum.chi2 + w.predicted.deviance) / counts
+                       + w.hypothesis.penalty
+                       + handicap * sum(not e.known for e in w.hypothesis.effects) for w in found])
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    before = max(nominal.predicted.misfit**2 - 1, 1e-12)
+    made = [replace(w, score=float(s), weight=float(p), share=1 - max(
+                w.predicted.misfit**2 - 1, 0.0) / before)
+            for w, s, p in zip(found, scores, weights / weights.sum(), strict=True)]
+    return sorted(made, key=lambda w: (w.score, w.hypothesis.place())), counts
+
+
+def dominance(lead: Weighed, others: Sequence[Weighed], rule: PartSettings) -> float:
+    """κ: how many times more the best of its rivals leaves; infinite where it has none."""
+    least = min((w.left for w in others[: rule.rivals]), default=np.inf)
+    return float(least / max(lead.left, rule.floor))
