@@ -70,6 +70,8 @@ def test_other_verdicts_have_sentences_of_their_own(records: Records) -> None:
     assert explore(True, RATE) in advice("unconfirmed", (FRICTION,), records, RATE, True)
     assert explore(False, 0.0) in advice("partial", (FRICTION,), records, 0.0, True, driven=False)
     assert advice("unconfirmed", (FRICTION,), records, RATE, False) == PROVE
+    idle = advice("unconfirmed", (FRICTION,), records, RATE, True, weak=True, idle=["a wall"])
+    assert "a wall acts there as well" in idle
     assert advice("unconfirmed", (FRICTION,), records, RATE, True, weak=True) == STRENGTHEN
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pikanid import errors
+from pikanid.errors.wording import listed
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.design.next_experiment import NextExperiment, next_experiment
@@ -38,7 +39,8 @@ def explore(driven: bool, rate: float) -> str:
 
 
 def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rate: float,
-           proves: bool, workers: int = 1, weak: bool = False, driven: bool = True) -> str:
+           proves: bool, workers: int = 1, weak: bool = False, driven: bool = True,
+           idle: Sequence[str] = ()) -> str:
     """The next experiment for a verdict; empty where none is needed.
 
     Args:
@@ -50,6 +52,7 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         workers: Threads.
         weak: Whether something given predicts what is held out, but is too weak to be sure of.
         driven: Whether inputs act.
+        idle: Names of given effects that do not act in the held-out recordings.
     """
     if verdict in ("none", "named"):
         return ""
@@ -58,6 +61,10 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         return _separating(given[:records.settings.budget.compared], records, rate, workers)
     if verdict == "partial":
         return f"To learn what is left, record {explore(driven, rate)}."
+    if given and weak and idle:
+        return ("Give a held-out recording in which the motion and the input are as large as in "
+                f"this one, so that {listed(idle)} acts there as well: it decides what is "
+                "confirmed.")
     if given and (weak or not proves):
         return STRENGTHEN if weak else PROVE
     return f"No law in the catalogue holds. Record {explore(driven, rate)}."

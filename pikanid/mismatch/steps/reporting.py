@@ -65,7 +65,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         tuple(case.notes), smallest(case.base, case.candidates, counts),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
                case.search.workers, bool(answer.doubt),
-               any(i.default is None for i in case.model.inputs)), shape=shape,
+               any(i.default is None for i in case.model.inputs), _idle(case, answer)),
+        shape=shape,
         force_over_time=force,
         doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""),
         present=present(answer), remainder=remainder(case, answer, proof))
@@ -107,3 +108,11 @@ def _measured(model: Model, recording: Recording, output: str) -> np.ndarray:
     """The samples (N,) of an output, as they are compared."""
     return next(s.y for s in bind(model, recording).samples
                 if model.outputs[s.output].name == output)
+
+
+def _idle(case: Case, answer: Answer) -> list[str]:
+    """Names of the effects of the first explanation that do not act in the held-out recordings."""
+    seen = case.predicted(answer.given[0]) if answer.given and case.later is not None else None
+    return [] if seen is None else [
+        e.name for e in answer.given[0].effects
+        if e.parameters and {p.name for p in e.parameters} <= seen.inert]
