@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pikanid.formula.expressions import TIME, symbol
-from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.site import Site, sites
+from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.model import Model
 from pikanid.problem.problem import Problem
 
 SHARE = 0.4  # numerical: of the time in which a phase turns by one radian: a parabola follows that
+ROUGH = 1e4  # numerical: chi2 per row: a start need not be simulated more closely than to 100 sigma
 
 
 def own_beginning(problem: Problem, theta: np.ndarray, sites: tuple[Site, ...]) -> np.ndarray:
@@ -41,3 +44,24 @@ def own_beginning(problem: Problem, theta: np.ndarray, sites: tuple[Site, ...]) 
                 if start.is_Symbol and start.name in inside:
                     found[inside[start.name]] = value
     return np.clip(found, problem.lower, problem.upper)
+
+
+def begun(model: Model, records: Records) -> Model:
+    """The model, with the guesses of its free initial values as the data begin where it is closer
+    to them from there: populations guessed at zero stay there, and no fit moves them.
+
+    Of several recordings, whose starts differ, the guesses stay.
+    """
+    if len(records.recordings) > 1:
+        return model
+    whitened = Whitened(model, records)
+    guess = whitened.problem.guess
+
+    def apart(theta: np.ndarray) -> float:
+        return whitened.chi2(theta) if whitened.choose_steps(theta, misfit=ROUGH) else np.inf
+
+    theta = own_beginning(whitened.problem, guess, sites(model, records.recordings))
+    if not apart(theta) < apart(guess):
+        return model
+    return model.with_values({f.name: float(v) for f, v in zip(
+        whitened.problem.free, theta, strict=True) if f.recording is not None})

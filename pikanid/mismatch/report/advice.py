@@ -31,9 +31,9 @@ def explore(driven: bool, rate: float) -> str:
         driven: Whether inputs act.
         rate: Natural frequency [rad/s]; 0 where nothing restores.
     """
-    swing = "a free decay over a three-fold range of amplitude, until it rests"
+    swing = "a free decay from starts three times apart, until it rests"
     drive = ("a slow sweep through the resonance at two input levels" if rate > 0 else
-             "steps of three or more sizes in both directions, each held until the speed is steady")
+             "steps of three or more sizes in both directions, each held until all is steady")
     wanted = ([swing] if rate > 0 or not driven else []) + ([drive] if driven else [])
     return "; ".join([*wanted, "two seconds at rest before each"])
 
@@ -77,7 +77,7 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     names = titles_apart(given)
     text = f"To tell {' from '.join(names)}: "
     if len(driven) != 1 or not rate > 0:
-        return text + "let it swing freely from amplitudes at least three times apart, and long."
+        return text + "let it move freely from starts at least three times apart, and long."
     models = {name: e.model for name, e in zip(names, given, strict=True)}
     found = _best(models, records, driven[0], rate, workers)
     if found is None:

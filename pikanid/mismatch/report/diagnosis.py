@@ -81,6 +81,7 @@ class Diagnosis(DiagnosisData):
             "undetectable_below": {
                 n: {"value": v.value, "unit": v.unit} for n, v in self.undetectable_below.items()},
             "next_experiment": self.next_experiment,
+            "notes": [*self.noise, *self.notes],
             "present": [p.to_dict() for p in self.present],
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "settings": self.settings.to_dict(),

@@ -22,6 +22,7 @@ from pikanid.mismatch.data.preparation import (
     with_sigma,
 )
 from pikanid.mismatch.fitting.repeats import repeats
+from pikanid.mismatch.judge.beginning import begun
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Effect, Model
@@ -72,6 +73,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     records = prepared(model, train, quiet, notes, settings, together)
     check_freedom(model, records)
     short = records.beginning(settings.budget.rows_searched)
+    model = begun(model, short)
     nls = NLS(adequacy=settings.adequacy, uncertainty=settings.uncertainty)
     before = nls.fit(model, with_sigma(short, model))
     if short is not records:
