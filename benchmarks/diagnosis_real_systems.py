@@ -62,20 +62,25 @@ def building() -> list[Row]:
     return [row("building", dx, seconds, f"a day ahead, fitted by hand: {', '.join(told)} degC")]
 
 
-def theophylline() -> list[Row]:
-    """At once in the blood is the nominal model; subjects have parameters of their own."""
-    subjects = [s.with_sigma(c=ASSAY) for s in datasets.theophylline()]
+def at_once() -> Model:
+    """Theophylline goes into the blood at once; subjects have parameters of their own."""
     own = {"scope": "recording"}
-    model = Model.from_dict({
+    return Model.from_dict({
         "name": "at once in the blood", "inputs": {"dose": {"unit": "mg/kg"}},
         "states": {"c": {"unit": "mg/l", "initial": "dose/V"}},
         "parameters": {"k": {"unit": "1/h", "guess": 0.08, "bounds": [1e-5, 100.0], **own},
                        "V": {"unit": "l/kg", "guess": 0.5, "bounds": [1e-3, 1e4], **own}},
         "equations": {"c": "-k*c"}, "outputs": {"c": {"unit": "mg/l", "expression": "c"}}})
+
+
+def theophylline() -> list[Row]:
+    """At once in the blood is the nominal model."""
+    subjects = [s.with_sigma(c=ASSAY) for s in datasets.theophylline()]
+    model = at_once()
     dx, seconds = _diagnosed(model, subjects[:SUBJECTS], subjects[SUBJECTS:])
     each = dx.model.replace(parameters=tuple(
         replace(p, scope="recording") if p.free else p for p in dx.model.parameters))
-    told = ", ".join(f"{name} {_left_out(one, subjects):.3g}"
+    told = ", ".join(f"{name} {left_out(one, subjects):.3g}"
                      for name, one in (("nominal", model), ("with what was found", each)))
     return [row("theophylline", dx, seconds, f"samples left out one by one: {told} mg/l")]
 
@@ -144,7 +149,7 @@ def _day_ahead(model: Model, train: Sequence[pk.Recording], other: Sequence[pk.R
     return _rms(np.concatenate(wrong))
 
 
-def _left_out(model: Model, subjects: Sequence[pk.Recording]) -> float:
+def left_out(model: Model, subjects: Sequence[pk.Recording]) -> float:
     """RMSE [mg/l] of each sample by a fit of its subject without it."""
     wrong = []
     for whole in subjects:

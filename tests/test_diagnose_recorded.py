@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis_real_systems import at_once, left_out
 
 import pikanid as pk
-from pikanid.model import Model
 
 pytestmark = pytest.mark.slow
 
@@ -35,21 +34,6 @@ def test_both_joints_of_a_double_pendulum_have_dry_friction(recordings_folder: P
     assert before > 0.19 and after < 0.06
 
 
-def left_out(model: Model, subjects: Sequence[pk.Recording]) -> float:
-    """RMSE [mg/l] of each sample by a fit of its subject without it."""
-    wrong = []
-    for whole in subjects:
-        for k in range(len(whole.t)):
-            seen = whole["c"].values.copy()
-            seen[k] = np.nan
-            part = pk.Recording.from_arrays(
-                whole.t, {"dose": whole["dose"].values, "c": seen}, {"dose": "mg/kg", "c": "mg/l"},
-                hold={"dose": "zero"})
-            found = pk.NLS(starts=1).fit(model, part).fitted_model
-            wrong.append(pk.simulate(found, whole)["c"].values[k] - whole["c"].values[k])
-    return float(np.sqrt(np.mean(np.square(wrong))))
-
-
 def test_what_twelve_subjects_swallow_is_absorbed_from_a_store(recordings_folder: Path) -> None:
     """Parameters of their own; eight subjects tell, four confirm.  Left out one by one, samples are
     predicted to 1.0 mg/l (0.935 by hand) instead of 2.5.
@@ -57,13 +41,7 @@ def test_what_twelve_subjects_swallow_is_absorbed_from_a_store(recordings_folder
     if not (recordings_folder / "theophylline").exists():
         pytest.skip("theophylline is not among the real recordings at hand")
     subjects = [s.with_sigma(c=0.5) for s in pk.datasets.theophylline()]
-    own = {"scope": "recording"}
-    model = Model.from_dict({
-        "name": "at once in the blood", "inputs": {"dose": {"unit": "mg/kg"}},
-        "states": {"c": {"unit": "mg/l", "initial": "dose/V"}},
-        "parameters": {"k": {"unit": "1/h", "guess": 0.08, "bounds": [1e-5, 100.0], **own},
-                       "V": {"unit": "l/kg", "guess": 0.5, "bounds": [1e-3, 1e4], **own}},
-        "equations": {"c": "-k*c"}, "outputs": {"c": {"unit": "mg/l", "expression": "c"}}})
+    model = at_once()
     dx = pk.diagnose(model, subjects[:8], subjects[8:], workers=1)
     assert dx.verdict == "partial" and [p.family for p in dx.present] == ["storage"]
     assert dx.hypotheses[0].effects[0].ids == ("absorption",)

@@ -114,6 +114,15 @@ def test_a_parameter_of_two_equations_is_changed_once() -> None:
     assert len(found) == len({*found})
 
 
+@pytest.mark.parametrize("at", [0.0, 0.3])
+def test_a_coordinate_that_stays_has_no_pitch(at: float) -> None:
+    model = pk.systems.pendulum()
+    run = pk.simulate(model, pk.excitation.free_decay(4.0), seed=0)
+    found = bound_to(read_effects("mechanics"), sites(model, (run,)), [run],
+                     lambda: dict.fromkeys(model.state_names, (at, at)))
+    assert [e.key for e in found] == ["gravity"]
+
+
 def test_a_state_that_stays_at_zero_has_no_guesses() -> None:
     model = pk.Model.from_dict({
         "name": "two substances", "domain": "kinetics",

@@ -97,9 +97,9 @@ def bound(form: EffectForm, around: Surroundings) -> Iterator[Effect]:
         try:
             made = _with(form, binding, around, alone=len(bindings) == 1)
         except errors.BadModel:
-            # a state that stays at zero has no size that a guess could follow from
-            if any(around.range_of(n, kind) == (0.0, 0.0) for n, kind in zip(
-                    binding.values(), form.places.values(), strict=True)):
+            # a state that stays where it is has no size that a guess could follow from
+            if any(low == high for low, high in map(
+                    around.range_of, binding.values(), form.places.values())):
                 continue
             raise
         yield made

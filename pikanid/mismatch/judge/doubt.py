@@ -96,6 +96,11 @@ def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float =
     return a is not None and b is not None and below(a.deviance, b.deviance - margin)
 
 
+def idle(effect: Candidate, seen: HeldOut) -> bool:
+    """Whether an effect does not act in held-out recordings."""
+    return bool(effect.parameters) and {p.name for p in effect.parameters} <= seen.inert
+
+
 def worth(effect: Candidate, with_it: HeldOut | None, without: HeldOut | None) -> float:
     """χ² that an effect is worth in held-out recordings, where it is there: how far apart the
     predictions with it and without it lie, each with its parameters moved within their errors.
@@ -107,6 +112,6 @@ def worth(effect: Candidate, with_it: HeldOut | None, without: HeldOut | None) -
         return 0.0
     if effect.absent:
         return with_it.motion
-    if effect.parameters and {p.name for p in effect.parameters} <= with_it.inert:
+    if idle(effect, with_it):
         return 0.0
     return float(np.sum((with_it.rest - without.rest) ** 2))

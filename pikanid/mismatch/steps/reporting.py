@@ -13,6 +13,7 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate, widened
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.doubt import idle
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.advice import advice
@@ -113,6 +114,4 @@ def _measured(model: Model, recording: Recording, output: str) -> np.ndarray:
 def _idle(case: Case, answer: Answer) -> list[str]:
     """Names of the effects of the first explanation that do not act in the held-out recordings."""
     seen = case.predicted(answer.given[0]) if answer.given and case.later is not None else None
-    return [] if seen is None else [
-        e.name for e in answer.given[0].effects
-        if e.parameters and {p.name for p in e.parameters} <= seen.inert]
+    return [] if seen is None else [e.name for e in answer.given[0].effects if idle(e, seen)]
