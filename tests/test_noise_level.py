@@ -51,7 +51,7 @@ def test_a_random_motion_does_not_count_as_coloured_noise() -> None:
     recording = Recording.from_arrays(T, {"u": drive, "y": y}, {"u": "m/s^2", "y": "rad"})
     blind, seeing = (first_level(recording, "y", None, DEFAULTS, inputs)
                      for inputs in ([], ["u"]))
-    assert blind.rho > 0.3
+    assert blind.stretch is not None and blind.stretch[1] > 2.5 and blind.rho > 0
     assert seeing.rho == 0 and seeing.sigma == pytest.approx(0.001, rel=0.15)
 
 
@@ -83,7 +83,7 @@ def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None
     assert np.quantile(np.array(stated)[~np.array(refuted)], 0.05) > 0.75 * error
     scores = (np.array(powers) - true) / stated
     assert np.std(scores) == pytest.approx(1.0, abs=0.2)
-    assert np.sqrt(np.mean(scores[refuted] ** 2)) < 1.2
+    assert all(np.abs(scores[refuted]) < 3)
 
 
 def rung(amplitude: float) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ highest frequencies give a standard deviation only, under the assumption that th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.noise.autoregressive import autocorrelation, fit
 from pikanid.noise.floor import rounding_noise
-from pikanid.noise.quiet import even_parts, find_quiet, without_moves
+from pikanid.noise.quiet import about_mean, about_trend, even_parts, find_quiet, without_moves
 from pikanid.noise.settings import ROUNDING, USUAL, QuietSettings, RoundingSettings
 from pikanid.recording.channel import Array, Channel, check_times, check_values
 
@@ -91,7 +91,8 @@ def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
 
     Args:
         channel: Samples may be missing.
-        quiet: Start and stop [s] of a stretch known to be quiet; looked for if None.
+        quiet: Start and stop [s] of a stretch known to be quiet; looked for if None.  What is found
+            may hold a slow trend, what is known to be quiet holds none.
         drives: Inputs; a stretch that is looked for is quiet while none of them moves.
         settings: What counts as quiet.
         rounding: What counts as rounded: σ is at least what rounding leaves.
@@ -103,15 +104,17 @@ def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
     >>> noise = 0.002 * np.random.default_rng(1).standard_normal(1000)
     >>> swing = Channel("theta", t, 0.2 * np.exp(-1.5 * t) * np.cos(14 * t) + noise, "rad")
     >>> print(estimate(swing).sentence("theta"))
-    Noise of 'theta': sigma = 0.00206, white, from the quiet stretch (2.8 s to 8.41 s).
+    Noise of 'theta': sigma = 0.00206, white, from the quiet stretch (4.2 s to 9.81 s).
     """
     check_times(channel, channel.name)
     check_values(channel, channel.name, missing_allowed=True)
     stretch = find_quiet(channel, settings) if quiet is None else quiet
     if stretch is None:
         return _from_highest(channel, rounding)
-    return _from_quiet(channel, *(without_moves(channel, drives, *stretch, settings)
-                                  if quiet is None else stretch), settings, rounding)
+    if quiet is None:
+        return _from_quiet(channel, *without_moves(channel, drives, *stretch, settings), settings,
+                           rounding, about_trend)
+    return _from_quiet(channel, *stretch, settings, rounding, about_mean)
 
 
 def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
@@ -149,7 +152,7 @@ def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
 
 
 def _from_quiet(channel: Channel, start: float, stop: float, settings: QuietSettings,
-                rounding: RoundingSettings) -> NoiseModel:
+                rounding: RoundingSettings, centred: Callable[[Array], Array]) -> NoiseModel:
     inside = (channel.time >= start) & (channel.time <= stop) & np.isfinite(channel.values)
     time, values = channel.time[inside], channel.values[inside]
     n = len(values)
@@ -160,7 +163,7 @@ def _from_quiet(channel: Channel, start: float, stop: float, settings: QuietSett
         raise errors.BadRecording(errors.noise_none(channel.name))
     sigma, rho, spread = least, 0.0, 2 / float(np.sqrt(2 * n))
     if np.ptp(values) > 0:  # else all that is known of the noise is that rounding hides it
-        found = fit(values - values.mean(), settings.order)
+        found = fit(centred(values), settings.order)
         sigma, spread = max(found.sigma, least), 2 * found.sigma_std / found.sigma
         rho = float(np.clip(autocorrelation(found.coefficients, 2)[1], 0.0, settings.steepest))
     first, last = float(time[0]), float(time[-1])

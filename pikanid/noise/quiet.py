@@ -1,4 +1,4 @@
-"""Stretches of a recording in which nothing but noise can be seen."""
+"""Stretches of a recording in which nothing but noise, and a slow trend, can be seen."""
 
 from __future__ import annotations
 
@@ -6,20 +6,27 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pikanid.noise.autoregressive import AR, fit, innovations
+from pikanid.noise.autoregressive import AR, autocorrelation, fit, innovations
 from pikanid.noise.settings import USUAL, QuietSettings
 from pikanid.recording.channel import Array, Channel
 
 _POSITIONS = 200  # limit: windows tried of each length
+_TESTED = 20  # limit: of these, the calmest, that are tested
+_LAGS = 50  # numerical: over which a short memory dies out
+_EXACT = 1e-12  # numerical: of the values, what rounding leaves of a constant
+TREND = 3  # definition: degree of a trend: an arc of a motion is a cubic, noise is none
 
 
 def find_quiet(channel: Channel, settings: QuietSettings = USUAL
                ) -> tuple[float, float] | None:
-    """The longest stretch [s] in which nothing but noise can be seen, or None.
+    """The longest stretch [s] in which nothing but noise about a trend can be seen, or None.
 
-    A stretch counts as quiet if it is among the calmest of the recording, at most an AR(1)
-    process of short memory describes it (what that leaves has a flat spectrum), and its halves
-    spread alike.  Looked for in evenly sampled parts without gaps.
+    A stretch counts as quiet if it is among the calmest of the recording, and about a cubic trend
+    at most an AR(1) process of short memory describes it (what that leaves has a flat spectrum),
+    its halves spread alike, and two trends, one for each half, leave no less than noise allows: a
+    motion that noise hides over a stretch vanishes in its halves, noise does not.  Of several of
+    one length it is the one of middling variance: the calmest would make noise too small.  Looked
+    for in evenly sampled parts without gaps.
 
     >>> t = np.arange(1000) * 0.01
     >>> noise = 0.002 * np.random.default_rng(1).standard_normal(1000)
@@ -72,6 +79,36 @@ def even_parts(channel: Channel) -> Iterator[tuple[Array, Array]]:
         yield time[a:b], values[a:b]
 
 
+def about_mean(values: Array) -> Array:
+    """(n,) values less their mean."""
+    return np.asarray(values - values.mean())
+
+
+def about_trend(values: Array) -> Array:
+    """(n,) what a cubic over the stretch leaves, with the variance of values that have no trend.
+
+    The variance of white noise is made up for the four coefficients, of which the mean is one that
+    estimates allow for themselves.
+
+    >>> [abs(round(float(x), 9)) for x in about_trend(np.arange(6.0) ** 3)]
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    """
+    n = len(values)
+    if n <= TREND + 1:
+        return about_mean(values)
+    return _detrended(values, _trends(n)) * float(np.sqrt((n - 1) / (n - 1 - TREND)))
+
+
+def _trends(n: int) -> Array:
+    """(n, 4) orthonormal polynomials."""
+    return np.asarray(np.linalg.qr(np.polynomial.legendre.legvander(
+        np.linspace(-1.0, 1.0, n), TREND))[0])
+
+
+def _detrended(values: Array, trends: Array) -> Array:
+    return np.asarray(values - trends @ (trends.T @ values))
+
+
 def _longest_quiet(values: Array, settings: QuietSettings) -> tuple[int, int] | None:
     n, loudest = len(values), float(np.var(values))
     length = n
@@ -80,34 +117,56 @@ def _longest_quiet(values: Array, settings: QuietSettings) -> tuple[int, int] | 
         starts = list(range(0, n - length + 1, step))
         if (n - length) % step:
             starts.append(n - length)  # the very end is often the calmest
-        windows = sorted((float(np.var(values[a : a + length])), a) for a in starts)
-        calmest = windows[0][0]
-        for variance, a in windows[:20]:
-            if variance <= settings.calmest * calmest and _is_quiet(
-                    values[a : a + length], loudest, settings):
-                return a, a + length
+        trends = _trends(length)
+        windows = sorted(
+            (float(np.var(_detrended(values[a : a + length], trends))), a) for a in starts)
+        calm = [a for variance, a in windows[:_TESTED]
+                if variance <= settings.calmest * windows[0][0]]
+        quiet = [a for a in calm if _is_quiet(values[a : a + length], loudest, settings)]
+        if quiet:
+            a = quiet[len(quiet) // 2]
+            return a, a + length
         length = int(length * 0.75)
     return None
 
 
 def _is_quiet(values: Array, loudest: float, settings: QuietSettings) -> bool:
-    """Whether a window holds nothing but stationary noise of short memory."""
+    """Whether a window holds nothing but a trend and stationary noise of short memory."""
     n = len(values)
-    centred = values - values.mean()
-    if not np.any(centred):
+    centred = about_trend(values)
+    if not np.any(np.abs(centred) > _EXACT * np.max(np.abs(values))):
         return False  # a stuck sensor shows no noise at all
     # One real pole: an oscillation needs a pair of complex ones, and must not pass for noise.
     model = fit(centred, highest=1)
     if model.memory * settings.memories > n:
         return False
-    # A busy signal can look like coloured noise: it must at least be much louder elsewhere.
-    if len(model.coefficients) and float(np.var(centred)) > settings.quieter * loudest:
+    # A motion can look like coloured noise: many samples tell, and what is far louder elsewhere.
+    if len(model.coefficients) and (
+            n < settings.low or float(np.var(centred)) > settings.quieter * loudest):
         return False
     if not (_flat_spectrum(innovations(centred, model), settings.chance)
-            and _stationary(centred, model, settings.chance)):
+            and _stationary(centred, model, settings.chance)
+            and _one_trend(centred, settings)):
         return False
     # An oscillation or a drift is predictable over the whole stretch, noise is not.
     return fit(centred, settings.order).memory * settings.memories <= n
+
+
+def _one_trend(centred: Array, settings: QuietSettings) -> bool:
+    """Whether trends of the two halves leave as little less as noise allows (F test): power at the
+    lowest frequencies against what the halves' noise has there, (σ_e / (1 - Σ a_k))².
+    """
+    from scipy.stats import f as f_distribution
+
+    n = len(centred)
+    halves = np.concatenate(
+        [_detrended(part, _trends(len(part))) for part in np.array_split(centred, 2)])
+    model = fit(halves * float(np.sqrt((n - 1) / (n - 2 * TREND - 2))), settings.order)
+    lowest = (model.innovation / (1 - float(np.sum(model.coefficients)))) ** 2
+    gained = float(centred @ centred - halves @ halves) / (TREND + 1)
+    freedom = _independent(n, model) - 2 * (TREND + 1)
+    return gained < lowest * float(
+        f_distribution.ppf(1 - settings.chance, TREND + 1, max(freedom, 2.0)))
 
 
 def _flat_spectrum(white: Array, chance: float) -> bool:
@@ -131,7 +190,13 @@ def _stationary(centred: Array, model: AR, chance: float) -> bool:
     from scipy.stats import f as f_distribution
 
     n = len(centred)
-    freedom = max(n / (2 * (1 + 2 * model.memory)), 2.0)
+    freedom = max(_independent(n // 2, model), 2.0)
     ratio = float(np.var(centred[: n // 2])) / max(float(np.var(centred[n // 2 :])), 1e-300)
     high = float(f_distribution.ppf(1 - chance / 2, freedom, freedom))
     return 1 / high < ratio < high
+
+
+def _independent(n: int, model: AR) -> float:
+    """As how many independent samples n of an AR process count for its variance."""
+    rho = autocorrelation(model.coefficients, min(_LAGS, n))
+    return float(n / (1 + 2 * np.sum(rho[1:] ** 2)))

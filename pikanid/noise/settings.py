@@ -22,7 +22,8 @@ class QuietSettings(Checked):
             signal can look like it.
         still: Share of an input's range that it may leave its resting value by.
         still_noise: The same [standard deviations of the input's own noise].
-        low: Samples of a quiet stretch that say something about low frequencies.
+        low: Samples of a quiet stretch that say something about low frequencies: fewer cannot tell
+            coloured noise from a motion.
         steepest: Correlation of neighbours that a quiet stretch can show: beyond it, it drifts.
     """
 

@@ -17,6 +17,7 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.thresholds import bic
 from pikanid.noise.floor import rounding_noise
 from pikanid.noise.level import NoiseModel, estimate
+from pikanid.noise.quiet import TREND, about_mean, about_trend
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
 
@@ -85,8 +86,9 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
             channel.values)
         values = channel.values[inside]
         if len(values) >= settings.quiet.low:
-            p = np.abs(np.fft.rfft(values - values.mean())) ** 2 / len(values)
-            spectra.append((np.linspace(0, np.pi, len(p))[1:], p[1:], 1.0))
+            centred, first = (about_trend, TREND) if quiet is None else (about_mean, 1)
+            p = np.abs(np.fft.rfft(centred(values))) ** 2 / len(values)
+            spectra.append((np.linspace(0, np.pi, len(p))[first:], p[first:], 1.0))
             source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
     given = level.sigma if level.source == "given" else None
     sigma, rho, spread = _whittle(spectra, given, settings.noise)
