@@ -161,9 +161,7 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     # effect's form is another one
     wider = [w for w in holders if w not in same and any(
         _contains(e, effect) for e in w.hypothesis.effects)]
-    # more effects take up a remainder by themselves, and say nothing of a name
-    rivals = [w for w in holders if w not in same and w not in wider
-              and len(w.hypothesis.effects) <= len(lead.hypothesis.effects)]
+    rivals = [w for w in holders if w not in same and w not in wider]
     other_form = not smaller(lead.left, rule.form * max(min(
         (w.left for w in wider), default=np.inf), rule.floor))
     own = sum(w.weight for w in same)
@@ -171,11 +169,9 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     # what needs a law outside the catalogue beside it has no name of its own, and a free exponent
     # takes up what other laws leave
     clearly = rule.dominance if isinstance(effect.exponent, Parameter) else rule.within
-    # no remainder is left that could take a rival's place
-    told = smaller(lead.left, rule.floor) or not smaller(within, clearly)
     blurred = effect.key in lead.hypothesis.blurred
     exact = all(e.known for e in own_effects) and not (
-        blurred or other_form or smaller(own, 1 - rule.rate) or not told
+        blurred or other_form or smaller(own, 1 - rule.rate) or smaller(within, clearly)
         # as sure as the family itself, whatever is left
         or (smaller(lead.share, rule.exact) and smaller(within, rule.dominance)))
     compared = {e.key: e.name for w in holders for e in members(kind, w.hypothesis, rule.dry)

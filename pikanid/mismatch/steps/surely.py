@@ -9,7 +9,6 @@ import numpy as np
 
 from pikanid.mismatch.beyond.free_channels import sure_channels
 from pikanid.mismatch.beyond.free_curve import (
-    share_lacking,
     with_free_curve,
     with_free_input,
     with_free_sensor,
@@ -126,10 +125,10 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
     curve beside it, of the state that it depends on, leaves far less: then its form is another one.
     """
     h, rule = part.hypothesis, case.settings.part
-    before, without = case.predicted(h), case.predicted(case.base)
-    if before is None or without is None:
+    before = case.predicted(h)
+    if before is None:
         return part
-    own_left, nominal = left_over(h, before, noise), left_over(case.base, without, noise)
+    own_left = left_over(h, before, noise)
     present, doubtful = [], list(part.doubtful)
     for p in part.present:
         own = members(p.kind, h, rule.dry)
@@ -140,8 +139,6 @@ def _against_curves(case: Case, part: Part, noise: Sequence[dict[str, float]]) -
         enough = p.dominance * max(own_left, rule.floor)
         rivals = [] if p.family == "constant force" or not own else [
             _left_with_curve(case, h, rest, s, p.effect.site, noise, enough) for s in others]
-        if h.far and rivals:  # no fit may get there
-            rivals += [nominal * share_lacking(case.base, s, p.effect.site) for s in others]
         kappa = min(rivals, default=np.inf) / max(own_left, rule.floor)
         if smaller(kappa, rule.dominance_of(p.family)):
             doubtful.append(Doubtful(p.kind, p.effect, "a free curve of a state it does not "
