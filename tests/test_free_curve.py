@@ -36,6 +36,7 @@ def fitted_to(rig: pk.Model) -> tuple[Hypothesis, Site]:
     return base, sites(model, (run,))[0]
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_curve_of_the_right_state_leaves_far_less_from_far_off() -> None:
     """Of a force as narrow as a piece of the curve."""
     base, site = base_of(MAGNET)

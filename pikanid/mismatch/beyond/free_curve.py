@@ -13,12 +13,13 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.model import Model
 
 FINE = 12  # numerical: pieces of a curve, for a law that acts in a tenth of the range
+PIECES = (FINE, 6, 3)  # numerical: with which a curve is tried, one after the other
 
 
 def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], argument: str,
                     site: Site) -> Hypothesis | None:
-    """Effects of a hypothesis and a free curve as a force, refitted from where it stands; None
-    where that cannot be run.
+    """Effects of a hypothesis and a free curve as a force, refitted from where it stands, with
+    fewer pieces where that ends in nothing that can be run; None where no curve can be.
 
     Args:
         nominal: Model without effects.
@@ -28,9 +29,10 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
         site: Coordinate in whose equation it stands.
     """
     visited = h.whitened.motion(h.minimum.theta)[argument]
-    curve = FreeCurve(argument, float(visited.min()), float(visited.max()), h.model, FINE)
-    return fitted(nominal, [*effects, curve.candidate(site)], h.whitened.records, [h.point], 1,
-                  settled=h.key)
+    low, high = float(visited.min()), float(visited.max())
+    return next((found for pieces in PIECES if (found := fitted(
+        nominal, [*effects, FreeCurve(argument, low, high, h.model, pieces).candidate(site)],
+        h.whitened.records, [h.point], 1, settled=h.key)) is not None), None)
 
 
 def with_free_input(nominal: Model, h: Hypothesis, name: str, site: Site) -> Hypothesis | None:
