@@ -48,11 +48,13 @@ def labelled(name: str, unit: str) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """A unit as it is printed.
+    """A unit as it is printed; nothing where there is none.
 
     >>> unit_text("N*s/m"), unit_text("1/(s*(rad)^2)"), unit_text("m/s**2")
     ('N·s/m', '1/(s·rad²)', 'm/s²')
     """
+    if unit == "1":
+        return ""
     plain = re.sub(r"\((\w+)\)", r"\1", unit).replace("**", "^").replace("*", "·")
     return re.sub(r"\^(-?\d+)", lambda found: found[1].translate(POWERS), plain)
 

@@ -17,3 +17,12 @@ def rounded(value: float, std: float) -> str:
     if abs(value) >= 1e6 or 0 < abs(value) < 1e-5 or digits > 10:
         return f"{value:.6e} ± {std:.1e}"
     return f"{value:.{digits}f} ± {std:.{digits}f}"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number and its unit, which is left away where there is none.
+
+    >>> with_unit("0.3", "m"), with_unit("0.3", "1")
+    ('0.3 m', '0.3')
+    """
+    return text if unit in ("", "1") else f"{text} {unit}"

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -39,7 +40,7 @@ def sensor_offset(site: Site) -> list[Candidate]:
 
 def sensor_drift(site: Site) -> list[Candidate]:
     """The sensor's zero drifts."""
-    b = Parameter(site.name("beta"), 0.0, f"({site.output.unit or '1'})/s")
+    b = Parameter(site.name("beta"), 0.0, units.product((site.output.unit, 1), ("s", -1)))
     return [_sensor(site, "sensor_drift", "a drift of the sensor", b,
                     f"{site.output.name} + {b.name}*t", lambda w: w.t, drift=b.name)]
 

@@ -213,8 +213,8 @@ def rate_limit(site: Site) -> list[Candidate]:
     """An input that cannot change at once: jumps become ramps."""
     found = []
     for u in site.inputs:
-        most = Parameter(site.name("rate"), 1e9, f"({site.model.input(u).unit or '1'})/s",
-                         (1e-9, INF))
+        unit = units.product((site.model.input(u).unit, 1), ("s", -1))
+        most = Parameter(site.name("rate"), 1e9, unit, (1e-9, INF))
 
         def directions(view: View, u: str = u, most: Parameter = most) -> list[TangentDirection]:
             steps = np.diff(view.t)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pikanid.estimate.rounding import with_unit
 from pikanid.figures import (
     NARROW,
     WIDE,
@@ -90,7 +91,7 @@ def _output(name: str, curves: Curves, error: OutputError, extended: bool, moved
             figure: FigureBase) -> None:
     """One output of the held-out recording: enlarged, and below what is left of all of it."""
     near, left = figure.subplots(2, 1)
-    unit = f" {error.unit}".rstrip()
+    unit = with_unit("", error.unit)
     shown = [("nominal model", curves.before, BEFORE, error.before)]
     if extended:
         shown.append(("extended model", curves.after, AFTER, error.after))

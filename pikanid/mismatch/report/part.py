@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pikanid.estimate.rounding import with_unit
+
 
 @dataclass(frozen=True)
 class Value:
@@ -120,7 +122,7 @@ class Remainder:
 
     def sentence(self) -> str:
         """In words."""
-        size, before, noise = (f"{v:.3g} {self.unit}".rstrip()
+        size, before, noise = (with_unit(f"{v:.3g}", self.unit)
                                for v in (self.rmse, self.rmse_before, self.noise))
         return (f"{100 * self.share_explained:.0f} % of the held-out misfit is explained; of "
                 f"{before} (RMSE) {size} are left, beside noise of {noise}")

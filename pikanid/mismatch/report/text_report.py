@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pikanid.estimate.rounding import rounded
+from pikanid.estimate.rounding import rounded, with_unit
 from pikanid.mismatch.report.findings import DiagnosisData
 
 
@@ -16,7 +16,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
                      + (f"; in time at {dx.where.seconds}" if dx.where.time else ""))
         if dx.where.parameters:
             lines.append("  with a free force there: " + ", ".join(
-                f"{name} = {rounded(v.value, v.std)} {v.unit}".rstrip()
+                f"{name} = {with_unit(rounded(v.value, v.std), v.unit)}"
                 for name, v in dx.where.parameters.items()))
     lines += [f"Surely: {part.sentence()}" for part in dx.present]
     lines += dx.remainder.lines() if dx.remainder is not None else []
@@ -25,7 +25,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
         for e in h.effects:
             lines.append(f"  {e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
-                lines.append(f"    {name} = {rounded(v.value, v.std)} {v.unit}".rstrip())
+                lines.append(f"    {name} = {with_unit(rounded(v.value, v.std), v.unit)}")
     lines += [f"Not: {title}: {why}" for title, why in dx.not_given[:4]]
     if dx.held_out is not None and dx.hypotheses:
         p = dx.held_out
@@ -34,7 +34,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
         for output, error in p.outputs.items():
             moved = (f", {error.moved:.3g} with the parameters moved within their errors"
                      if p.sensitive(dx.settings) else "")
-            change = f"{error.before:.3g} -> {error.after:.3g} {error.unit}".rstrip()
+            change = with_unit(f"{error.before:.3g} -> {error.after:.3g}", error.unit)
             whose = f"of '{output}' " if several else ""
             told.append(f"{whose}{change}{moved} (noise {error.noise:.3g})")
         lines.append(f"Proof: held-out RMSE {'; '.join(told)}, p = {p.p_value:.2g}")
