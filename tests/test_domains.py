@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import pikanid as pk
 from pikanid import errors
@@ -105,6 +107,34 @@ def test_heat_is_lost_to_temperatures_and_only_angles_hang() -> None:
     assert lost == ["loss_to[]"]  # of which it names no column, as there is one only
     assert not any("gravity" in e for e in effects_of(pk.systems.linear_oscillator(), "mechanics"))
     assert any("gravity" in e for e in effects_of(pk.systems.pendulum(), "mechanics"))
+
+
+@pytest.mark.parametrize(("unit", "zero"), [("degC", -273.15), ("K", 0.0)])
+def test_a_hot_plate_radiates_on_any_scale(unit: str, zero: float) -> None:
+    """Simulated by SciPy in kelvins, with as much lost by radiation as by conduction."""
+    table = content(unit, inputs={"P": {"unit": "W"}, "T_a": {"unit": unit}})
+    table["parameters"] = {"C": {"unit": "J/K", "guess": 900.0, "bounds": [100.0, 9000.0]},
+                           "k": {"unit": "1/s", "guess": 1e-3, "bounds": [0.0, 1.0]}}
+    table["equations"] = {"x": "P/C - k*(x - T_a)"}
+    model, run = pk.Model.from_dict(table), partial(plate, unit=unit, zero=zero)
+    dx = pk.diagnose(model, run(1), run(2), workers=1)
+    assert dx.verdict in ("named", "set")
+    found = {i: e for h in dx.hypotheses for e in h.effects for i in e.ids}
+    (value,) = [v for n, v in found["radiation"].parameters.items()]
+    assert abs(value.value - 2e-12) < 4 * value.std < 4e-13
+
+
+def plate(seed: int, unit: str, zero: float) -> pk.Recording:
+    rng, step, n = np.random.default_rng(seed), 5.0, 400
+    t, x = step * np.arange(n), np.full(n, 330.0)
+    power, around = np.repeat(rng.uniform(0, 900, n // 40), 40), 295.0 + 4 * np.sin(t / 300 + seed)
+    for k in range(n - 1):
+        x[k + 1] = solve_ivp(
+            lambda _, y, k=k: power[k] / 1000 - 5e-4 * (y - around[k])
+            - 2e-12 * (y**4 - around[k] ** 4), (0, step), x[k : k + 1], rtol=1e-9).y[0, -1]
+    seen = x + zero + 0.1 * rng.standard_normal(n)
+    return pk.Recording.from_arrays(
+        t, {"P": power, "T_a": around + zero, "x": seen}, {"P": "W", "T_a": unit, "x": unit})
 
 
 def test_a_parameter_of_two_equations_is_changed_once() -> None:

@@ -12,6 +12,8 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.cli import main
 from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.own_effects import own_effects
+from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.design.effects_shown import effects_shown
 from pikanid.model.effects_file import from_table, read_effects
 
@@ -40,6 +42,7 @@ parameters.h = { unit = "cm", guess = 9.0, bounds = [5, 15] }
 add = { x1 = "-k_o*max(x1 - h, 0)", x2 = "k_o*max(x1 - h, 0)" }
 null = { k_o = 0.0 }
 """
+T = np.linspace(0.0, 10.0, 50)
 STORE: dict[str, Any] = {"store": {
     "parameters": {"e": {"unit": "1/s", "guess": 0.2, "bounds": [0.0, 9.0]}},
     "null": {"e": 0.0}, "add": {"x1": "e*(z - x1)"},
@@ -72,6 +75,20 @@ def test_an_effect_is_added_and_no_longer_missing(tanks: Path) -> None:
     assert float(difference.subs({symbol("k_o"): 2, symbol("x1"): 10, symbol("h"): 9})) == -2
     with pytest.raises(errors.BadModel, match="'overflow'"):
         model.with_candidates(model.effects[0])
+
+
+def test_a_parameter_with_a_value_is_not_estimated(tanks: Path, tmp_path: Path) -> None:
+    table = {"parameters": {**STORE["store"]["parameters"], "low": {"value": 3.0, "unit": "cm"}},
+             "null": {"e": 0.0}, "add": {"x1": "-e*(x1 - low)"}}
+    model = pk.Model.load(tanks).with_candidates(*from_table({"leak": table}, "test"))
+    leak = model.effects[1]
+    assert isinstance(leak, pk.Effect) and [p.free for p in leak.parameters] == [True, False]
+    model.save(tmp_path / "again.toml")
+    assert pk.Model.load(tmp_path / "again.toml") == model
+    extended = model.with_effect(leak)
+    assert extended.values["low"] == 3.0 and "low" not in extended.free_names
+    site = sites(model, (pk.Recording.from_arrays(T, {"u": T, "y": T}),))
+    assert [p.name for p in own_effects([leak], site, {})[0].parameters] == ["e"]
 
 
 def test_effects_stand_side_by_side(tanks: Path) -> None:
@@ -119,6 +136,8 @@ def test_names_are_no_others(tanks: Path) -> None:
     ({"inputs": {"u": {"gains": "e"}}}, "gains"),
     ({"parameters": {"e": {"guess": 0.1, "unit": "1/s", "bounds": [1, 0]}}}, "'e'"),
     ({"parameters": {"e": {"guess": 0.1, "unit": "1/s", "scope": "all"}}}, "'shared' or"),
+    ({"parameters": {"e": {"value": 0.1, "unit": "1/s"}}}, "'null' must name one"),
+    ({"parameters": {"e": {"value": 0.1, "guess": 0.1}}}, "value"),
     ({"colour": "red"}, "colour"),
 ])
 def test_what_is_wrong_is_said(tanks: Path, change: dict[str, Any], said: str) -> None:

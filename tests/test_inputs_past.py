@@ -119,3 +119,17 @@ def test_residuals_of_a_late_sensor_are_not_alone() -> None:
     seen = [(0, "omega", run["omega"].time, left)]
     assert without_lone(records, seen)[1] > 0
     assert without_lone(records, seen, ("u",))[1] == 0
+
+
+@pytest.mark.parametrize("offset", [0.0, 300.0])
+def test_a_slow_input_far_from_zero_explains_nothing_by_itself(offset: float) -> None:
+    """The heater's steps do; a temperature about 300 K leaves its own neighbours' cubic by rounding
+    only, of which no weight of it follows.
+    """
+    rng, t = np.random.default_rng(4), 5.0 * np.arange(400.0)
+    heat = np.repeat(rng.uniform(0, 900, 40), 10)
+    room = Channel("T_a", t, offset + 4 * np.sin(t / 300), "K")
+    y = 0.01 * np.concatenate([heat[:1], heat[:-1]])
+    part = explained(t, y + 0.1 * rng.standard_normal(400),
+                     [Channel("P", t, heat, "W"), room], 5, 1e-6)
+    assert np.std(part - y) < 0.15 * np.std(y)

@@ -238,6 +238,15 @@ def begins_elsewhere(text: str) -> bool:
     return len(found) == 1 and any(found.get(name) == 1 for name in _OFFSET)
 
 
+def absolute_zero(text: str) -> float:
+    """The lowest temperature on a scale; zero in every other unit.
+
+    >>> absolute_zero("degC"), absolute_zero("K"), absolute_zero("m")
+    (-273.15, 0.0, 0.0)
+    """
+    return float(convert(0.0, "K", text)) if begins_elsewhere(text) else 0.0
+
+
 def product(*factors: tuple[str, int | Fraction]) -> str:
     """The unit of a product of powers: what a sensitivity or a covariance is measured in.
 

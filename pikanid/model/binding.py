@@ -16,6 +16,7 @@ from pikanid.model.effect_table import effect_of
 from pikanid.model.lookup import Lookup
 from pikanid.storage.entries import Entry
 
+_NUMBERS = ("guess", "value", "bounds")  # definition: what is a number, or a formula of one
 _OWN = ("name", "parameters", "states", "family", "twins")  # not formulas in their first place
 
 
@@ -49,6 +50,9 @@ class Surroundings:
         """What a placeholder of this kind may stand for beside those that are bound."""
         first = next(iter(bound.values()), "")
         rates = self.rates
+        inputs = [n for n in self.model.input_names if n in self.sizes]
+        like = [n for n in (*inputs, *self.channels)
+                if units.convertible(self.unit(n), self.unit(first))]
         return {
             "state": [*self.states],
             "other state": [n for n in self.model.state_names if n not in bound.values()],
@@ -57,10 +61,10 @@ class Surroundings:
                       and self.unit(q) and units.convertible(self.unit(q), "rad")],
             "its rate": [rates[first]] if first in rates else [],
             "output": [n for n in self.model.output_names if n in self.seen],
-            "input": [n for n in self.model.input_names if n in self.sizes],
+            "input": inputs,
             "channel": [*self.channels],
-            "channel like it": [n for n, unit in self.channels.items()
-                                if units.convertible(unit, self.unit(first))],
+            "channel like it": [n for n in like if n in self.channels],
+            "signal like it": like,
             "parameter": [p for p in self.model.free_names if first in self.model.equations
                           and symbol(p) in self.model.equations[first].free_symbols]}[kind]
 
@@ -112,7 +116,8 @@ def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,
         low, high = around.range_of(wanted, form.places[name])
         values |= {f"{name}_low": low, f"{name}_high": high,
                    f"{name}_size": around.sizes.get(wanted, 1.0),
-                   f"{name}_value": around.model.values.get(wanted, 1.0)}
+                   f"{name}_value": around.model.values.get(wanted, 1.0),
+                   f"{name}_zero": units.absolute_zero(around.unit(wanted))}
     where = f"'{form.source}': effect '{form.key}'"
     own = Entry(form.content, where, errors.BadModel).table(optional=None)
     parameters = own["parameters"].table(optional=None)
@@ -129,7 +134,7 @@ def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,
     written = {n: around.unit(wanted) or "1" for n, wanted in binding.items()}
     content["parameters"] = {
         renamed[n]: {k: _number(v, values, f"{where}: {k} of '{n}'")
-                     if k in ("guess", "bounds") else _unit(v, written) if k == "unit" else v
+                     if k in _NUMBERS else _unit(v, written) if k == "unit" else v
                      for k, v in e.table(optional=None).items() for v in [v.value]}
         for n, e in parameters.items()}
     content["states"] = {

@@ -29,7 +29,7 @@ class Effect:
     Attributes:
         key: Its id: short, as a name.
         name: For people.
-        parameters: Added, all estimated; `value` is the guess around which they are looked for.
+        parameters: Added; `value` is the guess around which a free one is looked for.
         null: Name of the one parameter that measures the size, and its value at no effect.
         add: Terms added to the right-hand sides of states.
         replace: New right-hand sides of states; of other symbols, formulas put in their place.

@@ -10,11 +10,14 @@
 
 Texts in braces become the unit of what a placeholder stands for, in names its name.  Guesses and
 bounds may be formulas of the range that a state or an output covers (``x_low``, ``x_high``), of the
-largest size of an input or a channel (``u_size``), of a parameter's value (``p_value``), of the
-recordings' duration [s] and of the usual interval between samples [s]: what is gone within one is
-as good as gone at once.  A coordinate is a state whose rate is another state: ``"its rate"``, the
-place after it, is that one; an angle is a coordinate with a unit of angles.  A parameter is one of
-the equation of the first place, and a channel like it has a unit that converts to its own.
+largest size of an input or a channel (``u_size``), of a parameter's value (``p_value``), of
+absolute zero on a state's scale of temperature (``x_zero``), of the recordings' duration [s] and of
+the usual interval between samples [s]: what is gone within one is as good as gone at once.  A
+parameter with a ``value`` instead of a guess is not estimated.  A coordinate is a state whose rate
+is another state: ``"its rate"``, the place after it, is that one; an angle is a coordinate with a
+unit of angles.  A parameter is one of the equation of the first place; a channel like it, recorded
+and not used by the model, has a unit that converts to its own, and a signal like it may be an input
+of the model as well.
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ from pikanid.storage.entries import Entry
 MOST_PLACES = 4  # limit: of placeholders in one form
 FIRST = ("state", "coordinate", "angle", "input", "output")
 KINDS = ("state", "other state", "coordinate", "angle", "its rate", "input", "output", "channel",
-         "channel like it", "parameter")
+         "channel like it", "signal like it", "parameter")
 
 
 @dataclass(frozen=True)

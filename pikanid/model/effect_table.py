@@ -22,7 +22,7 @@ def content_of(effect: Effect) -> dict[str, Any]:
     """The table of an effect."""
     usual = Parameter("", math.nan)
     parameters = {p.name: {
-        "guess": float(p.value),
+        "guess" if p.free else "value": float(p.value),
         **{k: list(v) if k == "bounds" else v for k in ("unit", "bounds", "scope", "description")
            if (v := getattr(p, k)) != getattr(usual, k)}} for p in effect.parameters}
     content: dict[str, Any] = {
@@ -57,8 +57,9 @@ def effect_of(key: str, entry: Entry) -> Effect:
     parameters = tuple(_parameter(n, e.called(f"{where}: parameter '{n}'"))
                        for n, e in part("parameters").items())
     null = part("null")
-    if len(null) != 1 or (size := next(iter(null))) not in [p.name for p in parameters]:
-        raise errors.BadModel(errors.effect_without_size(where, [p.name for p in parameters]))
+    estimated = [p.name for p in parameters if p.free]
+    if len(null) != 1 or (size := next(iter(null))) not in estimated:
+        raise errors.BadModel(errors.effect_without_size(where, estimated))
     states = {check_name(n, "state"): _state(e.called(f"{where}: state '{n}'"))
               for n, e in part("states").items()}
 
@@ -90,7 +91,10 @@ def _formula(entry: Entry) -> str:
 
 def _parameter(name: str, entry: Entry) -> Parameter:
     check_name(name, "parameter")
-    table = entry.table(["guess"], ["unit", "bounds", "scope", "description"])
+    free = "guess" in entry.table(optional=None)
+    table = entry.table(["guess"] if free else ["value"],
+                        ["unit", "bounds", "scope", "description"] if free else
+                        ["unit", "description"])
     bounds = (-math.inf, math.inf)
     if "bounds" in table:
         low, high = table["bounds"].pair()
@@ -99,10 +103,10 @@ def _parameter(name: str, entry: Entry) -> Parameter:
         ("unit", ""), ("scope", "shared"), ("description", "")))
     if scope not in ("shared", "recording"):
         raise table["scope"].fail("'shared' or 'recording'")
-    value = table["guess"].number()
+    value = table["guess" if free else "value"].number()
     if not bounds[0] <= value <= bounds[1] or not bounds[0] < bounds[1]:
         raise errors.BadModel(errors.bad_bounds(name, value, bounds))
-    return Parameter(name, value, unit, bounds, scope=scope,  # type: ignore[arg-type]  # checked
+    return Parameter(name, value, unit, bounds, free, scope=scope,  # type: ignore[arg-type]  # checked
                      description=description)
 
 

@@ -87,8 +87,9 @@ def static_bias(site: Site) -> list[Candidate]:
         initial = {site.q: 1.0 / site.rate**2} if balanced else {}
         return [TangentDirection({b.name: 1.0}, force=np.ones(len(view.t)), initial=initial)]
 
-    free = Candidate(("static_bias",), "a constant force or tilt", b.name, "dynamics", site, (b,),
-                     extend, directions, twin="offset", static=True, form="constant")
+    name = "a constant force or tilt" if site.q else "a constant source"
+    free = Candidate(("static_bias",), name, b.name, "dynamics", site, (b,), extend, directions,
+                     twin="offset", static=True, form="constant")
     held = replace(
         free, variant="held", extend=lambda m: site.pushed(m, b.name),
         directions=lambda view: [TangentDirection({b.name: 1.0}, force=np.ones(len(view.t)))],

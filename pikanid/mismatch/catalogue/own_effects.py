@@ -49,7 +49,7 @@ def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
     site, nominal = _site(effect, sites), sites[0].model
     nominal.with_effect(effect)  # which is refused before anything is fitted
     size = effect.size
-    others = tuple(p for p in effect.parameters if p.name != size.name)
+    others = tuple(p for p in effect.parameters if p.free and p.name != size.name)
     probes = tuple(_probes(others))
 
     def extend(model: Model) -> Model:

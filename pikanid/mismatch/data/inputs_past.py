@@ -18,6 +18,7 @@ from pikanid.recording.channel import Channel
 
 GAP = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0  # numerical: by which it is left
 CLIPPED = 3.0  # numerical: standard deviations beyond which a deviation counts as so much only
+SMOOTH = 0.01  # numerical: of an input's spread: gaps below say nothing that a misfit could not
 ROUNDS = 10  # numerical: of a fit that gross errors must not lead
 ROWS = 10  # numerical: samples a column from which on those are told from noise
 NORMAL = 0.6745  # definition: median absolute value of a unit Gaussian
@@ -25,12 +26,13 @@ NORMAL = 0.6745  # definition: median absolute value of a unit Gaussian
 
 def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[Channel], lags: int, chance: float
               ) -> np.ndarray:
-    """The part (N,) of a signal y (N,) that is a weighted sum of the inputs some samples ago; zeros
-    where they tell no more of the next sample than its own past does (C. W. J. Granger,
-    Econometrica 37, 1969).
+    """The part (N,) of a signal y (N,) that is a weighted sum of the inputs some samples ago, less
+    its mean; zeros where they tell no more of the next sample than its own past does (C. W. J.
+    Granger, Econometrica 37, 1969).
 
     The weights are those that explain best how samples leave the cubic through their neighbours:
-    slow parts of the signal, whatever they are, do not lead them away.
+    slow parts of the signal, whatever they are, do not lead them away.  Inputs that hardly leave
+    it themselves have none: noise would make them huge.
 
     Args:
         t: (N,) [s].
@@ -56,8 +58,10 @@ def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[Channel], lags: int
     if not p_value < chance:
         return nothing
     gaps = np.stack([np.convolve(x, GAP, "valid") for x in X.T], axis=1)
-    said, _ = _robust(np.convolve(y, GAP, "valid"), gaps)
-    return np.asarray(X @ np.linalg.lstsq(gaps, said, rcond=None)[0])
+    sharp = gaps.std(axis=0) > SMOOTH * X.std(axis=0)
+    said, _ = _robust(np.convolve(y, GAP, "valid"), gaps[:, sharp])
+    weights = np.linalg.lstsq(gaps[:, sharp], said, rcond=None)[0]
+    return np.asarray((X - X.mean(axis=0))[:, sharp] @ weights)
 
 
 def _robust(wanted: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
@@ -84,5 +88,6 @@ def _past(t: np.ndarray, inputs: Sequence[Channel], lags: int) -> np.ndarray:
     step = float(np.median(np.diff(t)))
     held = [HeldInput(u.name, u.time, u.values, "zero" if u.hold in (None, "zero") else "first")
             for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0]
-    columns = [u.at(t, k * step) for u in held for k in range(1, lags + 1)]
+    columns = [x for u in held for k in range(1, lags + 1)
+               if np.ptp(x := u.at(t, k * step)) > 0]
     return np.stack(columns, axis=1) if columns else np.empty((len(t), 0))
