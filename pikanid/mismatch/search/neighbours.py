@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.fitting.decisions import in_order
 from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.screen import Screen, as_strong
@@ -170,7 +171,13 @@ def wide(h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
 
 def to_extend(ranked: Sequence[Hypothesis], fits: Mapping[frozenset[str], Hypothesis]
               ) -> list[Hypothesis]:
-    """Hypotheses that effects are added to, best first: the leading ones that are not wide."""
+    """Hypotheses that effects are added to, best first: the leading ones that are not wide.
+
+    From far off all that is left counts for a few rows, and a price is more than any gain: there
+    what leaves least comes first.
+    """
+    if ranked[0].far:
+        ranked = in_order(ranked, lambda h: h.minimum.chi2, Hypothesis.place)
     return [h for h in leading(ranked) if not wide(h, fits)] or [*ranked[:1]]
 
 

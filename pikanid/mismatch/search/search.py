@@ -121,7 +121,7 @@ class Search:
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
             near = rows + settings.fits.far * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
-            simple = neighbours.to_extend(self._ways_on(best), self.fits)
+            simple = neighbours.to_extend(self.ranked(), self.fits)
             for h in simple[: budget.leading if count == 1 else 1]:
                 if len(h.effects) < budget.effects and (h is simple[0] or h.minimum.chi2 < near):
                     self._extend(h, budget.beside_one if count == 1 else budget.beside_more,
@@ -159,14 +159,6 @@ class Search:
             for job in neighbours.with_other_form(h, self.candidates):
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
-
-    def _ways_on(self, best: Hypothesis) -> list[Hypothesis]:
-        """What to add effects to, first to last: what scores best, or from far off, where all that
-        is left counts for a few rows and a price is more than any gain, what leaves least.
-        """
-        if not best.far:
-            return self.ranked()
-        return in_order(self.fits.values(), lambda h: h.minimum.chi2, Hypothesis.place)
 
     def _contenders(self) -> Iterator[Hypothesis]:
         """The hypotheses that score about as well as the best."""
