@@ -28,7 +28,6 @@ TAPERED = 0.9  # numerical: (Σw²)²/(N Σw⁴): share of the ordinates that st
 BRIDGED = 0.1  # numerical: least share of white noise's power that a spectrum is divided by
 HIGHEST = 0.97  # numerical: of half the sampling rate: beyond, anti-alias filters bend a spectrum
 MEAN_OF = 50  # numerical: frequencies that a mean power is taken over
-STANDARD = 0.683  # definition: probability within one standard deviation
 GRID = np.linspace(0.0, 0.95, 191)  # numerical: correlations of neighbours that are compared
 Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
 
@@ -140,7 +139,11 @@ def bridged(grid: np.ndarray) -> np.ndarray:
 
 def _whittle(spectra: list[Spectrum], given: float | None, settings: NoiseSettings
              ) -> tuple[float, float, float]:
-    """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`."""
+    """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`.
+
+    The mean and the standard deviation of ln power over all ρ, each as likely as it is, white noise
+    as likely beforehand as all others together; where it is that afterwards, the noise is white.
+    """
     total = sum(w * len(o) for o, _, w in spectra)
     scales = []
     for rho in GRID:
@@ -149,23 +152,20 @@ def _whittle(spectra: list[Spectrum], given: float | None, settings: NoiseSettin
     sigmas = np.sqrt(np.array(scales) / (1 - GRID**2))
     costs = np.array([_against(spectra, *level, settings)
                       for level in zip(sigmas, GRID, strict=True)])
-    best = likeliest(costs, total)
-    spread = 1.0 / np.sqrt(total)
-    if best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
+    low = spectra[0][0][0]
+    powers = np.log([_power(*level, low) for level in zip(sigmas, GRID, strict=True)])
+    likely = np.exp(costs.min() - costs) / len(GRID)
+    likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
+    likely /= np.sum(likely)
+    white = likely[0] > 1 - likely[0]
+    best = 0 if white else int(np.argmin(np.abs(powers - likely @ powers)))
+    error = 1.0 / total
+    if np.argmin(costs) < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
         # the curvature at the best ρ says too little: far smaller ones may be nearly as likely
-        low = spectra[0][0][0]
-        powers = np.log([_power(*level, low) for level in zip(sigmas, GRID, strict=True)])
-        likely = np.exp(costs.min() - costs) / len(GRID)
-        likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
-        spread = float(np.hypot(spread, _two_thirds(np.abs(powers - powers[best]), likely)))
-    return float(sigmas[best]), float(GRID[best]), min(spread, settings.order_only)
-
-
-def _two_thirds(distances: np.ndarray, weights: np.ndarray) -> float:
-    """Below which as much of the weight lies as within one standard deviation."""
-    order = np.argsort(distances)
-    share = np.cumsum(weights[order]) / np.sum(weights)
-    return float(np.interp(STANDARD, share, distances[order]))
+        error += float(likely @ (powers - powers[best]) ** 2)
+    else:
+        best = len(GRID) - 1
+    return float(sigmas[best]), float(GRID[best]), float(np.sqrt(error))
 
 
 def _against(spectra: list[Spectrum], sigma: float, rho: float, settings: NoiseSettings) -> float:
