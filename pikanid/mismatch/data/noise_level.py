@@ -19,7 +19,7 @@ from pikanid.noise.floor import rounding_noise
 from pikanid.noise.level import NoiseModel, estimate
 from pikanid.noise.quiet import TREND, about_mean, about_trend
 from pikanid.recording import Recording
-from pikanid.recording.channel import Channel
+from pikanid.recording.channel import Array, Channel
 
 LONGEST = 50  # numerical: samples of a gap beyond which a line across it leaves nothing that counts
 UNEVEN = 0.2  # numerical: of an interval, by which samples may be off an even grid
@@ -145,15 +145,15 @@ def _whittle(spectra: list[Spectrum], given: float | None, settings: NoiseSettin
     as likely beforehand as all others together; where it is that afterwards, the noise is white.
     """
     total = sum(w * len(o) for o, _, w in spectra)
-    scales = []
-    for rho in GRID:
-        power = sum(w * np.sum(_calm(p / _shape(rho, o), settings.line)) for o, p, w in spectra)
-        scales.append(power / total if given is None else given**2 * (1 - rho**2))
-    sigmas = np.sqrt(np.array(scales) / (1 - GRID**2))
-    costs = np.array([_against(spectra, *level, settings)
-                      for level in zip(sigmas, GRID, strict=True)])
-    low = spectra[0][0][0]
-    powers = np.log([_power(*level, low) for level in zip(sigmas, GRID, strict=True)])
+    quiet, logs = np.zeros(len(GRID)), np.zeros(len(GRID))
+    for omega, power, weight in spectra:
+        shapes = _shape(GRID[:, None], omega)
+        quiet += weight * np.sum(_calm(power / shapes, settings.line), axis=1)
+        logs += weight * np.sum(np.log(shapes), axis=1)
+    scales = quiet / total if given is None else given**2 * (1 - GRID**2)
+    costs = quiet / scales + logs + total * np.log(scales)
+    sigmas = np.sqrt(scales / (1 - GRID**2))
+    powers = np.log(_power(sigmas, GRID, spectra[0][0][0]))
     likely = np.exp(costs.min() - costs) / len(GRID)
     likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
     likely /= np.sum(likely)
@@ -177,12 +177,13 @@ def _against(spectra: list[Spectrum], sigma: float, rho: float, settings: NoiseS
     return cost
 
 
-def _power(sigma: float, rho: float, top: float) -> float:
-    """Mean power of ε between frequency zero and `top` [rad]."""
-    return float(sigma**2 * (1 - rho**2) * np.mean(_shape(rho, np.linspace(0.0, top, MEAN_OF))))
+def _power(sigma: Array | float, rho: Array | float, top: float) -> Array:
+    """Mean power of ε between frequency zero and `top` [rad]; of several (σ, ρ) each."""
+    shapes = _shape(np.expand_dims(rho, -1), np.linspace(0.0, top, MEAN_OF))
+    return np.asarray(np.square(sigma) * (1 - np.square(rho)) * np.mean(shapes, axis=-1))
 
 
-def _shape(rho: float, omega: np.ndarray) -> np.ndarray:
+def _shape(rho: Array | float, omega: Array) -> Array:
     """1/|1 - ρ exp(-iω)|²: the spectrum of AR(1) noise."""
     return np.asarray(1.0 / (1 - 2 * rho * np.cos(omega) + rho**2))
 
@@ -195,7 +196,8 @@ def likeliest(costs: np.ndarray, total: float) -> int:
     return 0 if costs[0] - costs[best] < bic(total) else best
 
 
-def _calm(ratio: np.ndarray, line: float) -> np.ndarray:
-    """Ordinates limited to some times their median's mean: a `line` in the band is no noise."""
-    return np.minimum(ratio, line * float(np.median(ratio)) / np.log(2))
-
+def _calm(ratio: Array, line: float) -> Array:
+    """Ordinates (..., n) limited to some times their median's mean: a `line` in the band is no
+    noise.
+    """
+    return np.minimum(ratio, line * np.median(ratio, axis=-1, keepdims=True) / np.log(2))
