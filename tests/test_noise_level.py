@@ -75,8 +75,7 @@ def test_the_error_of_the_power_at_low_frequencies_is_stated(rho: float) -> None
         stated.append(level.spread)
         refuted.append("all frequencies" in level.source)
     error = np.std(powers)  # of 120 it is known to 7 %
-    # the chance of a steeper ρ counts as well, which makes the stated one larger, never smaller
-    assert 0.8 * error < np.median(stated) < 1.3 * error
+    assert np.median(stated) == pytest.approx(error, rel=0.2)
     true = np.mean(np.log((1 - rho**2) / (1 - 2 * rho * np.cos(low) + rho**2)))
     assert np.mean(powers) == pytest.approx(true, abs=0.4 * error)
     # where the whole residual refutes a power by chance, it is known better than otherwise
@@ -131,15 +130,13 @@ def test_an_explanation_tells_the_noise_better_than_high_frequencies_alone(rho: 
     assert abs(np.mean(errors, axis=0)[1]) < 0.3 * after
 
 
-@pytest.mark.parametrize(("rho", "samples"), [
-    (0.0, 501), (0.4, 501), (0.65, 501), (0.0, 71), (0.5, 71), (0.7, 101)])
-def test_a_short_recording_without_a_quiet_stretch_states_its_doubt(
-        rho: float, samples: int) -> None:
-    """High frequencies of a few samples: also where the noise seems white, and is not."""
-    t, low, scores = np.arange(samples) * 0.01, np.linspace(0.0, 0.25 * np.pi, 50), []
+@pytest.mark.parametrize("rho", [0.0, 0.4, 0.65])
+def test_a_short_recording_without_a_quiet_stretch_states_its_doubt(rho: float) -> None:
+    """High frequencies of five seconds: also where the noise seems white, and is not."""
+    t, low, scores = np.arange(501) * 0.01, np.linspace(0.0, 0.25 * np.pi, 50), []
     true = (1 - rho**2) * np.mean(1 / (1 - 2 * rho * np.cos(low) + rho**2))
     for seed in range(150):
-        y = coloured(rho, 3000 + seed)[:samples]
+        y = coloured(rho, 3000 + seed)[:501]
         level = refined(WHITE, Channel("y", t, y), t, y, 14.4, None, DEFAULTS)
         power = level.sigma**2 * (1 - level.rho**2) * np.mean(
             1 / (1 - 2 * level.rho * np.cos(low) + level.rho**2))
@@ -159,7 +156,7 @@ def test_what_explains_all_tells_a_colour_that_high_frequencies_hide() -> None:
                                  None, DEFAULTS, explained) for explained in (False, True))
         found.append((before.rho, after.rho))
     rho = np.array(found)
-    assert np.min(rho[:, 0]) < 0.45  # it does mislead
+    assert np.min(rho[:, 0]) < 0.35  # it does mislead
     assert np.all(np.abs(rho[:, 1] - 0.65) < 0.15)
 
 

@@ -28,6 +28,7 @@ TAPERED = 0.9  # numerical: (Σw²)²/(N Σw⁴): share of the ordinates that st
 BRIDGED = 0.1  # numerical: least share of white noise's power that a spectrum is divided by
 HIGHEST = 0.97  # numerical: of half the sampling rate: beyond, anti-alias filters bend a spectrum
 MEAN_OF = 50  # numerical: frequencies that a mean power is taken over
+STANDARD = 0.683  # definition: probability within one standard deviation
 GRID = np.linspace(0.0, 0.95, 191)  # numerical: correlations of neighbours that are compared
 Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
 
@@ -139,11 +140,7 @@ def bridged(grid: np.ndarray) -> np.ndarray:
 
 def _whittle(spectra: list[Spectrum], given: float | None, settings: NoiseSettings
              ) -> tuple[float, float, float]:
-    """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`.
-
-    The mean and the standard deviation of ln power over all ρ, each as likely as it is, white noise
-    as likely beforehand as all others together; where it is that afterwards, the noise is white.
-    """
+    """(σ, ρ, relative standard error of the power below the first spectrum); σ may be `given`."""
     total = sum(w * len(o) for o, _, w in spectra)
     quiet, logs = np.zeros(len(GRID)), np.zeros(len(GRID))
     for omega, power, weight in spectra:
@@ -154,18 +151,21 @@ def _whittle(spectra: list[Spectrum], given: float | None, settings: NoiseSettin
     costs = quiet / scales + logs + total * np.log(scales)
     sigmas = np.sqrt(scales / (1 - GRID**2))
     powers = np.log(_power(sigmas, GRID, spectra[0][0][0]))
-    likely = np.exp(costs.min() - costs) / len(GRID)
-    likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
-    likely /= np.sum(likely)
-    white = likely[0] > 1 - likely[0]
-    best = 0 if white else int(np.argmin(np.abs(powers - likely @ powers)))
-    error = 1.0 / total
-    if np.argmin(costs) < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
+    best = likeliest(costs, total)
+    spread = 1.0 / np.sqrt(total)
+    if best < len(GRID) - 1:  # at the end of the grid it is a motion, not noise
         # the curvature at the best ρ says too little: far smaller ones may be nearly as likely
-        error += float(likely @ (powers - powers[best]) ** 2)
-    else:
-        best = len(GRID) - 1
-    return float(sigmas[best]), float(GRID[best]), float(np.sqrt(error))
+        likely = np.exp(costs.min() - costs) / len(GRID)
+        likely[0] += np.exp(costs.min() - costs[0])  # white noise is as likely as any other
+        spread = float(np.hypot(spread, _two_thirds(np.abs(powers - powers[best]), likely)))
+    return float(sigmas[best]), float(GRID[best]), min(spread, settings.order_only)
+
+
+def _two_thirds(distances: Array, weights: Array) -> float:
+    """Below which as much of the weight lies as within one standard deviation."""
+    order = np.argsort(distances)
+    share = np.cumsum(weights[order]) / np.sum(weights)
+    return float(np.interp(STANDARD, share, distances[order]))
 
 
 def _against(spectra: list[Spectrum], sigma: float, rho: float, settings: NoiseSettings) -> float:
