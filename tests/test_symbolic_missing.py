@@ -178,3 +178,32 @@ def test_friction_and_drag_are_named_inside_the_ode(law: str, size: float, name:
     alone = extract(found)
     assert dict(alone.forms) == dict(reading.forms) or not alone.ok
     assert -reading.values[0] == pytest.approx(size, abs=5 * reading.std[0])
+
+
+def test_what_is_read_of_a_temperature_goes_into_its_model() -> None:
+    """A room in degC that loses heat by T**2: constants carry units, powers a zero."""
+    from scipy.integrate import solve_ivp
+
+    room = pk.Model.from_dict({
+        "states": {"T": {"unit": "degC", "initial": "free", "guess": 20.0}},
+        "inputs": {"P": {"unit": "W"}},
+        "parameters": {"r": {"unit": "1/s", "guess": 0.04, "bounds": [0.001, 1.0]},
+                       "c": {"unit": "K/s/W", "guess": 0.4, "bounds": [0.001, 1.0]},
+                       "T_a": {"unit": "degC", "value": 10.0}},
+        "equations": {"T": "c*P - r*(T - T_a)"},
+        "outputs": {"y": {"unit": "degC", "expression": "T"}}})
+    t = np.linspace(0.0, 200.0, 400)
+    P = np.interp(t, np.linspace(0.0, 200.0, 14), np.random.default_rng(1).uniform(0.0, 6.0, 14))
+    y = solve_ivp(lambda s, T: 0.5 * np.interp(s, t, P) - 0.02 * (T - 10.0)
+                  - 0.002 * T**2, (0.0, 200.0), [20.0], t_eval=t,
+                  rtol=1e-9, atol=1e-9).y[0]
+    seen = pk.Recording.from_arrays(
+        t, {"P": P, "y": y + 0.01 * np.random.default_rng(2).normal(size=t.size)},
+        {"P": "W", "y": "degC"}, hold={"P": "first"})
+    missing = pk.kan_discrepancy(room, seen, "T", ["T"])
+    read = extract(missing, library=[FORMS["quadratic"], FORMS["logarithm"]], recordings=seen)
+    assert list(read.forms.values()) == ["quadratic"]
+    assert set(read.units.values()) == {"1/(degC*s)"}
+    extended = room.with_term("T", read.expression, read.parameters)
+    fit = pk.NLS(starts=1).fit(extended, seen)
+    assert fit.rmse == pytest.approx(0.01, rel=0.15)

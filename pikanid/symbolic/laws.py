@@ -29,11 +29,26 @@ POINTS = 100  # numerical: that tell apart what is inside a law
 
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """One law on every edge that has one; the parameters' values are those of `fits`."""
+    """One law on every edge that has one; the parameters' values are those of `fits`.
+
+    Attributes:
+        fits: The laws, by place.
+        expression: Their sum, in the model's names.
+        parameters: Its free constants.
+        fixed: Units by which arguments are divided that have to be numbers, and zeros of
+            temperature scales that powers count from.
+    """
 
     fits: Mapping[Place, FormFit]
     expression: sp.Expr
     parameters: tuple[Parameter, ...]
+    fixed: tuple[Parameter, ...] = ()
+
+    @property
+    def numeric(self) -> sp.Expr:
+        """The sum in which arguments are numbers in their units."""
+        return self.expression.xreplace({
+            symbol(p.name): sp.Integer(int(p.value)) for p in self.fixed})
 
     @property
     def label(self) -> str:
@@ -60,7 +75,7 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
         ranges: Of every edge's argument, which bound the parameters inside a law.
         unit: Of the sum, from which the units of the parameters follow; left open if empty.
     """
-    terms, parameters = [], []
+    terms, parameters, fixed = [], [], []
     taken = set(model.symbols)
     for (_, k, _), fit in fits.items():
         tail = re.sub(r"\W+", "_", arguments[k]).strip("_")
@@ -69,29 +84,48 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
         bounds = [(-np.inf, np.inf)] * len(fit.amplitudes)
         bounds += [q.limits(*ranges[k], POINTS) for q in fit.form.knobs]
         argument = model.formula(arguments[k], f"argument '{arguments[k]}'")
-        measured = _units(fit, unit, model_units.of_formula(model, argument)) if unit else (
-            [""] * len(names))
-        for name, value, reach, own in zip(names, [*fit.amplitudes, *fit.inside], bounds, measured,
-                                           strict=True):
-            full = f"{name}_{tail}"
-            while full in taken:
-                full += "_"
-            taken.add(full)
+        measured = [""] * len(names)
+        if unit:
+            own = model_units.of_formula(model, argument)
+            if own and units.begins_elsewhere(own):
+                fixed.append(Parameter(_free_name(f"zero_{tail}", taken), 0.0, own, free=False))
+                argument = argument - symbol(fixed[-1].name)
+            if fit.form.takes_number and own:
+                fixed.append(Parameter(_free_name(f"one_{tail}", taken), 1.0, _distance(own),
+                                       free=False))
+                argument, own = argument / symbol(fixed[-1].name), ""
+            measured = _units(fit, unit, own)
+        for name, value, reach, each in zip(
+                names, [*fit.amplitudes, *fit.inside], bounds, measured, strict=True):
+            full = _free_name(f"{name}_{tail}", taken)
             swap[symbol(name)] = symbol(full)
             inside = float(np.clip(value, *reach))
-            parameters.append(Parameter(full, inside, own, bounds=reach,
+            parameters.append(Parameter(full, inside, each, bounds=reach,
                                         description=f"of {arguments[k]}"))
         bare = fit.form.expression - symbol("d")
         terms.append(bare.xreplace({**swap, X: argument}))
-    return Laws(fits, sp.Add(*terms), tuple(parameters))
+    return Laws(fits, sp.Add(*terms), tuple(parameters), tuple(fixed))
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """The name, with underscores behind it until it is free; it is `taken` from then on."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
 
 
 def _units(fit: FormFit, unit: str, argument: str) -> list[str]:
     """Units of a law's amplitudes and of the constants inside it."""
     outside = [units.product((unit, 1), (argument, -(power or 0))) for power in fit.form.powers]
-    inside = ["" if knob.power is None else units.product((argument, knob.power))
-              for knob in fit.form.knobs]
+    inside = ["" if knob.power is None else _distance(argument) if knob.power == 1
+              else units.product((argument, knob.power)) for knob in fit.form.knobs]
     return [*outside, *inside]
+
+
+def _distance(unit: str) -> str:
+    """The unit of a difference of two arguments."""
+    return f"delta_{unit}" if unit and units.begins_elsewhere(unit) else unit
 
 
 def chosen(named: Mapping[Place, NamedEdge]) -> dict[Place, FormFit]:
@@ -128,7 +162,9 @@ def reading_of_laws(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Seq
         tuple(zip(labels[1:], map(float, share[1:]), strict=False)), float(np.sqrt(off)),
         None if estimate is None else estimate.rmse, float(np.sqrt(size)), float(p_value),
         {place: laws.fits[place].form.name if place in laws.fits else edge.name
-         for place, edge in named.items()}, estimate=estimate, settings=settings)
+         for place, edge in named.items()},
+        {p.name: p.unit for p in laws.parameters}, laws.fixed, estimate=estimate,
+        settings=settings)
 
 
 def reading_unrefitted(laws: Laws, named: Mapping[Place, NamedEdge], arguments: Sequence[str],

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
 from typing import Literal
@@ -23,6 +24,7 @@ from pikanid.symbolic.numeric import Array, Compiled, compiled, slopes
 Kind = Literal["location", "below", "above", "width", "rate", "signed rate", "frequency",
                "exponent"]
 X = symbol("x")
+HALF = Fraction(1, 2)  # definition: of a square root
 MOST_TURNS = 40.0  # limit: radians of a frequency over half the range
 DENSE = 1.5  # limit: of the narrowest feature, in mean distances of samples
 
@@ -89,14 +91,14 @@ class Form:
         family: Forms of one family share its prior probability.
         columns: The f_k(x; p).
         knobs: The p.
-        powers: Power of x's unit in every f_k; None where it follows an exponent.
+        powers: Power of x's unit in every f_k; None where it follows an exponent, or is not known.
     """
 
     name: str
     family: str
     columns: tuple[sp.Expr, ...]
     knobs: tuple[Knob, ...] = ()
-    powers: tuple[int | None, ...] = ()
+    powers: tuple[int | Fraction | None, ...] = ()
 
     @property
     def count(self) -> int:
@@ -108,6 +110,11 @@ class Form:
         """Whether the columns change continuously with the parameters inside."""
         return not any(c.has(sp.sign) and any(k.kind == "location" for k in self.knobs)
                        for c in self.columns)
+
+    @property
+    def takes_number(self) -> bool:
+        """Whether x has to be a number: no factor turns a logarithm's unit into another one."""
+        return any(c.has(sp.log) for c in self.columns)
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
@@ -161,8 +168,8 @@ class Form:
 NOTHING = Form("nothing", "nothing", ())
 
 
-def _form(name: str, family: str, columns: str, knobs: str = "", powers: Sequence[int | None] = ()
-          ) -> Form:
+def _form(name: str, family: str, columns: str, knobs: str = "",
+          powers: Sequence[int | Fraction | None] = ()) -> Form:
     """A form from text: columns separated by ";", knobs as "name kind, name kind"."""
     inside = tuple(Knob(*entry.strip().split(" ", 1))  # type: ignore[arg-type]  # kinds of the table
                    for entry in knobs.split(",") if entry)
@@ -209,9 +216,9 @@ LIBRARY: tuple[Form, ...] = (
     _form("logarithm", "logarithm", "log(x)"),
     _form("shifted logarithm", "logarithm", "log(x - c)", "c below"),
     _form("mirrored logarithm", "logarithm", "log(c - x)", "c above"),
-    _form("square root", "square root", "sqrt(x)", powers=(None,)),
-    _form("shifted square root", "square root", "sqrt(x - c)", "c below", (None,)),
-    _form("mirrored square root", "square root", "sqrt(c - x)", "c above", (None,)),
+    _form("square root", "square root", "sqrt(x)", powers=(HALF,)),
+    _form("shifted square root", "square root", "sqrt(x - c)", "c below", (HALF,)),
+    _form("mirrored square root", "square root", "sqrt(c - x)", "c above", (HALF,)),
     _form("reciprocal", "reciprocal", "1/x", powers=(-1,)),
     _form("shifted reciprocal", "reciprocal", "1/(x - c)", "c below", (-1,)),
     _form("mirrored reciprocal", "reciprocal", "1/(x - c)", "c above", (-1,)),
@@ -265,7 +272,20 @@ def user_form(expression: sp.Expr | str, argument: str = "x", name: str | None =
                   for s in rest if s not in linear)
     swapped = tuple(c.xreplace({own: X}) for c in columns)
     label = name or str(expr)
-    return Form(label, label, swapped, knobs, (None,) * len(swapped))
+    alike = [X, *(symbol(k.name) for k in knobs if k.kind == "location")]
+    return Form(label, label, swapped, knobs, tuple(_power(c, alike) for c in swapped))
+
+
+def _power(column: sp.Expr, alike: Sequence[sp.Symbol]) -> Fraction | None:
+    """The power of x's unit that a column has where others of its symbols have that unit as well.
+
+    >>> _power(parse("sqrt(x - c)", {"x", "c"}, "a candidate"), [X, symbol("c")])
+    Fraction(1, 2)
+    """
+    by = sp.Symbol("by", positive=True)
+    ratio = sp.simplify(column.xreplace({s: by * s for s in alike}) / column)
+    degree = sp.nsimplify(sp.simplify(sp.log(ratio) / sp.log(by)))
+    return Fraction(int(degree.p), int(degree.q)) if degree.is_Rational else None
 
 
 def _shifts(expr: sp.Expr, x: sp.Symbol, s: sp.Symbol) -> bool:

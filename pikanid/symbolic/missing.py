@@ -167,7 +167,8 @@ def _simpler(edge: NamedEdge, form: Form) -> list[FormFit]:
 
 
 def _extended(found: Discrepancy, law: Laws) -> Model:
-    return found.nominal.fitted_model.with_term(found.equation, law.expression, law.parameters)
+    return found.nominal.fitted_model.with_term(found.equation, law.expression,
+                                                [*law.parameters, *law.fixed])
 
 
 def _score(estimate: Estimate) -> float:

@@ -48,6 +48,8 @@ class Reading:
             None without data.
         forms: The form chosen for every edge.
         units: Of the constants, "" where not known.
+        fixed: Units by which arguments are divided that have to be numbers, and zeros of
+            temperature scales that powers count from.
         kan, composition, theta: The network that was read, pruned, and the formula in its places
             with all its constants.
         estimate: Of the model with the formula in it, where it was refitted inside an ODE.
@@ -71,6 +73,7 @@ class Reading:
     p_value: float | None
     forms: Mapping[Place, str]
     units: Mapping[str, str] = field(default_factory=dict)
+    fixed: tuple[Parameter, ...] = ()
     kan: Any = field(default=None, repr=False)
     composition: Composition | None = field(default=None, repr=False)
     theta: Array = field(default_factory=lambda: np.empty(0), repr=False)
@@ -94,18 +97,20 @@ class Reading:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The constants as parameters of a model, free, at their values.
+        """The constants as parameters of a model, free, at their values, and what is fixed.
 
         `model.with_term(equation, reading.expression, reading.parameters)` adds what was read.
         """
-        return tuple(Parameter(n, float(v), self.units.get(n, ""), description="read from a KAN")
-                     for n, v in zip(self.names, self.values, strict=True))
+        return (*(Parameter(n, float(v), self.units.get(n, ""), description="read from a KAN")
+                  for n, v in zip(self.names, self.values, strict=True)), *self.fixed)
 
     @property
     def numeric(self) -> sp.Expr:
         """The formula with numbers in it."""
-        return self.expression.xreplace({
-            symbol(n): sp.Float(float(v)) for n, v in zip(self.names, self.values, strict=True)})
+        swap = {symbol(n): sp.Float(float(v))
+                for n, v in zip(self.names, self.values, strict=True)}
+        swap |= {symbol(p.name): sp.Integer(int(p.value)) for p in self.fixed}
+        return self.expression.xreplace(swap)
 
     def __call__(self, x: Array) -> Array:
         """The formula at inputs (M, n), which must lie in their ranges to mean anything.

@@ -7,19 +7,19 @@ estimated anew inside the equation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 
-from pikanid.formula import units
+import sympy as sp
+
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
-from pikanid.mismatch.beyond.patch import Difference
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.settings.settings import Settings
-from pikanid.model.parts import Input, Parameter, State
+from pikanid.model.parts import Parameter
 from pikanid.symbolic.fitting import FormFit
-from pikanid.symbolic.laws import Laws, sum_of_laws
+from pikanid.symbolic.laws import sum_of_laws
 from pikanid.symbolic.library import NOTHING
 from pikanid.symbolic.naming import name_curve
 from pikanid.symbolic.search import shortlist
@@ -59,32 +59,16 @@ def _forms(edge: Edge, settings: Settings) -> list[FormFit]:
 
 def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entries) -> Candidate:
     law = sum_of_laws(site.model, [edge.argument], {(0, 0, 0): fit},
-                      [(edge.curve.low, edge.curve.high)])
-    channels: list[State | Input] = [*site.model.states, *site.model.inputs]
-    unit = next(c.unit for c in channels if c.name == edge.argument)
-    distance = Difference.of(edge.argument, unit, site.name("zero"))
-    argument = symbol(edge.argument)
-    moved = argument - sum(symbol(zero.name) for zero in distance.zeros)
-    expression = law.expression.xreplace({argument: moved})
-    parameters = tuple(_with_units(law, site, distance, fit))
+                      [(edge.curve.low, edge.curve.high)], site.force_unit)
+    parameters, force = law.parameters, sp.Integer(0)
     if constant:
-        force = Parameter(site.name("force_0"), 0.0, site.force_unit)
-        parameters = (*parameters, force)
-        expression = expression + symbol(force.name)
-    text = str(expression)
+        parameters = (*parameters, Parameter(site.name("force_0"), 0.0, site.force_unit))
+        force = symbol(parameters[-1].name)
+    expression, text = law.expression + force, str(law.numeric + force)
     alone = named.get((fit.form.name, edge.argument))
     covers: dict[str, dict[str, float]] = {alone: {}, named[CONSTANT]: {}} if alone else {}
     return Candidate((SYMBOLIC + text,), f"a law {text}", text, "dynamics", site, parameters,
-                     lambda m: site.pushed(m.with_parameters(*distance.zeros), expression),
+                     lambda m: site.pushed(m.with_parameters(*law.fixed), expression),
                      lambda view: (),
                      covers=covers, static=True)
 
-
-def _with_units(law: Laws, site: Site, distance: Difference, fit: FormFit) -> Iterator[Parameter]:
-    own = distance.unit
-    powers = [(site.force_unit, 1, -(p or 0)) for p in fit.form.powers]
-    found = [units.product((unit, one), (own, power)) for unit, one, power in powers]
-    found += ["" if k.power is None else distance.distance if k.power == 1
-              else units.product((own, k.power)) for k in fit.form.knobs]
-    for parameter, unit in zip(law.parameters, found, strict=True):
-        yield replace(parameter, unit=unit)
