@@ -49,7 +49,7 @@ class NoiseSettings:
     begins: Annotated[tuple[Share, Share], ASCENDING] = (0.25, 0.6)
     line: Amount = 7.0
     order_only: Amount = 0.6
-    least_spectrum: Count = 200
+    least_spectrum: Count = 60
     less: Amount = 2.0
     same: Amount = 0.05
     same_correlation: Share = 0.06
