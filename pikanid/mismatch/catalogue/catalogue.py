@@ -61,6 +61,7 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.one_way_friction, ("dry friction", "constant force")),
     (decoys.stribeck_friction, ("dry friction",)),
     (decoys.dissipating_wall, ("restoring force",)),
+    (decoys.rigid_stop, ("restoring force",)),
     (decoys.velocity_coupled_drive, ("input curve",)),
     (decoys.soft_saturation, ("input curve",)),
     (decoys.clock_error, ("timing",)),
@@ -74,7 +75,8 @@ FORCES: frozenset[Make] = frozenset((
     friction.amplitude_damping, friction.boundary_layer, friction.hysteresis,
     forces.cubic_stiffness, forces.free_spring, forces.static_bias, forces.wall_impact,
     decoys.even_stiffness, decoys.quintic_stiffness, decoys.linear_stiffness,
-    decoys.one_way_friction, decoys.stribeck_friction, decoys.dissipating_wall))
+    decoys.one_way_friction, decoys.stribeck_friction, decoys.dissipating_wall,
+    decoys.rigid_stop))
 
 
 def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[Candidate, ...]:

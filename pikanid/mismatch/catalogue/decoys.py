@@ -22,6 +22,7 @@ from pikanid.model.parts import Parameter
 from pikanid.problem.held import HeldInput, acting
 
 RISING = (0.025, 0.075, 0.25)  # numerical: of the usual speed, below which friction rises
+BRIEFER = 25.0  # numerical: times as stiff as what is touched for one sample
 PARTS = 8  # numerical: of a step, at which a ramp within it is looked at
 Shape = Callable[[View], np.ndarray]
 
@@ -122,8 +123,7 @@ def stribeck_friction(site: Site) -> list[Candidate]:
 
 
 def dissipating_wall(site: Site) -> list[Candidate]:
-    """A stop that takes energy out: k δ (1 + α δ'), δ how deep the wall gives way; in the limit of
-    a stiff one a stop of some restitution.
+    """A stop that takes energy out: k δ (1 + α δ'), δ how deep the wall gives way.
 
     K. H. Hunt and F. R. E. Crossley, J. Appl. Mech. 42, 1975.
     """
@@ -141,8 +141,26 @@ def dissipating_wall(site: Site) -> list[Candidate]:
     return found
 
 
-def _pushing(site: Site, text: str) -> Callable[[Model], Model]:
-    return lambda m: site.pushed(m, text)
+def rigid_stop(site: Site) -> list[Candidate]:
+    """A stop of constant restitution: of a wall that touches for a sample at most, whatever its
+    stiffness.  It pushes less on the way back, by the share of the energy that it takes.
+    """
+    found = []
+    for wall in (w for w in wall_impact(site) if w.variant != BOTH):
+        w, k = wall.parameters
+        stiff = Parameter(site.name("k_stop"), BRIEFER * k.bounds[1], k.unit, free=False)
+        lost = Parameter(site.name("lost"), 0.3, "", (0.0, 1.0))
+        text = (f"({wall.expression.replace(k.name, stiff.name)})*(1 - {lost.name}"
+                f"*(1 {'+' if wall.variant else '-'} sign({site.v}))/2)")
+        found.append(Candidate(
+            ("rigid_stop",), "impact on a rigid stop", text, "dynamics", site, (w, lost),
+            _pushing(site, text, stiff), lambda view: [], wall.variant, known=False,
+            other_minima=wall.other_minima, covers={wall.key: {}}))
+    return found
+
+
+def _pushing(site: Site, text: str, *fixed: Parameter) -> Callable[[Model], Model]:
+    return lambda m: site.pushed(m.with_parameters(*fixed), text)
 
 
 def velocity_coupled_drive(site: Site) -> list[Candidate]:

@@ -44,12 +44,17 @@ class Weighed:
 @dataclass(frozen=True)
 class Explanations:
     """Explanations, the best first, what χ² is divided by, and the best one that predicts most of
-    what the nominal model misses, if there is one.
+    what the nominal model misses, if one of those that are not unlikely does.
     """
 
     weighed: tuple[Weighed, ...]
     overdispersion: float
     lead: Weighed | None
+
+    @property
+    def best(self) -> Hypothesis:
+        """What leads, or would if it predicted enough."""
+        return (self.lead or self.weighed[0]).hypothesis
 
 
 def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
@@ -77,9 +82,9 @@ def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
             nominal.predicted.rest), settings.least_proof):
         return None
     found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
-    # of the explanations that predict most of what the nominal model misses
-    return Explanations(tuple(found), counts,
-                        next((w for w in found if not smaller(w.share, rule.share)), None))
+    return Explanations(tuple(found), counts, next(
+        (w for w in found if not smaller(w.share, rule.share)
+         and not smaller(w.weight, rule.rate * found[0].weight)), None))
 
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -88,8 +93,9 @@ def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
-    """The best lasting hypotheses, the best ones without each family of the first and those with
-    another member of it, those that need none of its channels, and the nominal model.
+    """The best lasting hypotheses, the best ones without each family of the first, those with
+    another member of it, beside its own and in its place, those that need none of its channels, and
+    the nominal model.
     """
     left = lasting(ranked)
     chosen = left[: rule.pool]
@@ -98,7 +104,9 @@ def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
         apart = {h.fit: members(kind, h, rule.dry) for h in left}
         own = {e.key for e in apart[first.fit]} if first else set()
         chosen += [h for h in left if not apart[h.fit]][: rule.rivals]
-        chosen += [h for h in left if any(e.key not in own for e in apart[h.fit])][: rule.rivals]
+        others = [h for h in left if any(e.key not in own for e in apart[h.fit])]
+        chosen += others[: rule.rivals]
+        chosen += [h for h in others if all(e.key not in own for e in apart[h.fit])][: rule.rivals]
     for channel in sorted(needed(first)) if first else ():
         chosen += [h for h in left if channel not in needed(h)][: rule.rivals]
     chosen += [h for h in left if not h.effects]
