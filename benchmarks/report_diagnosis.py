@@ -72,13 +72,13 @@ LATER = 100  # from the seed of one round to that of the next
 
 
 def rounds(chosen: Sequence[Set], count: int) -> list[Set]:
-    """All sets; those of the default mix once for every round, with a seed of its own.
+    """All sets, once for every round, with a seed of its own.
 
-    >>> [(s.name, s.seed) for s in rounds(SETS[2:4], 2)]
-    [('rich_1deg', 20843), ('rich_1deg_2', 20943), ('remainder', 20844)]
+    >>> [(s.name, s.seed) for s in rounds(SETS[2:4], 2)][1:3]
+    [('rich_1deg_2', 20943), ('remainder', 20844)]
     """
     return [replace(one, name=one.name + (f"_{k + 1}" if k else ""), seed=one.seed + LATER * k)
-            for one in chosen for k in range(1 if one.mix else count)]
+            for one in chosen for k in range(count)]
 
 
 def main() -> None:
@@ -101,13 +101,15 @@ def main() -> None:
     parser.add_argument("--only", choices=[*(s.name for s in every), *SECTIONS], nargs="*",
                         help="sets and sections to run; by default all")
     given = parser.parse_args()
-    chosen = rounds(SETS, given.rounds)
+    chosen = [one for one in rounds(SETS, given.rounds)
+              if one.mix is None or one in SETS]
     asked = given.only if given.only is not None else [*(s.name for s in chosen), *SECTIONS]
     path = given.folder / "diagnosis.json"
     kept = json.loads(path.read_bytes()) if path.exists() else {"sets": {}, "sections": {}}
     kinds = [s.name for s in every
              if s.mix is None and (s.name in kept["sets"] or s.name in asked)]
-    others = [s.name for s in SETS if s.mix]
+    others = [s.name for s in every
+              if s.mix and (s in SETS or s.name in kept["sets"] or s.name in asked)]
 
     def keep() -> None:
         found = [s for one in kept["sets"].values() for s in scores(one)]

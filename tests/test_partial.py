@@ -13,7 +13,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.as_estimate import widened
-from pikanid.mismatch.judge.explanations import Weighed
+from pikanid.mismatch.judge.explanations import Explanations, Weighed
 from pikanid.mismatch.judge.kinds import Kind, kinds_of
 from pikanid.mismatch.judge.partial import Doubtful, Part, Present, _examined
 from pikanid.mismatch.report import part as reported_as
@@ -161,7 +161,7 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
         return bool(new)
 
     monkeypatch.setattr(surely, "explanations", lambda *_: SimpleNamespace(
-        lead=SimpleNamespace(hypothesis=lead[0]), weighed=()))
+        lead=SimpleNamespace(hypothesis=lead[0]), weighed=(), leaders=(lead[0],)))
     monkeypatch.setattr(surely, "surely_there", lambda found, *_: Part(
         (), (), found.lead.hypothesis, 1.0, 0.95))
     monkeypatch.setattr(surely, "_compared", compared)
@@ -175,6 +175,14 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
     _, part = surely._sure(case)
     assert part is not None and part.hypothesis is without
     assert tried == [("coulomb_friction",), ("quadratic_drag",), ()]
+
+
+def test_what_is_most_probable_is_reduced_though_it_predicts_too_little_to_lead() -> None:
+    probable, predicts = (weighed(e, 1.0, w) for e, w in (((COULOMB, DRAG), 0.9), ((DRAG,), 0.1)))
+    for lead, wanted in ((predicts, (predicts, probable)), (probable, (probable,)),
+                         (None, (probable,))):
+        found = Explanations((probable, predicts), 1.0, lead)
+        assert found.leaders == tuple(w.hypothesis for w in wanted)
 
 
 @pytest.mark.parametrize("wider", [

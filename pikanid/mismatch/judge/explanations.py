@@ -44,7 +44,7 @@ class Weighed:
 @dataclass(frozen=True)
 class Explanations:
     """Explanations, the best first, what χ² is divided by, and the best one that predicts most of
-    what the nominal model misses, if one of those that are not unlikely does.
+    what the nominal model misses, if there is one.
     """
 
     weighed: tuple[Weighed, ...]
@@ -52,9 +52,11 @@ class Explanations:
     lead: Weighed | None
 
     @property
-    def best(self) -> Hypothesis:
-        """What leads, or would if it predicted enough."""
-        return (self.lead or self.weighed[0]).hypothesis
+    def leaders(self) -> tuple[Hypothesis, ...]:
+        """What leads, and what would if it predicted enough."""
+        first = self.weighed[0].hypothesis
+        lead = self.lead.hypothesis if self.lead else first
+        return (lead,) if lead is first else (lead, first)
 
 
 def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
@@ -82,9 +84,8 @@ def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
             nominal.predicted.rest), settings.least_proof):
         return None
     found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
-    return Explanations(tuple(found), counts, next(
-        (w for w in found if not smaller(w.share, rule.share)
-         and not smaller(w.weight, rule.rate * found[0].weight)), None))
+    return Explanations(tuple(found), counts,
+                        next((w for w in found if not smaller(w.share, rule.share)), None))
 
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:

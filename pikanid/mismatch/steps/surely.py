@@ -76,8 +76,8 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
             break
         explained, part = weighed()
     # nothing of an explanation is sure that was not left out of it, of the last one found neither
-    while explained and search.refine(
-            _without_each_family(lead := explained.best, settings.part.dry), lead.key):
+    while explained and any([search.refine(_without_each_family(h, settings.part.dry), h.key)
+                             for h in explained.leaders]):
         explained, part = weighed()
     if explained is None or part is None:
         return explained, None
