@@ -52,6 +52,17 @@ def test_another_motion_proves_a_spring(hypotheses: tuple[Case, list[Hypothesis]
     assert said == "" and motion > 1e5
 
 
+def test_a_size_that_may_be_nothing_is_not_sure(
+        hypotheses: tuple[Case, list[Hypothesis]], monkeypatch: pytest.MonkeyPatch) -> None:
+    """However much it gains: it stands for something that other parameters nearly do as well."""
+    case, ranked = hypotheses
+    size = ranked[0].values["k3"]
+    for error, sure in ((size / 4.0, True), (size / 2.0, False)):
+        monkeypatch.setattr(Hypothesis, "std", {"k3": error})
+        said, _ = doubt(case, ranked, moved(2))
+        assert sure == (said == "") and sure != ("may be nothing" in said)
+
+
 def test_what_is_at_rest_or_short_proves_nothing(
         hypotheses: tuple[Case, list[Hypothesis]]) -> None:
     for later in (moved(2, 0.0), moved(2).window(0.0, 0.045)):

@@ -124,6 +124,18 @@ def test_outliers_and_gaps_do_not_disturb_the_highest_frequencies() -> None:
     assert noise.high_band_sigma(Channel("y", t, y))[0] == pytest.approx(SIGMA, rel=0.15)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_of_samples_at_any_times(seed: int) -> None:
+    """Drawn at random, and lost at random: nowhere are five intervals alike."""
+    rng = np.random.default_rng(seed)
+    for t in (np.sort(rng.uniform(0.0, 20.0, 400)),
+              np.flatnonzero(rng.random(700) < 0.5)[:300] * 0.05):
+        y = Channel("y", t, np.sin(1.5 * t) + 0.02 * rng.standard_normal(len(t)))
+        sigma, error = noise.high_band_sigma(y)
+        assert sigma == pytest.approx(0.02, abs=3.0 * error + 0.001)
+        assert noise.estimate(y).rho == 0.0
+
+
 def test_claimed_errors_of_the_highest_frequencies() -> None:
     t = np.arange(800) * DT
     results = [

@@ -53,6 +53,8 @@ class Surroundings:
         inputs = [n for n in self.model.input_names if n in self.sizes]
         like = [n for n in (*inputs, *self.channels)
                 if units.convertible(self.unit(n), self.unit(first))]
+        level = [p.name for p in self.model.parameters
+                 if not p.free and p.unit and units.convertible(p.unit, self.unit(first))]
         return {
             "state": [*self.states],
             "other state": [n for n in self.model.state_names if n not in bound.values()],
@@ -64,7 +66,7 @@ class Surroundings:
             "input": inputs,
             "channel": [*self.channels],
             "channel like it": [n for n in like if n in self.channels],
-            "signal like it": like,
+            "signal like it": [*like, *level],
             "parameter": [p for p in self.model.free_names if first in self.model.equations
                           and symbol(p) in self.model.equations[first].free_symbols]}[kind]
 

@@ -17,7 +17,7 @@ parameter with a ``value`` instead of a guess is not estimated.  A coordinate is
 is another state: ``"its rate"``, the place after it, is that one; an angle is a coordinate with a
 unit of angles.  A parameter is one of the equation of the first place; a channel like it, recorded
 and not used by the model, has a unit that converts to its own, and a signal like it may be an input
-of the model as well.
+or a fixed parameter of the model as well, such as the temperature of the surroundings.
 """
 
 from __future__ import annotations

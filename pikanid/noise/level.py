@@ -16,7 +16,8 @@ import numpy as np
 from pikanid import errors
 from pikanid.noise.autoregressive import autocorrelation, fit
 from pikanid.noise.floor import rounding_noise
-from pikanid.noise.quiet import about_mean, about_trend, even_parts, find_quiet, without_moves
+from pikanid.noise.neighbours import beside_neighbours
+from pikanid.noise.quiet import about_mean, about_trend, find_quiet, without_moves
 from pikanid.noise.settings import ROUNDING, USUAL, QuietSettings, RoundingSettings
 from pikanid.recording.channel import Array, Channel, check_times, check_values
 
@@ -119,7 +120,8 @@ def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
 
 def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
                     ) -> tuple[float, float]:
-    """(sigma, its standard error) of white noise under a signal, from fourth differences.
+    """(sigma, its standard error) of white noise under a signal, from what the four neighbours of a
+    sample do not tell of it: of an evenly sampled one, fourth differences.
 
     Fourth differences pass the noise at the highest frequencies and hardly anything of a signal
     that is well sampled: σ² = E(Δ⁴y)²/70 (T. Gasser et al., Biometrika 73, 1986, for difference
@@ -127,7 +129,7 @@ def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
     half the sampling rate, the result is an upper bound.
 
     Raises:
-        BadRecording: If fewer than 8 fourth differences can be formed, or nothing varies.
+        BadRecording: If fewer than 8 samples have four neighbours, or nothing varies.
 
     >>> rng = np.random.default_rng(0)
     >>> t = np.arange(2000) * 0.01
@@ -135,17 +137,16 @@ def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
     >>> round(high_band_sigma(Channel("y", t, y))[0], 2)
     0.1
     """
-    weights = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-    parts = [np.convolve(y, weights, "valid") for _, y in even_parts(channel) if len(y) >= 5]
-    differences = np.concatenate(parts) if parts else np.empty(0)
+    differences = beside_neighbours(channel)
     if len(differences) < 8:
         raise errors.BadRecording(errors.noise_short(channel.name, len(differences) + 4))
-    # 0.6745: the median absolute deviation of a unit Gaussian; 70 = Σ weights².
-    sigma = float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(70.0))
+    # 0.6745: the median absolute deviation of a unit Gaussian
+    sigma = float(np.median(np.abs(differences)) / 0.6745)
     sigma = max(sigma, rounding_noise(channel.values, rounding))
     if sigma == 0:
         raise errors.BadRecording(errors.noise_none(channel.name))
-    lags = np.correlate(weights, weights, "full") / 70.0
+    weights = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+    lags = np.correlate(weights, weights, "full") / np.sum(weights**2)
     # The median uses 37 % of the information; neighbouring differences share samples.
     spread = sigma * np.sqrt(np.sum(lags**2) / 0.37 / (2 * len(differences)))
     return sigma, float(spread)

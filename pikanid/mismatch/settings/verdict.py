@@ -40,6 +40,8 @@ class VerdictSettings:
         needed: [criterion] that each of several effects must gain on held-out recordings.
         once: Share of what an effect that happens once takes away beside others that one that lasts
             may take away in its place.
+        sized: Standard errors from nothing that the size of an effect of one parameter must be:
+            what gains much and still may be nothing stands for something else.
         worse: Times the nominal held-out RMSE: no proof, whatever errors of parameters forgive.
         linear: Standard deviations that a linearisation holds for: beyond, it is renewed.
         missed: [χ²] that a fit to all recordings may exceed fits to each by, where it is best.
@@ -67,6 +69,7 @@ class VerdictSettings:
     shown: Amount = 12.0
     needed: Amount = 4.0
     once: Share = 0.5
+    sized: Amount = 3.0
     worse: Factor = 1.5
     linear: Amount = 3.0
     missed: Amount = 15.0
