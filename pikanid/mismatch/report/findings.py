@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pikanid.estimate import Estimate
+from pikanid.formula.units import parse
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.patch import Patch
@@ -282,5 +283,5 @@ def titles_apart(given: Sequence[Explanation]) -> list[str]:
 def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],
               std: Mapping[str, float], overdispersion: float = 1.0) -> dict[str, Value]:
     """Estimates of an effect's parameters, with variances multiplied by the overdispersion."""
-    return {p.name: Value(values[p.name], std[p.name] * overdispersion**0.5, p.unit)
+    return {p.name: Value(values[p.name], std[p.name] * overdispersion**0.5, parse(p.unit))
             for p in parameters if p.name in values}
