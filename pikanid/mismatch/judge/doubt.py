@@ -49,9 +49,9 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
 
     minor = asks.minor * gained(fits[frozenset()])
     for e in h.effects:
-        if len(e.parameters) == 1:
-            size, error = h.values[e.parameters[0].name], h.std[e.parameters[0].name]
-            if below(abs(size - e.parameters[0].value), asks.sized * error):
+        if len(sizes := [p for p in e.parameters if p.free]) == 1:
+            size, error = h.values[sizes[0].name], h.std[sizes[0].name]
+            if below(abs(size - sizes[0].value), asks.sized * error):
                 return (f"the size of {e.name} may be nothing beside the rest ({size:.3g} with a "
                         f"standard error of {error:.2g})")
         rest = h.key - {e.key}
