@@ -71,4 +71,3 @@ def _candidate(site: Site, edge: Edge, fit: FormFit, constant: bool, named: Entr
                      lambda m: site.pushed(m.with_parameters(*law.fixed), expression),
                      lambda view: (),
                      covers=covers, static=True)
-
