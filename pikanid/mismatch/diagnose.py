@@ -45,8 +45,9 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     so.
 
     Args:
-        model: Nominal model.  Where a state is the rate of another one, physics is looked for in
-            the equation of that rate; without any, in those of all states that reach an output.
+        model: Nominal model.  Where a state is the rate of another one, but for a constant factor,
+            physics is looked for in the equation of that rate; without any, in those of all states
+            that reach an output.
         train: Recording, or several, to explain.
         held_out: Recording, or several, with another excitation, to prove it on.  Without one the
             end of the recording is set aside, and the verdict is at most "unconfirmed".

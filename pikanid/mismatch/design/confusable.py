@@ -26,6 +26,7 @@ from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Model
 from pikanid.model.domains import candidates_of
+from pikanid.model.rates import in_rates
 from pikanid.problem.arguments import a_model, one_recording
 from pikanid.recording import Recording
 
@@ -156,7 +157,8 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
     separated = settings.separated
     if not separated < strength < inf:
         raise errors.BadSetting(errors.bad_value("strength", strength, f"above {separated:g}"))
-    effects, model = candidates_of(a_model(model)), model.replace(effects=())
+    model, _ = in_rates(a_model(model))
+    effects, model = candidates_of(model), model.replace(effects=())
     nothing = recorded(model, one_recording(excitation), sigma, settings)
     found = sites(model, nothing.recordings)
     given = bound_to(effects, found, nothing.recordings, lambda: ranges_along(model, nothing))

@@ -15,6 +15,7 @@ from pikanid.mismatch.catalogue.candidate import Array
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Effect, Model
 from pikanid.model.domains import candidates_of
+from pikanid.model.rates import in_rates
 from pikanid.problem.arguments import a_model, one_recording
 from pikanid.problem.problem import bind
 from pikanid.recording import Recording
@@ -78,7 +79,8 @@ def effects_shown(model: Model, excitation: Recording) -> tuple[ShownEffect, ...
     >>> shown.derivative < 0.01
     True
     """
-    effects, model = candidates_of(a_model(model)), model.replace(effects=())
+    model, _ = in_rates(a_model(model))
+    effects, model = candidates_of(model), model.replace(effects=())
     drive = one_recording(excitation)
     nominal = simulate(model, drive)
     own = bound_to(effects, sites(model, (nominal,)), [nominal], lambda: _ranges(model, nominal))

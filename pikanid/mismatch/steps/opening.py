@@ -27,6 +27,7 @@ from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Effect, Model
 from pikanid.model.domains import candidates_of, taken
+from pikanid.model.rates import in_rates
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
@@ -60,8 +61,9 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     train = beginnings(model, train, "the recording", notes, settings.budget)
     if later is None:
         train, later = set_aside(train, model, notes, settings.noise)
+    model, changes = in_rates(model)
     effects, said = candidates_of(model), taken(model)
-    notes += [said] if said else []
+    notes += [*changes, said] if said else changes
     model = held_as_recorded(model.replace(effects=()), train)
     # a model in which nothing can be looked for is refused before any fit, as a wrong effect is
     catalogue_of(sites(model, train), [e for e in effects if isinstance(e, Effect)])
