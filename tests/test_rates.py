@@ -53,6 +53,23 @@ def test_what_is_no_constant_factor_stays(right: str) -> None:
     assert in_rates(model) == (model, [])
 
 
+@pytest.mark.parametrize("name", sorted(pk.systems.SYSTEMS))
+def test_ready_made_systems_keep_their_states(name: str) -> None:
+    """Some products of reactions, and removed individuals, only add up what a state does."""
+    model = pk.systems.SYSTEMS[name]()
+    assert in_rates(model) == (model, [])
+
+
+def test_a_voltage_is_no_coordinate() -> None:
+    circuit = pk.Model.from_dict({
+        "states": {"v": {"unit": "V", "initial": 0.0}, "i": {"unit": "A", "initial": 0.0}},
+        "inputs": {"u": {"unit": "V"}},
+        "parameters": {"C": {"unit": "F", "guess": 1e-3}, "L": {"unit": "H", "guess": 0.1}},
+        "equations": {"v": "i/C", "i": "(u - v)/L"},
+        "outputs": {"y": {"unit": "V", "expression": "v"}}})
+    assert in_rates(circuit) == (circuit, [])
+
+
 def test_effects_in_the_models_own_states_keep_these() -> None:
     drag = pk.Effect("drag", "drag", (pk.Parameter("c", 0.1, "1/s"),), ("c", 0.0),
                      add={"p": "-c*p"})

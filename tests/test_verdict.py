@@ -58,20 +58,15 @@ def rounded(value: float) -> float:
 
 
 def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothesis:
-    """A fit that leaves χ², at a price of 14 for each effect; how little its noise is known.
-
-    Parameters are 1, with standard errors of 0.01.
-    """
-    names = ["length", "damping", *(p.name for e in effects for p in e.parameters)]
-    count = len(names)
+    """A fit of 1 ± 0.01 that leaves χ², at a price of 14 for each effect; its noise's doubt."""
+    free = [SimpleNamespace(name=n, label=n) for n in (
+        "length", "damping", *(p.name for e in effects for p in e.parameters))]
     r = np.full(ROWS, np.sqrt(chi2 / ROWS))
-    free = [SimpleNamespace(name=n, label=n) for n in names]
-    whitened = cast(Whitened, SimpleNamespace(rows=ROWS, problem=SimpleNamespace(free=free),
-                                              records=SimpleNamespace(spread=spread),
-                                              settings=DEFAULTS))
-    return Hypothesis(tuple(effects), sloshing(), whitened,
-                      Minimum(np.ones(count), r, 100.0 * np.eye(ROWS, count), True),
-                      14.0 * len(effects))
+    whitened = cast(Whitened, SimpleNamespace(
+        rows=ROWS, problem=SimpleNamespace(free=free), records=SimpleNamespace(spread=spread),
+        settings=DEFAULTS))
+    found = Minimum(np.ones(len(free)), r, 100.0 * np.eye(ROWS, len(free)), True)
+    return Hypothesis(tuple(effects), sloshing(), whitened, found, 14.0 * len(effects))
 
 
 def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,

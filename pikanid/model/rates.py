@@ -21,8 +21,9 @@ from pikanid.model.parts import State
 def in_rates(model: Model) -> tuple[Model, list[str]]:
     """The same system, with the rates of coordinates as states; and a sentence for each change.
 
-    A factor may hold parameters, but no state, input or time.  What is a rate already stays as it
-    is, and so does a model that lists effects, which are written in its own states.
+    Coordinates are lengths and angles that their own rate's equation depends on.  A factor may hold
+    parameters, but no state, input or time.  What is a rate already stays as it is, and so does a
+    model that lists effects, which are written in its own states.
 
     >>> model = Model.from_dict({
     ...     "states": {"q": {"initial": 0.1}, "p": {"initial": 0.0}},
@@ -40,14 +41,29 @@ def in_rates(model: Model) -> tuple[Model, list[str]]:
         moved = [n for n in model.state_names if right.has(symbol(n))]
         if len(moved) != 1 or right == symbol(moved[0]) or moved[0] == state.name:
             continue
-        factor = right.diff(symbol(moved[0]))
-        known = {symbol(n) for n in model.parameter_names}
-        if (sp.expand(right - factor * symbol(moved[0])) == 0 and factor.free_symbols <= known
+        factor = _constant(model, right, moved[0])
+        if (factor is not None and _is_place(model, state, moved[0])
                 and symbol(moved[0]) not in model.equations.values()):
             model = _in_rate(model, state, moved[0], factor)
             said.append(f"The rate of '{state.name}' is '{model.equations[state.name]}' = {right}: "
                         "laws are told in it.")
     return model, said
+
+
+def _is_place(model: Model, state: State, moved: str) -> bool:
+    """Whether a state is a length or an angle, or has no unit, and what moves it is held by it: the
+    product of a reaction is no coordinate, and a voltage none of mechanics.
+    """
+    held = model.equations[moved].has(symbol(state.name))
+    return held and (not state.unit or any(units.convertible(state.unit, u) for u in ("m", "rad")))
+
+
+def _constant(model: Model, right: sp.Expr, moved: str) -> sp.Expr | None:
+    """What a state is multiplied by in an equation that holds nothing but parameters besides."""
+    factor = right.diff(symbol(moved))
+    known = {symbol(n) for n in model.parameter_names}
+    alone = sp.expand(right - factor * symbol(moved)) == 0 and factor.free_symbols <= known
+    return factor if alone else None
 
 
 def _in_rate(model: Model, coordinate: State, moved: str, factor: sp.Expr) -> Model:
