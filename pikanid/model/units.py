@@ -96,6 +96,15 @@ def of_formula(model: Lookup, expr: sp.Expr) -> str:
     return Conversion({p.name: p for p in named}).walk(expr, "The formula")[1].text
 
 
+def of_difference(text: str) -> str:
+    """The unit of a difference of two values.
+
+    >>> of_difference("degC"), of_difference("cm"), of_difference("")
+    ('delta_degC', 'cm', '')
+    """
+    return f"delta_{text}" if text and units.begins_elsewhere(text) else text
+
+
 def _input(item: Input, put: Callable[..., sp.Expr]) -> Input:
     own = declared(item.unit)
     return dataclasses.replace(

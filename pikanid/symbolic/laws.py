@@ -91,8 +91,8 @@ def sum_of_laws(model: Model, arguments: Sequence[str], fits: Mapping[Place, For
                 fixed.append(Parameter(_free_name(f"zero_{tail}", taken), 0.0, own, free=False))
                 argument = argument - symbol(fixed[-1].name)
             if fit.form.takes_number and own:
-                fixed.append(Parameter(_free_name(f"one_{tail}", taken), 1.0, _distance(own),
-                                       free=False))
+                fixed.append(Parameter(_free_name(f"one_{tail}", taken), 1.0,
+                                       model_units.of_difference(own), free=False))
                 argument, own = argument / symbol(fixed[-1].name), ""
             measured = _units(fit, unit, own)
         for name, value, reach, each in zip(
@@ -118,14 +118,10 @@ def _free_name(name: str, taken: set[str]) -> str:
 def _units(fit: FormFit, unit: str, argument: str) -> list[str]:
     """Units of a law's amplitudes and of the constants inside it."""
     outside = [units.product((unit, 1), (argument, -(power or 0))) for power in fit.form.powers]
-    inside = ["" if knob.power is None else _distance(argument) if knob.power == 1
-              else units.product((argument, knob.power)) for knob in fit.form.knobs]
+    inside = ["" if knob.power is None else model_units.of_difference(argument)
+              if knob.power == 1 else units.product((argument, knob.power))
+              for knob in fit.form.knobs]
     return [*outside, *inside]
-
-
-def _distance(unit: str) -> str:
-    """The unit of a difference of two arguments."""
-    return f"delta_{unit}" if unit and units.begins_elsewhere(unit) else unit
 
 
 def chosen(named: Mapping[Place, NamedEdge]) -> dict[Place, FormFit]:

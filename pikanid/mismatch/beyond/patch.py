@@ -25,6 +25,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, Spline
+from pikanid.model.units import of_difference
 
 INTERVALS, DEGREE = 5, 3  # numerical: of a law that nobody knows: a few pieces, cubic
 GRID = 201  # numerical: points at which an edge is drawn
@@ -118,7 +119,7 @@ class Difference:
     @property
     def distance(self) -> str:
         """The unit of a distance by itself."""
-        return f"delta_{self.unit}" if self.zeros else self.unit
+        return of_difference(self.unit)
 
     @classmethod
     def of(cls, argument: str, unit: str, name: str) -> Difference:

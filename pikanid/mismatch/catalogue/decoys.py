@@ -14,7 +14,7 @@ import numpy as np
 
 from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Candidate, Parts, TangentDirection, View
-from pikanid.mismatch.catalogue.forces import BOTH, INF, spring, term, wall_impact
+from pikanid.mismatch.catalogue.forces import BOTH, INF, spring, term, wall_force, wall_impact
 from pikanid.mismatch.catalogue.friction import STICKING, sense
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -150,7 +150,7 @@ def rigid_stop(site: Site) -> list[Candidate]:
         w, k = wall.parameters
         stiff = Parameter(site.name("k_stop"), BRIEFER * k.bounds[1], k.unit, free=False)
         lost = Parameter(site.name("lost"), 0.3, "", (0.0, 1.0))
-        text = (f"({wall.expression.replace(k.name, stiff.name)})*(1 - {lost.name}"
+        text = (f"({wall_force(site, w.name, stiff.name, wall.variant)})*(1 - {lost.name}"
                 f"*(1 {'+' if wall.variant else '-'} sign({site.v}))/2)")
         found.append(Candidate(
             ("rigid_stop",), "impact on a rigid stop", text, "dynamics", site, (w, lost),
