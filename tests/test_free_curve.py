@@ -59,18 +59,18 @@ def test_a_curve_of_the_sensor_explains_what_no_cubic_does() -> None:
         "theta", function="theta + 0.03*sin(13*theta + 0.4)"))
     cubic = fitted(base.model, sensor_nonlinearity(site), base.whitened.records, [base.point], 1)
     assert cubic is not None
-    found = with_free_sensor(base.model, cubic, site)
+    found = with_free_sensor(base.model, cubic, cubic.effects, site)
     assert found is not None and cubic.minimum.chi2 > 1.2 * cubic.whitened.rows
     assert found.minimum.chi2 == pytest.approx(found.whitened.rows, rel=0.1)
 
 
 def test_a_curve_of_an_input_explains_how_it_saturates_softly() -> None:
     base, site = fitted_to(pk.systems.sloshing().map_input("u_x", function="3*tanh(u_x/3)"))
-    found = with_free_input(base.model, base, "u_x", site)
+    found = with_free_input(base.model, base, (), "u_x", site)
     assert found is not None and base.minimum.chi2 > 1.5 * base.whitened.rows
     assert found.minimum.chi2 == pytest.approx(found.whitened.rows, rel=0.1)
 
 
 def test_an_input_at_rest_has_no_curve() -> None:
     base, site = base_of("0")
-    assert with_free_input(base.model, base, "u_z", site) is None
+    assert with_free_input(base.model, base, (), "u_z", site) is None

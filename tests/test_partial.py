@@ -28,6 +28,11 @@ from pikanid.reporting.diagnosis_page import page
 RULE = DEFAULTS.part
 
 
+def never(*_: object) -> float:
+    """An effect that does not act again in the train recordings."""
+    return 0.0
+
+
 def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool = True,
            twin: str = "", parts: Any = None) -> Candidate:
     return cast(Candidate, SimpleNamespace(
@@ -53,7 +58,7 @@ def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: f
 
 
 def examined(*found: Weighed, family: Any = "dry friction") -> Present | Doubtful:
-    return _examined(Kind(family, "v"), found[0], found, RULE, DEFAULTS.least_proof)
+    return _examined(Kind(family, "v"), found[0], found, RULE, DEFAULTS.least_proof, never)
 
 
 def test_a_family_that_dominates_is_there_and_has_a_name() -> None:
@@ -79,7 +84,7 @@ def test_a_scale_error_has_to_dominate_far_more(left: float, sure: bool) -> None
     """Free stiffness and damping take up their share of what is missing, and nothing its gain."""
     gain = effect("sensor_gain", "gain")
     found = _examined(Kind("gain", ""), lead := weighed((gain,), 1.0, 0.999),
-                      [lead, weighed((DRAG,), left, 0.001)], RULE, DEFAULTS.least_proof)
+                      [lead, weighed((DRAG,), left, 0.001)], RULE, DEFAULTS.least_proof, never)
     assert isinstance(found, Present) is sure
     other = examined(weighed((COULOMB,), 1.0, 0.999), weighed((DRAG,), left, 0.001))
     assert isinstance(other, Present)
@@ -167,7 +172,7 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
     monkeypatch.setattr(surely, "_compared", compared)
     monkeypatch.setattr(surely, "_one_more", lambda *_: None)
     monkeypatch.setattr(surely, "lasting", lambda _: [first])
-    monkeypatch.setattr(surely, "_against_curves", lambda case, part, noise: part)
+    monkeypatch.setattr(surely, "against_curves", lambda case, found, part, noise: part)
     search = SimpleNamespace(refine=refine, ranked=list, scale=lambda: 1.0)
     records = SimpleNamespace(levels=[{}])
     case: Any = SimpleNamespace(search=search, settings=DEFAULTS, later=records, records=records,

@@ -11,9 +11,11 @@ import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.hypothesis import extended, fitted
-from pikanid.mismatch.judge import prediction
-from pikanid.mismatch.judge.prediction import _from_levels, held_out
+from pikanid.mismatch.judge import prediction, together
+from pikanid.mismatch.judge.doubt import worth
+from pikanid.mismatch.judge.prediction import held_out
 from pikanid.mismatch.judge.prior import Prior, room
+from pikanid.mismatch.judge.together import _from_levels
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.optimise.levenberg_marquardt import Evaluate, Minimum, minimise
@@ -146,7 +148,8 @@ def test_settings_bound_the_fits_to_held_out_recordings(monkeypatch: pytest.Monk
         limits.append(limit)
         return minimise(evaluate, start, lower, upper, limit)
 
-    monkeypatch.setattr(prediction, "minimise", watched)
+    for module in (prediction, together):
+        monkeypatch.setattr(module, "minimise", watched)
     own = DEFAULTS.with_values({"budget.held_out": 4, "budget.beginnings": 5})
     model = pk.systems.sloshing().with_initial(theta="free")
     train, later = (pk.simulate(model, pk.excitation.planar_moves(3, 5.0, seed=seed),
@@ -156,3 +159,20 @@ def test_settings_bound_the_fits_to_held_out_recordings(monkeypatch: pytest.Monk
     assert predicted is not None and set(limits) == {4, 5}
     limits.clear()
     assert predicted.together is not None and limits == [4]
+
+
+def test_what_holds_a_rig_at_rest_is_not_idle() -> None:
+    """Nothing acts there, but without friction the rig would move."""
+    model = pk.systems.sloshing()
+    rig = model.with_term("theta_dot", "-2*sign(theta_dot)")
+    t = np.arange(800) / 100
+    weak = pk.Recording.from_arrays(t, {"u_x": 0.05 * np.sin(3 * t)}, {"u_x": "m/s^2"})
+    train, later = (pk.simulate(rig, run, sigma=0.002, seed=seed) for seed, run in enumerate((
+        pk.excitation.planar_moves(8, 10.0, seed=1), weak)))
+    case = open_case(model, (train,), (later,), None, lambda text: None, DEFAULTS)
+    friction = next(c for c in case.candidates if c.key == "coulomb_friction")
+    found = fitted(case.model, [friction], case.records, [{"c": 1.8}], 30)
+    assert found is not None and found.values["c"] == pytest.approx(2.0, abs=0.1)
+    held, moved = (case.predicted(h) for h in (found, case.base))
+    assert held is not None and moved is not None and held.motion < 1.0 and not held.inert
+    assert worth(friction, held, moved) > 10 * DEFAULTS.least_proof

@@ -35,27 +35,32 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
         h.whitened.records, [h.point], 1, settled=h.key)) is not None), None)
 
 
-def with_free_input(nominal: Model, h: Hypothesis, name: str, site: Site) -> Hypothesis | None:
-    """A hypothesis and a free curve of an input in what acts, refitted from where it stands."""
+def with_free_input(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
+                    site: Site) -> Hypothesis | None:
+    """The same with a free curve of an input in what acts; None where that never changes."""
     problem = h.whitened.problem
     at = nominal.input_names.index(name)
     visited = np.concatenate([e.held[at].values for e in problem.experiments])
-    return _beside(nominal, h, name, visited, nominal.input(name).unit, FreeCurve.of_input, site)
+    return _beside(nominal, h, effects, name, visited, nominal.input(name).unit,
+                   FreeCurve.of_input, site)
 
 
-def with_free_sensor(nominal: Model, h: Hypothesis, site: Site) -> Hypothesis | None:
-    """A hypothesis and a free curve of the site's output in what it shows, refitted."""
+def with_free_sensor(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
+                     site: Site) -> Hypothesis | None:
+    """The same with a free curve of the site's output in what it shows."""
     problem, output = h.whitened.problem, site.output
     visited = np.concatenate([s.y for e in problem.experiments for s in e.samples
                               if problem.model.outputs[s.output].name == output.name])
-    return _beside(nominal, h, output.name, visited, output.unit, FreeCurve.of_sensor, site)
+    return _beside(nominal, h, effects, output.name, visited, output.unit, FreeCurve.of_sensor,
+                   site)
 
 
-def _beside(nominal: Model, h: Hypothesis, name: str, visited: np.ndarray, unit: str,
-            effect: Callable[[FreeCurve, Site], Candidate], site: Site) -> Hypothesis | None:
+def _beside(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
+            visited: np.ndarray, unit: str, curve_of: Callable[[FreeCurve, Site], Candidate],
+            site: Site) -> Hypothesis | None:
     low, high = float(visited.min()), float(visited.max())
     if low == high:
         return None
     curve = FreeCurve(name, low, high, h.model, FINE, unit)
-    return fitted(nominal, [*h.effects, effect(curve, site)], h.whitened.records, [h.point], 1,
+    return fitted(nominal, [*effects, curve_of(curve, site)], h.whitened.records, [h.point], 1,
                   settled=h.key)

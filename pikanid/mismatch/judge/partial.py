@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +10,15 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import worth
+from pikanid.mismatch.judge.doubt import idle, worth
 from pikanid.mismatch.judge.explanations import Explanations, Weighed, dominance
 from pikanid.mismatch.judge.kinds import Kind, holds, kinds_in, members
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import PartSettings
 from pikanid.model.parts import Parameter
+
+# χ² of an effect, from explanations with it and without it
+Again = Callable[[Candidate, Hypothesis, Hypothesis], float]
 
 
 @dataclass(frozen=True)
@@ -87,18 +90,21 @@ class Part:
     share: float
 
 
-def surely_there(explained: Explanations, scale: float, settings: Settings) -> Part | None:
+def surely_there(explained: Explanations, scale: float, settings: Settings,
+                 again: Again = lambda effect, one, other: 0.0) -> Part | None:
     """What is there whatever the remainder is; None where nothing is sure.
 
     Args:
         explained: Explanations, weighed.
         scale: That divides χ², as far as the train recordings tell.
         settings: What is asked.
+        again: χ² that an effect that does not act in the held-out recordings is worth where it acts
+            again in the train recordings.
     """
     rule, found, lead = settings.part, explained.weighed, explained.lead
     if lead is None:
         return None
-    examined = [_examined(kind, lead, found, rule, scale * settings.least_proof)
+    examined = [_examined(kind, lead, found, rule, scale * settings.least_proof, again)
                 for kind in kinds_in(lead.hypothesis, rule.dry)]
     present = [p for p in examined if isinstance(p, Present)]
     # that a family is there somewhere says no more where a place of it is sure
@@ -125,7 +131,7 @@ def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:
 
 
 def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
-              proof: float) -> Present | Doubtful:
+              proof: float, again: Again) -> Present | Doubtful:
     """A family of the leading explanation: surely there, or why not.
 
     Args:
@@ -134,6 +140,7 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
         found: All explanations, best first.
         rule: What is asked.
         proof: χ² that the family must be worth in the held-out recordings.
+        again: What it is worth within the train recordings.
     """
     holders = [w for w in found if kind.among(w.kinds)]
     others = [w for w in found if not kind.among(w.kinds)]
@@ -153,19 +160,17 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     if smaller(kappa, max((dominance(lead, [w for w in found if not holds(w.hypothesis, e)], rule)
                            for e in lead.hypothesis.effects if not e.known), default=0.0)):
         return Doubtful(kind, effect, "beside it a law outside the catalogue explains more")
-    if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof):
+    if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof) and (
+            not idle(effect, lead.predicted)
+            or below(again(effect, lead.hypothesis, others[0].hypothesis), proof)):
         return Doubtful(kind, effect, "the held-out recording could not have refuted it (it is "
                         f"worth {power:.2g} of chi-squared there, {proof:.2g} are asked)")
-    same = [w for w in holders if holds(w.hypothesis, effect)]
-    # a law that contains the effect is no rival of it, but where that one leaves far less, the
-    # effect's form is another one
-    wider = [w for w in holders if w not in same and any(
-        _contains(e, effect) for e in w.hypothesis.effects)]
-    rivals = [w for w in holders if w not in same and w not in wider]
+    # where a law that contains the effect leaves far less, the effect's form is another one
     other_form = not smaller(lead.left, rule.form * max(min(
-        (w.left for w in wider), default=np.inf), rule.floor))
-    own = sum(w.weight for w in same)
-    within = dominance(lead, rivals, rule)
+        (w.left for w in holders if not holds(w.hypothesis, effect)
+         and _wider(w.hypothesis, effect)), default=np.inf), rule.floor))
+    own = sum(w.weight for w in holders if holds(w.hypothesis, effect))
+    within = dominance(lead, rivals(kind, effect, holders), rule)
     # what needs a law outside the catalogue beside it has no name of its own, and a free exponent
     # takes up what other laws leave
     clearly = rule.dominance if isinstance(effect.exponent, Parameter) else rule.within
@@ -180,7 +185,13 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
                    compared, own, total, kappa, within, lead.share)
 
 
-def _contains(law: Candidate, effect: Candidate) -> bool:
-    """Whether a law has an effect as a special case, or is a sum of which it is one."""
-    sums = law.parts([p.value for p in law.parameters]) if law.parts else ()
-    return effect.key in law.covers or any(effect.key in parts for parts in sums)
+def rivals(kind: Kind, effect: Candidate, found: Iterable[Weighed]) -> list[Weighed]:
+    """Explanations with another effect of a kind; a law that contains the effect is no rival."""
+    return [w for w in found if kind.among(w.kinds) and not holds(w.hypothesis, effect)
+            and not _wider(w.hypothesis, effect)]
+
+
+def _wider(h: Hypothesis, effect: Candidate) -> bool:
+    """Whether one of its laws has an effect as a special case, or is a sum of which it is one."""
+    return any(effect.key in law.covers or any(effect.key in parts for parts in (
+        law.parts([p.value for p in law.parameters]) if law.parts else ())) for law in h.effects)

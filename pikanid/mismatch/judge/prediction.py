@@ -17,6 +17,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis, extended
 from pikanid.mismatch.fitting.progressive_horizon import besides, progressive_horizon, rough
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit, room
+from pikanid.mismatch.judge.together import fitted_together, part_of, tested_together
 from pikanid.model import Model
 from pikanid.noise.projection import project
 from pikanid.optimise.levenberg_marquardt import Minimum, minimise
@@ -119,7 +120,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     movable = found.movable(whitened.problem.lower, whitened.problem.upper)
     tests = functools.partial(residual_tests, whitened, found.theta, found.r, movable, candidates,
                               rate)
-    together = functools.partial(_tested_together, hypothesis, whitened, found, candidates, rate)
+    together = functools.partial(tested_together, hypothesis, whitened, found, candidates, rate)
     predicted, gaps = _shown(whitened, guess)
     moved, closer = _shown(whitened, found.theta)
     left = project(movable, found.r)  # corners, as of a wall hardly touched, may have stopped it
@@ -132,7 +133,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     return HeldOut(_rmse(residuals), float(np.sqrt(np.mean(sized**2))), tests, together, chi2,
                    chi2 + room(found.J, shared, fit), samples.t, samples.y, predicted, moved,
                    _rmse(_residuals(whitened, closer)), residuals, found.r[: whitened.rows],
-                   _inert(whitened, found), _motion(whitened, gaps))
+                   _inert(whitened, found, nominal), _motion(whitened, gaps))
 
 
 def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared: list[int],
@@ -164,8 +165,8 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
         prior, found = anew, suited(anew, found.theta)
     if suits and found is not None and rough(found.chi2, whitened.rows, effects, settings):
         # a wall that was hardly touched is stiffer than any line from there leads to
-        both = _fitted_together(hypothesis, whitened, found, whitened.rows)
-        begin = None if both is None else _part(both, whitened)
+        both = fitted_together(hypothesis, whitened, found, whitened.rows)
+        begin = None if both is None else part_of(both, whitened)
         anew = None if begin is None else elsewhere(prior, hypothesis, begin[shared])
         other = None if begin is None or anew is None else suited(anew, begin)
         if anew and other and other.chi2 + anew.constant < found.chi2 + prior.constant:
@@ -173,11 +174,15 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
     return found, prior
 
 
-def _inert(whitened: Whitened, found: Minimum) -> frozenset[str]:
-    """Names of the parameters whose whole size changes the residual by less than one row of it."""
+def _inert(whitened: Whitened, found: Minimum, nominal: Model) -> frozenset[str]:
+    """Names of the parameters whose whole size changes the residual by less than one row of it;
+    none where none of the nominal model does: what holds a rig at rest is not idle.
+    """
     acts = np.linalg.norm(found.J[: whitened.rows], axis=0) * np.abs(found.theta)
     free = whitened.problem.free
-    return frozenset(f.name for f, size in zip(free, acts, strict=True) if size < 1)
+    inert = frozenset(f.name for f, size in zip(free, acts, strict=True) if size < 1)
+    own = {f.name for f in free if f.recording is None} & set(nominal.free_names)
+    return inert if own - inert else frozenset()
 
 
 def _motion(whitened: Whitened, gaps: Sequence[np.ndarray]) -> float:
@@ -220,81 +225,3 @@ def _residuals(whitened: Whitened, gaps: list[np.ndarray]) -> Iterator[Residual]
             name = whitened.problem.model.outputs[s.output].name
             yield r, name, s.t, gap[first:first + len(s.t)]
             first += len(s.t)
-
-
-def _tested_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum,
-                     candidates: tuple[Candidate, ...], rate: float) -> Detection | None:
-    """Test what a hypothesis leaves in the recordings that it was fitted to and in others, all
-    fitted at once: what is weak in each of them adds up where it is the same in all.
-
-    The fit begins where that of the held-out ones alone ended.
-    """
-    if (both := _fitted_together(hypothesis, later, apart, apart.chi2)) is None:
-        return None
-    problem, found = both[0].problem, both[1]
-    movable = found.movable(problem.lower, problem.upper)
-    return residual_tests(both[0], found.theta, found.r, movable, candidates, rate)
-
-
-def _fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, left: float
-                     ) -> tuple[Whitened, Minimum] | None:
-    """One fit of all recordings, of which the later ones alone leave χ² of about `left`; none of
-    what happens once: that is not the same in all.
-    """
-    if any(e.absent for e in hypothesis.effects):
-        return None
-    first = hypothesis.whitened
-    count = len(first.records.recordings)
-    whitened = Whitened(hypothesis.model, Records(
-        first.records.recordings + later.records.recordings,
-        first.records.levels + later.records.levels, first.settings))
-    whitened.step_as(first, later)
-    own = {(f.name, f.recording): v for f, v in zip(
-        first.problem.free, hypothesis.minimum.theta, strict=True)}
-    own |= {(f.name, None if f.recording is None else f.recording + count): v
-            for f, v in zip(later.problem.free, apart.theta, strict=True)}
-    problem = whitened.problem
-    start = np.array([own[f.name, f.recording] for f in problem.free])
-    found = minimise(whitened.residual, start, problem.lower, problem.upper,
-                     first.settings.budget.held_out)
-    if found is None:
-        return None
-    if found.chi2 > hypothesis.minimum.chi2 + left + first.settings.verdict.missed:
-        found = _from_levels(whitened, hypothesis, found)
-    return whitened, found
-
-
-def _part(both: tuple[Whitened, Minimum], later: Whitened) -> np.ndarray:
-    """θ (n,) of the later recordings in a fit of all."""
-    whitened, found = both
-    first = len(whitened.simulators) - len(later.simulators)
-    values = {(f.name, f.recording): v
-              for f, v in zip(whitened.problem.free, found.theta, strict=True)}
-    return np.array([values[f.name, None if f.recording is None else f.recording + first]
-                     for f in later.problem.free])
-
-
-def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> Minimum:
-    """The closest of fits that begin where laws without a first step to them may act: a wall that
-    was touched once can be soft or hard, and only other recordings tell which.
-    """
-    problem = whitened.problem
-
-    def at(theta: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
-        both = zip(problem.free, theta, strict=True)
-        return np.array([values.get(f.name, v) for f, v in both])
-
-    for effect in hypothesis.effects:
-        # where a law does not act at all, others do as well
-        seen = {whitened.chi2(theta): theta
-                for theta in (at(found.theta, level) for level in effect.levels)}
-        for chi2 in sorted(seen)[:whitened.settings.budget.levels]:
-            theta, name = seen[chi2], effect.parameters[0].name
-            size = next(v for f, v in zip(problem.free, theta, strict=True) if f.name == name)
-            beside = [at(theta, {name: share * size}) for share in (1.0, *effect.other_minima)]
-            theta = min(beside, key=whitened.chi2)
-            if whitened.choose_steps(theta):
-                other = minimise(whitened.residual, theta, problem.lower, problem.upper,
-                                 whitened.settings.budget.held_out)
-                found = min(found, other or found, key=lambda m: m.chi2)
-    return found

@@ -136,6 +136,8 @@ class PartSettings:
         rivals: Explanations without a family that are compared with the best one with it.
         pool: Explanations that are looked at, the best first.
         dry: Exponent of the speed at or below which a force is dry friction.
+        all_of: Effects that may be said to be all that is missing without each being sure whatever
+            is left.
     """
 
     rate: Rate = 0.01
@@ -150,6 +152,7 @@ class PartSettings:
     rivals: Count = 6
     pool: Count = 10
     dry: Amount = 0.3
+    all_of: Count = 2
 
     @property
     def dominance(self) -> float:

@@ -1,0 +1,140 @@
+"""What is there still once free curves stand for laws that nobody has listed.
+
+A family is not sure where a free curve in its place leaves little more, of a state, an input or an
+output that its members do not depend on: a magnet is no friction with a memory, and an amplifier
+that bends is no mode.  A name is not where a free curve beside it, of what it depends on, leaves
+far less: then its form is another one; nor, where something is left that a curve may stand for,
+where another member of its family does as well once a curve stands beside either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pikanid.mismatch.beyond.free_curve import (
+    with_free_curve,
+    with_free_input,
+    with_free_sensor,
+)
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.fitting.decisions import smaller
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.explanations import Explanations
+from pikanid.mismatch.judge.kinds import members
+from pikanid.mismatch.judge.left_over import left_in_train, left_over
+from pikanid.mismatch.judge.partial import Doubtful, Part, Present, rivals
+from pikanid.model import Model
+
+RIVALS = 2  # numerical: other members of a family that are tried with a curve beside them
+
+
+def against_curves(case: Case, explained: Explanations, part: Part,
+                   noise: Sequence[dict[str, float]]) -> Part:
+    """The part without families and names that free curves do as well without.
+
+    Args:
+        case: What is diagnosed.
+        explained: Explanations, weighed.
+        part: What is sure among them.
+        noise: σ of each output by name, in the train and in the held-out recordings.
+    """
+    h, rule = part.hypothesis, case.settings.part
+    before = case.predicted(h)
+    if before is None:
+        return part
+    own_left = max(left_over(h, before, noise), rule.floor)
+    present, doubtful = [], list(part.doubtful)
+    for p in part.present:
+        own = members(p.kind, h, rule.dry)
+        asked = rule.dominance_of(p.family)
+        if own:
+            rest = [e for e in h.effects if e not in own]
+            kappa = _least(case, _in_its_place(case.model, h, p, rest), noise,
+                           p.dominance * own_left) / own_left
+            if smaller(kappa, asked):
+                doubtful.append(Doubtful(
+                    p.kind, p.effect, "a free curve of what it does not depend on leaves "
+                    f"{kappa:.2g} times as much in its place, {asked:.2g} are asked"))
+                continue
+            if p.names and not _has_its_form(case, explained, h, p, own_left, noise):
+                p = replace(p, names=())
+            p = replace(p, dominance=min(p.dominance, kappa))
+        present.append(p)
+    return replace(part, present=tuple(present), doubtful=tuple(doubtful))
+
+
+def _has_its_form(case: Case, explained: Explanations, h: Hypothesis, p: Present, own_left: float,
+                  noise: Sequence[dict[str, float]]) -> bool:
+    """Whether a named effect is what its family's member is, whatever stands beside it."""
+    rule = case.settings.part
+    enough = own_left / rule.form
+    if not smaller(enough, _least(case, _with_its_form_free(case.model, h, p), noise, enough)):
+        return False
+    others = [w.hypothesis for w in rivals(p.kind, p.effect, explained.weighed)[:RIVALS]]
+    if not others or not smaller(rule.floor, own_left):
+        return True
+    least = max(min(own_left, _least(case, _beside(case.model, h, p), noise, own_left)), rule.floor)
+    return not smaller(_least(case, (found for o in others for found in _beside(case.model, o, p)),
+                              noise, rule.within * least), rule.within * least)
+
+
+def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
+    """An explanation and a free curve of a state."""
+    site = p.effect.site
+    return (with_free_curve(nominal, h, h.effects, s, site) for s in site.moving)
+
+
+def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate],
+                  ) -> Iterator[Hypothesis | None]:
+    """Free curves beside the `rest` of the effects, of what a family's members do not depend on."""
+    site = p.effect.site
+    if p.family == "constant force":
+        return  # a curve holds a constant, too
+    yield from (with_free_curve(nominal, h, rest, s, site)
+                for s in site.moving if s != _argument(p))
+    if p.family == "gain":
+        return  # a curve of a channel has a slope
+    if p.family != "input curve":
+        yield from (with_free_input(nominal, h, rest, u, site) for u in site.inputs)
+    if p.family != "sensor curve":
+        yield with_free_sensor(nominal, h, rest, site)
+
+
+def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
+    """An explanation with a free curve beside a named effect, of what that one's law depends on."""
+    site = p.effect.site
+    if p.family == "input curve":
+        yield from (with_free_input(nominal, h, h.effects, u, site) for u in site.inputs)
+    elif p.family == "sensor curve":
+        yield with_free_sensor(nominal, h, h.effects, site)
+    elif argument := _argument(p):
+        yield with_free_curve(nominal, h, h.effects, argument, site)
+
+
+def _argument(p: Present) -> str:
+    """The state that a family's members depend on; empty where it is none, or several."""
+    site = p.effect.site
+    states = {"dry friction": site.v, "drag": site.v, "restoring force": site.q}
+    return states.get(p.family, p.effect.argument)
+
+
+def _least(case: Case, fits: Iterable[Hypothesis | None], noise: Sequence[dict[str, float]],
+           enough: float) -> float:
+    """What the best of some fits leaves in all recordings; of those that leave more than `enough`,
+    which decides, in the train ones alone that is looked at.
+    """
+    return min((_left(case, found, noise, enough) for found in fits if found is not None),
+               default=np.inf)
+
+
+def _left(case: Case, found: Hypothesis, noise: Sequence[dict[str, float]], enough: float
+          ) -> float:
+    seen = left_in_train(found, noise)
+    if smaller(enough, seen):
+        return seen
+    after = case.predicted(found)
+    return np.inf if after is None else left_over(found, after, noise)

@@ -1,0 +1,77 @@
+"""What held-out recordings cannot speak of: one part of a train recording predicted from the other.
+
+A limit that the held-out motion never meets is neither confirmed nor refuted there.  Where the
+train recording meets it again and again, its second part is one that could have refuted what the
+first one says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.fitting.decisions import below
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, extended, fitted
+from pikanid.mismatch.judge.doubt import worth
+from pikanid.mismatch.judge.prediction import held_out
+
+LEAST = 50  # numerical: samples of either part
+SHARES = (0.5, 0.2, 0.05, 0.01)  # numerical: of what tells fits apart, at which parts are tried
+
+
+def worth_within_train(case: Case, effect: Candidate, with_it: Hypothesis, without: Hypothesis
+                       ) -> float:
+    """χ² that an effect is worth in the second part of each train recording, as predicted from
+    the first part, where it acts in either; 0 where that does not speak for it.
+
+    The second part begins in the middle of a motion, so that its initial state is estimated.
+
+    Args:
+        case: What is diagnosed.
+        effect: That does not act in the held-out recordings.
+        with_it, without: Explanations to be compared, fitted to all of the train recordings.
+    """
+    begins = [c for c in case.candidates if c.ids[0] == "initial_state"]
+    if any(e in begins or e.absent or e.per_recording for e in with_it.effects + without.effects):
+        return 0.0
+    model = extended(case.model, begins)
+    asked = case.settings.verdict.shown * case.search.scale()
+    for first, second in _parts(case.records, with_it, without):
+        one, other = (fitted(model, h.effects, first, [h.point], 1, settled=h.key)
+                      for h in (with_it, without))
+        # what does not act in the first part predicts nothing
+        if one is None or other is None or below(other.minimum.chi2 - one.minimum.chi2, asked):
+            continue
+        a, b = (held_out(h, model, second, case.candidates, case.rate) for h in (one, other))
+        if a is not None and b is not None and below(a.deviance, b.deviance) and (
+                found := worth(effect, a, b)):
+            return found
+    return 0.0
+
+
+def _parts(records: Records, one: Hypothesis, other: Hypothesis
+           ) -> Iterator[tuple[Records, Records]]:
+    """Both parts of all recordings, cut where a share of what tells two fits apart has been seen,
+    as long as neither is too short.
+    """
+    apart = [(np.concatenate([s.t for s in e.samples]), (a.y - b.y) ** 2) for e, a, b in zip(
+        one.whitened.problem.experiments,
+        *(h.whitened.responses(h.minimum.theta) for h in (one, other)), strict=True)]
+    for share in SHARES:
+        cuts = []
+        for t, square in apart:
+            order = np.argsort(t, kind="stable")
+            seen = np.cumsum(square[order])
+            at = int(np.searchsorted(seen, share * seen[-1]))
+            if min(at, len(t) - at) >= LEAST:
+                cuts.append(float(t[order][at]))
+        if len(cuts) == len(apart):
+            yield (replace(records, recordings=tuple(r.window(r.start, cut) for r, cut in zip(
+                       records.recordings, cuts, strict=True))),
+                   replace(records, recordings=tuple(r.window(cut, r.stop) for r, cut in zip(
+                       records.recordings, cuts, strict=True))))

@@ -1,0 +1,83 @@
+"""Families and names that free curves do as well without are not sure."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import pikanid as pk
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.judge.explanations import Explanations
+from pikanid.mismatch.judge.kinds import kinds_of
+from pikanid.mismatch.judge.partial import Part, Present
+from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.search.screen import Screen
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps import surely
+from pikanid.mismatch.steps.against_curves import against_curves
+from pikanid.mismatch.steps.opening import open_case
+
+SIGMA = 0.002
+MODEL = pk.systems.sloshing()
+
+
+def case_of(rig: pk.Model) -> Case:
+    train, later = (pk.simulate(rig, pk.excitation.planar_moves(8, 10.0, seed=seed), sigma=SIGMA,
+                                seed=seed) for seed in (1, 2))
+    return open_case(MODEL, (train,), (later,), None, lambda text: None, DEFAULTS)
+
+
+def judged(case: Case, key: str) -> Part:
+    """What is left of an effect that seemed to be sure, by its name."""
+    own = next(c for c in case.candidates if c.key == key)
+    (_, starts), = Screen(case.base, [own]).singles(1)
+    case.search.refine([((own,), starts)])
+    h = next(h for h in case.search.ranked() if h.key == {key})
+    sure = Present(kinds_of(own, h, DEFAULTS.part.dry)[0], own, own.ids, {}, 1.0, 1.0, 50.0, 50.0,
+                   0.95)
+    return against_curves(case, Explanations((), 1.0, None), Part((sure,), (), h, 1.0, 0.95),
+                          [{"theta": SIGMA}] * 2)
+
+
+def test_an_amplifier_that_bends_is_no_mode() -> None:
+    found = judged(case_of(MODEL.map_input("u_x", function="0.6*tanh(u_x/0.6)")), "second_mode")
+    assert not found.present and "of what it does not depend on" in found.doubtful[0].why
+
+
+def test_no_curve_takes_the_place_of_a_mode() -> None:
+    """Of a state, of the input, of the sensor: a mode is none of them."""
+    case = case_of(MODEL)
+    mode = next(c for c in case.candidates if c.key == "second_mode")
+    rig = mode.applied(MODEL).with_values({"a_2": 20.0, "omega_2": 40.0, "zeta_2": 0.02})
+    found = judged(case_of(rig), "second_mode")
+    assert [p.names for p in found.present] == [("second_mode",)] and not found.doubtful
+
+
+def test_a_limit_keeps_its_name() -> None:
+    found = judged(case_of(MODEL.map_input("u_x", saturation=0.5)), "input_saturation")
+    assert [p.names for p in found.present] == [("input_saturation",)]
+
+
+def effect(name: str) -> Any:
+    return SimpleNamespace(key=name, ids=(name,))
+
+
+@pytest.mark.parametrize(("held", "sure", "verdict"), [
+    ("ab", "", "named"),          # two effects may be all that is missing
+    ("abc", "abc", "named"),      # three are, where each is sure by its name
+    ("abc", "ab", "partial"),     # else it is said which of them are
+    ("abc", "", "unconfirmed")])
+def test_many_effects_are_all_only_where_each_is_sure(
+        monkeypatch: pytest.MonkeyPatch, held: str, sure: str, verdict: str) -> None:
+    h: Any = SimpleNamespace(effects=[effect(name) for name in held])
+    present: Any = tuple(SimpleNamespace(names=(name,)) for name in sure)
+    part = Part(present, (), h, 1.0, 0.95) if sure else None
+    monkeypatch.setattr(surely, "_sure", lambda case: (None, part))
+    monkeypatch.setattr(surely, "sure_channels", lambda *_: ("dynamics",))
+    case: Any = SimpleNamespace(settings=DEFAULTS, proves=True, base=None, candidates=(),
+                                search=SimpleNamespace(ranked=list))
+    found = surely.with_sure_part(case, Answer("named", (h,), ()), h)
+    assert found.verdict == verdict
+    assert bool(found.doubt) == (verdict == "unconfirmed")
