@@ -3,8 +3,8 @@
 A family is not sure where a free curve in its place leaves little more, of a state, an input or an
 output that its members do not depend on: a magnet is no friction with a memory, and an amplifier
 that bends is no mode.  A name is not where a free curve beside it, of what it depends on, leaves
-far less: then its form is another one; nor, where something is left that a curve may stand for,
-where another member of its family does as well once a curve stands beside either.
+far less: then its form is another one; nor where another member of its family does as well once a
+curve stands beside either.
 """
 
 from __future__ import annotations
@@ -71,11 +71,13 @@ def _has_its_form(case: Case, explained: Explanations, h: Hypothesis, p: Present
                   noise: Sequence[dict[str, float]]) -> bool:
     """Whether a named effect is what its family's member is, whatever stands beside it."""
     rule = case.settings.part
-    enough = own_left / rule.form
-    if not smaller(enough, _least(case, _with_its_form_free(case.model, h, p), noise, enough)):
+    if not smaller(rule.floor, own_left):
+        return True  # nothing is left that a curve may stand for
+    freed = _least(case, _with_its_form_free(case.model, h, p), noise, own_left / rule.form)
+    if not smaller(own_left, rule.form * max(freed, rule.floor)):
         return False
     others = [w.hypothesis for w in rivals(p.kind, p.effect, explained.weighed)[:RIVALS]]
-    if not others or not smaller(rule.floor, own_left):
+    if not others:
         return True
     least = max(min(own_left, _least(case, _beside(case.model, h, p), noise, own_left)), rule.floor)
     return not smaller(_least(case, (found for o in others for found in _beside(case.model, o, p)),
