@@ -9,6 +9,7 @@ import numpy as np
 from pikanid.mismatch.beyond.patch import FreeCurve
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.model import Model
 
@@ -17,7 +18,7 @@ PIECES = (FINE, 6, 3)  # numerical: with which a curve is tried, one after the o
 
 
 def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], argument: str,
-                    site: Site) -> Hypothesis | None:
+                    site: Site, near: float = np.inf) -> Hypothesis | None:
     """Effects of a hypothesis and a free curve as a force, refitted from where it stands, with
     fewer pieces where that ends in nothing that can be run; None where no curve can be.
 
@@ -27,40 +28,41 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
         effects: Some of its effects.
         argument: State that the curve is a function of.
         site: Coordinate in whose equation it stands.
+        near: χ² to come near to: a fit that stays far above is not carried through.
     """
     visited = h.whitened.motion(h.minimum.theta)[argument]
     low, high = float(visited.min()), float(visited.max())
     return next((found for pieces in PIECES if (found := fitted(
         nominal, [*effects, FreeCurve(argument, low, high, h.model, pieces).candidate(site)],
-        h.whitened.records, [h.point], 1, settled=h.key)) is not None), None)
+        h.whitened.records, [h.point], 1, Closest(near), h.key)) is not None), None)
 
 
 def with_free_input(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
-                    site: Site) -> Hypothesis | None:
+                    site: Site, near: float = np.inf) -> Hypothesis | None:
     """The same with a free curve of an input in what acts; None where that never changes."""
     problem = h.whitened.problem
     at = nominal.input_names.index(name)
     visited = np.concatenate([e.held[at].values for e in problem.experiments])
     return _beside(nominal, h, effects, name, visited, nominal.input(name).unit,
-                   FreeCurve.of_input, site)
+                   FreeCurve.of_input, site, near)
 
 
 def with_free_sensor(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
-                     site: Site) -> Hypothesis | None:
+                     site: Site, near: float = np.inf) -> Hypothesis | None:
     """The same with a free curve of the site's output in what it shows."""
     problem, output = h.whitened.problem, site.output
     visited = np.concatenate([s.y for e in problem.experiments for s in e.samples
                               if problem.model.outputs[s.output].name == output.name])
     return _beside(nominal, h, effects, output.name, visited, output.unit, FreeCurve.of_sensor,
-                   site)
+                   site, near)
 
 
 def _beside(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
             visited: np.ndarray, unit: str, curve_of: Callable[[FreeCurve, Site], Candidate],
-            site: Site) -> Hypothesis | None:
+            site: Site, near: float) -> Hypothesis | None:
     low, high = float(visited.min()), float(visited.max())
     if low == high:
         return None
     curve = FreeCurve(name, low, high, h.model, FINE, unit)
     return fitted(nominal, [*effects, curve_of(curve, site)], h.whitened.records, [h.point], 1,
-                  settled=h.key)
+                  Closest(near), h.key)

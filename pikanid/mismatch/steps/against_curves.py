@@ -87,34 +87,34 @@ def _has_its_form(case: Case, explained: Explanations, h: Hypothesis, p: Present
 def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
     """An explanation and a free curve of a state."""
     site = p.effect.site
-    return (with_free_curve(nominal, h, h.effects, s, site) for s in site.moving)
+    return (with_free_curve(nominal, h, h.effects, s, site, h.minimum.chi2) for s in site.moving)
 
 
 def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate],
                   ) -> Iterator[Hypothesis | None]:
     """Free curves beside the `rest` of the effects, of what a family's members do not depend on."""
-    site = p.effect.site
+    site, near = p.effect.site, h.minimum.chi2
     if p.family == "constant force":
         return  # a curve holds a constant, too
-    yield from (with_free_curve(nominal, h, rest, s, site)
+    yield from (with_free_curve(nominal, h, rest, s, site, near)
                 for s in site.moving if s != _argument(p))
     if p.family == "gain":
         return  # a curve of a channel has a slope
     if p.family != "input curve":
-        yield from (with_free_input(nominal, h, rest, u, site) for u in site.inputs)
+        yield from (with_free_input(nominal, h, rest, u, site, near) for u in site.inputs)
     if p.family != "sensor curve":
-        yield with_free_sensor(nominal, h, rest, site)
+        yield with_free_sensor(nominal, h, rest, site, near)
 
 
 def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
     """An explanation with a free curve beside a named effect, of what that one's law depends on."""
-    site = p.effect.site
+    site, near = p.effect.site, h.minimum.chi2
     if p.family == "input curve":
-        yield from (with_free_input(nominal, h, h.effects, u, site) for u in site.inputs)
+        yield from (with_free_input(nominal, h, h.effects, u, site, near) for u in site.inputs)
     elif p.family == "sensor curve":
-        yield with_free_sensor(nominal, h, h.effects, site)
+        yield with_free_sensor(nominal, h, h.effects, site, near)
     elif argument := _argument(p):
-        yield with_free_curve(nominal, h, h.effects, argument, site)
+        yield with_free_curve(nominal, h, h.effects, argument, site, near)
 
 
 def _argument(p: Present) -> str:

@@ -59,9 +59,10 @@ def _parts(records: Records, one: Hypothesis, other: Hypothesis
     """Both parts of all recordings, cut where a share of what tells two fits apart has been seen,
     as long as neither is too short.
     """
-    apart = [(np.concatenate([s.t for s in e.samples]), (a.y - b.y) ** 2) for e, a, b in zip(
-        one.whitened.problem.experiments,
-        *(h.whitened.responses(h.minimum.theta) for h in (one, other)), strict=True)]
+    apart = [(np.concatenate([s.t for s in e.samples]), ((a.y - b.y) / sigma) ** 2)
+             for e, sigma, a, b in zip(
+                 one.whitened.problem.experiments, one.whitened.sigma,
+                 *(h.whitened.responses(h.minimum.theta) for h in (one, other)), strict=True)]
     for share in SHARES:
         cuts = []
         for t, square in apart:
