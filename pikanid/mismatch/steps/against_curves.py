@@ -21,8 +21,9 @@ from pikanid.mismatch.beyond.free_curve import (
 )
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import smaller
-from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.explanations import Explanations
 from pikanid.mismatch.judge.kinds import members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over
@@ -42,9 +43,9 @@ def against_curves(case: Case, explained: Explanations, part: Part,
         part: What is sure among them.
         noise: σ of each output by name, in the train and in the held-out recordings.
     """
-    h, rule = part.hypothesis, case.settings.part
-    before = case.predicted(h)
-    if before is None:
+    h, rule = _searched(case, part.hypothesis), case.settings.part
+    before = None if h is None else case.predicted(h)
+    if h is None or before is None:
         return part
     own_left = max(left_over(h, before, noise), rule.floor)
     present, doubtful = [], list(part.doubtful)
@@ -67,6 +68,13 @@ def against_curves(case: Case, explained: Explanations, part: Part,
     return replace(part, present=tuple(present), doubtful=tuple(doubtful))
 
 
+def _searched(case: Case, h: Hypothesis) -> Hypothesis | None:
+    """The same on as much of the recordings as can be searched in a minute."""
+    short = case.records.beginning(case.settings.budget.rows_searched)
+    return h if short is case.records else fitted(
+        case.model, h.effects, short, [h.point], 1, Closest(h.minimum.chi2), h.key)
+
+
 def _has_its_form(case: Case, explained: Explanations, h: Hypothesis, p: Present, own_left: float,
                   noise: Sequence[dict[str, float]]) -> bool:
     """Whether a named effect is what its family's member is, whatever stands beside it."""
@@ -76,7 +84,8 @@ def _has_its_form(case: Case, explained: Explanations, h: Hypothesis, p: Present
     freed = _least(case, _with_its_form_free(case.model, h, p), noise, own_left / rule.form)
     if not smaller(own_left, rule.form * max(freed, rule.floor)):
         return False
-    others = [w.hypothesis for w in rivals(p.kind, p.effect, explained.weighed)[:RIVALS]]
+    among = rivals(p.kind, p.effect, explained.weighed)[:RIVALS]
+    others = [o for w in among if (o := _searched(case, w.hypothesis)) is not None]
     if not others:
         return True
     least = max(min(own_left, _least(case, _beside(case.model, h, p), noise, own_left)), rule.floor)
