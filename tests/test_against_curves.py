@@ -15,6 +15,7 @@ from pikanid.mismatch.judge.partial import Part, Present
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps import against_curves as curves
 from pikanid.mismatch.steps import surely
 from pikanid.mismatch.steps.against_curves import against_curves
 from pikanid.mismatch.steps.opening import open_case
@@ -58,6 +59,19 @@ def test_no_curve_takes_the_place_of_a_mode() -> None:
 def test_a_limit_keeps_its_name() -> None:
     found = judged(case_of(MODEL.map_input("u_x", saturation=0.5)), "input_saturation")
     assert [p.names for p in found.present] == [("input_saturation",)]
+
+
+@pytest.mark.parametrize(("family", "states"), [
+    ("restoring force", ["v"]), ("dry friction", ["q"]), ("timing", ["q", "v"])])
+def test_beside_a_member_no_curve_is_the_family_itself(
+        monkeypatch: pytest.MonkeyPatch, family: str, states: list[str]) -> None:
+    """With a curve of the deflection any spring is any other."""
+    monkeypatch.setattr(curves, "with_free_curve", lambda *args: args[3])
+    h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
+    p: Any = SimpleNamespace(family=family, effect=SimpleNamespace(
+        argument="", site=SimpleNamespace(q="q", v="v", moving=("q", "v"))))
+    found: list[Any] = list(curves._beside(MODEL, h, p))
+    assert found == states
 
 
 def effect(name: str) -> Any:

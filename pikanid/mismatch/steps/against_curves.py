@@ -4,7 +4,7 @@ A family is not sure where a free curve in its place leaves little more, of a st
 output that its members do not depend on: a magnet is no friction with a memory, and an amplifier
 that bends is no mode.  A name is not where a free curve beside it, of what it depends on, leaves
 far less: then its form is another one; nor where another member of its family does as well once a
-curve stands beside either.
+curve of what neither depends on stands beside either.
 """
 
 from __future__ import annotations
@@ -94,9 +94,12 @@ def _has_its_form(case: Case, explained: Explanations, h: Hypothesis, p: Present
 
 
 def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
-    """An explanation and a free curve of a state."""
+    """An explanation and a free curve of a state; of the one that a family's members depend on it
+    would be any of them.
+    """
     site = p.effect.site
-    return (with_free_curve(nominal, h, h.effects, s, site, h.minimum.chi2) for s in site.moving)
+    return (with_free_curve(nominal, h, h.effects, s, site, h.minimum.chi2)
+            for s in site.moving if s != _argument(p))
 
 
 def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate],
