@@ -36,9 +36,9 @@ def worth_within_train(case: Case, effect: Candidate, with_it: Hypothesis, witho
         effect: That does not act in the held-out recordings.
         with_it, without: Explanations to be compared, fitted to all of the train recordings.
     """
-    begins = [c for c in case.candidates if c.ids[0] == "initial_state"]
-    if any(e in begins or e.absent or e.per_recording for e in with_it.effects + without.effects):
+    if any(e.absent or e.per_recording for e in with_it.effects + without.effects):
         return 0.0
+    begins = [c for c in case.candidates if c.per_recording and not c.absent]
     model = extended(case.model, begins)
     asked = case.settings.verdict.shown * case.search.scale()
     for first, second in _parts(case.records, with_it, without):
