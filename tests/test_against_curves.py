@@ -48,7 +48,7 @@ def test_an_amplifier_that_bends_is_no_mode() -> None:
 
 
 def test_no_curve_takes_the_place_of_a_mode() -> None:
-    """Of a state, of the input, of the sensor: a mode is none of them."""
+    """Of a state or of the input: a mode is neither."""
     case = case_of(MODEL)
     mode = next(c for c in case.candidates if c.key == "second_mode")
     rig = mode.applied(MODEL).with_values({"a_2": 20.0, "omega_2": 40.0, "zeta_2": 0.02})

@@ -1,8 +1,8 @@
 """What is there still once free curves stand for laws that nobody has listed.
 
-A family is not sure where a free curve in its place leaves little more, of a state, an input or an
-output that its members do not depend on: a magnet is no friction with a memory, and an amplifier
-that bends is no mode.  A name is not where a free curve beside it, of what it depends on, leaves
+A family is not sure where a free curve in its place leaves little more, of a state or an input that
+its members do not depend on: a magnet is no friction with a memory, and an amplifier that bends is
+no mode.  A name is not where a free curve beside it, of what it depends on, leaves
 far less: then its form is another one; nor where another member of its family does as well once a
 curve of what neither depends on stands beside either.
 """
@@ -114,8 +114,6 @@ def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Cand
         return  # a curve of a channel has a slope
     if p.family != "input curve":
         yield from (with_free_input(nominal, h, rest, u, site, near) for u in site.inputs)
-    if p.family != "sensor curve":
-        yield with_free_sensor(nominal, h, rest, site, near)
 
 
 def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
