@@ -2,9 +2,9 @@
 
 A family is not sure where a free curve in its place leaves little more, of a state or an input that
 its members do not depend on: a magnet is no friction with a memory, and an amplifier that bends is
-no mode.  A name is not where a free curve beside it, of what it depends on, leaves
-far less: then its form is another one; nor where another member of its family does as well once a
-curve of what neither depends on stands beside either.
+no mode.  A name is not where a free curve beside it, of what it depends on, leaves far less: then
+its form is another one; nor where another member of its family does as well once a curve of what
+neither depends on stands beside either.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from pikanid.mismatch.judge.left_over import left_in_train, left_over
 from pikanid.mismatch.judge.partial import Doubtful, Part, Present, rivals
 from pikanid.model import Model
 
-RIVALS = 2  # numerical: other members of a family that are tried with a curve beside them
+RIVALS = 2  # limit: other members of a family that are tried with a curve beside them
 
 
 def against_curves(case: Case, explained: Explanations, part: Part,
