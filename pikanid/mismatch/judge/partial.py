@@ -91,7 +91,7 @@ class Part:
 
 
 def surely_there(explained: Explanations, scale: float, settings: Settings,
-                 again: Again = lambda effect, one, other: 0.0) -> Part | None:
+                 again: Again) -> Part | None:
     """What is there whatever the remainder is; None where nothing is sure.
 
     Args:
