@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import cast
 
 import pytest
-from test_neighbours import case, hypothesis, keys
+from opened import case, hypothesis, keys
 
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.search.neighbours import with_walls

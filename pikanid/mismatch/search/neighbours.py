@@ -105,6 +105,17 @@ def with_parts(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
                     yield [*found.values()], [{**h.point, **start}]
 
 
+def with_sums(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With the one law that several of its effects are the sum of in their place."""
+    for law in candidates:
+        for parts in law.parts([1.0] * len(law.parameters)) if law.parts else ():
+            own = [e for e in h.effects if e.key in parts]
+            sizes = [h.values[e.parameters[0].name] / parts[e.key][0] for e in own]
+            if len(own) == len(parts) and min(sizes) > 0:
+                yield (*(e for e in h.effects if e not in own), law), [
+                    {**h.point, law.parameters[0].name: sum(sizes) / len(sizes)}]
+
+
 def reduced(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """Without an effect, or with less than it in its place."""
     yield from without_one(h)

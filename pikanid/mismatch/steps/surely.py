@@ -20,6 +20,7 @@ from pikanid.mismatch.search.neighbours import (
     beside,
     with_next_form,
     with_relatives,
+    with_sums,
     with_walls,
 )
 from pikanid.mismatch.search.screen import Screen
@@ -118,12 +119,14 @@ def _one_more(search: Search, lead: Hypothesis) -> None:
 
 
 def _compared(search: Search, lead: Hypothesis) -> bool:
-    """Fit what an explanation is to be compared with: others of its effects' families, and what
-    does best without each effect, or each family; whether that found anything.
+    """Fit what an explanation is to be compared with: others of its effects' families, one law that
+    is the sum of several, and what does best without each effect, or each family; whether that
+    found anything.
     """
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
         *with_next_form(lead, search.candidates), *with_walls(lead, search.candidates),
+        *with_sums(lead, search.candidates),
         *_without_each_family(lead, search.settings.part.dry)], lead.key)
     return (not search.budget_exhausted and search.closer([lead])) or found
 
