@@ -30,7 +30,7 @@ def row(recording: str, dx: Diagnosis, seconds: float, remark: str = "") -> Row:
     """What a diagnosis says."""
     names = tuple(" + ".join("/".join(e.ids) for e in h.effects) for h in dx.hypotheses)
     if dx.present:
-        names = ("surely " + " and ".join("/".join(p.ids) or p.family for p in dx.present),)
+        names = ("surely " + " and ".join("/".join(p.ids) or p.title for p in dx.present),)
     proof = dx.held_out
     before, after = (np.nan, np.nan) if proof is None else (proof.rmse_before, proof.rmse_after)
     return Row(recording, dx.verdict, names, before, after, "" if proof is None else proof.unit,

@@ -10,8 +10,8 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.judge.explanations import Explanations
-from pikanid.mismatch.judge.kinds import kinds_of
-from pikanid.mismatch.judge.partial import Part, Present
+from pikanid.mismatch.judge.kinds import Kind, kinds_of
+from pikanid.mismatch.judge.partial import Instead, Part, Present
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -68,10 +68,31 @@ def test_beside_a_member_no_curve_is_the_family_itself(
     """With a curve of the deflection any spring is any other."""
     monkeypatch.setattr(curves, "with_free_curve", lambda *args: args[3])
     h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
-    p: Any = SimpleNamespace(family=family, effect=SimpleNamespace(
-        argument="", site=SimpleNamespace(q="q", v="v", moving=("q", "v"))))
-    found: list[Any] = list(curves._beside(MODEL, h, p))
+    found: list[Any] = list(curves._beside(MODEL, h, sure_of(family)))
     assert found == states
+
+
+SITE: Any = SimpleNamespace(q="q", v="v", moving=("q", "v"), inputs=("u",))
+
+
+def sure_of(family: str, instead: str = "") -> Any:
+    """A family that is there, or one of two."""
+    own: Any = SimpleNamespace(argument="", site=SITE)
+    return Present(Kind(family), own, (), {}, 1.0, 1.0, 50.0, 50.0, 0.95,
+                   Instead(Kind(instead), own) if instead else None)
+
+
+@pytest.mark.parametrize(("families", "tried"), [
+    (("restoring force", ""), ["v", "u"]), (("restoring force", "gain"), ["v"]),
+    (("gain", "dry friction"), ["q"]), (("dry friction", "restoring force"), ["u"]),
+    (("mode", "constant force"), []), (("mode", "timing"), ["q", "v", "u"])])
+def test_no_curve_stands_for_either_of_two_families(
+        monkeypatch: pytest.MonkeyPatch, families: tuple[str, str], tried: list[str]) -> None:
+    """Of what one of them depends on it would be that one."""
+    for name in ("with_free_curve", "with_free_input"):
+        monkeypatch.setattr(curves, name, lambda *args: args[3])
+    h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
+    assert list(curves._in_its_place(MODEL, h, sure_of(*families), [])) == tried
 
 
 def effect(name: str) -> Any:

@@ -126,8 +126,9 @@ def test_tally_counts_what_it_says() -> None:
     assert counts == {
         "right": (1, 3), "wrong": (2, 8), "wrong_strictly": (3, 8), "wrong_of_answers": (2, 4),
         "wrong_but_knowable": (1, 8), "surely_in_part": (0, 8), "found": (0, 0),
-        "found_by_name": (0, 0), "formula": (0, 8), "false_alarm": (1, 2), "missed": (1, 5),
-        "parameters_within_3_std": (0, 0), "held_out_within_1.1_noise": (0, 1)}
+        "found_by_name": (0, 0), "found_of_two": (0, 0), "formula": (0, 8),
+        "false_alarm": (1, 2), "missed": (1, 5), "parameters_within_3_std": (0, 0),
+        "held_out_within_1.1_noise": (0, 1)}
 
 
 @pytest.mark.parametrize(("count", "n"), [(0, 240), (1, 240), (57, 60), (5, 5), (9, 400)])
@@ -174,10 +175,10 @@ def beside(*ids: str, laws: tuple[str, ...] = ("cogging", "turbulence"),
 
 
 def surely(*present: tuple[str, str], **more: Any) -> dict:
-    """Families and, where the name is sure, ids."""
+    """Families, or two of which one is there, and, where the name is sure, ids."""
     return answer(["quadratic_drag"], verdict="partial", present=[
-        {"family": family, "ids": ids.split("/") if ids else None} for family, ids in present],
-        **more)
+        {"family": family.split(" or ")[0], "or_family": ([*family.split(" or "), None])[1],
+         "ids": ids.split("/") if ids else None} for family, ids in present], **more)
 
 
 ONE, TWO = beside("coulomb_friction"), beside("coulomb_friction", "input_delay")
@@ -222,6 +223,17 @@ def test_what_is_said_beside_a_remainder_has_to_be_there(
     score = judge(truth, given)
     assert (score.outcome, score.reason) == (outcome, reason)
     assert (score.found, score.found_by_name) == found
+
+
+@pytest.mark.parametrize(("said", "outcome", "counts"), [
+    (["dry friction or gain"], "part", (1, 0, 1)), (["gain or dry friction"], "part", (1, 0, 1)),
+    (["gain or drag"], "wrong", (0, 0, 0)), (["timing", "gain or dry friction"], "part", (2, 0, 1)),
+    (["timing or gain", "timing"], "part", (1, 0, 0))])
+def test_one_of_two_families_has_to_be_there(said: list[str], outcome: str,
+                                             counts: tuple[int, int, int]) -> None:
+    score = judge(TWO, surely(*((families, "") for families in said)))
+    assert score.outcome == outcome
+    assert (score.found, score.found_by_name, score.found_of_two) == counts
 
 
 def test_families_of_what_hides_are_those_of_its_variant_and_exponent() -> None:

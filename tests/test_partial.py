@@ -9,12 +9,13 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from weighing import COULOMB, DRAG, HYSTERESIS, RULE, effect, never, weighed
 
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.as_estimate import widened
 from pikanid.mismatch.judge.explanations import Explanations, Weighed
-from pikanid.mismatch.judge.kinds import Kind, kinds_of
+from pikanid.mismatch.judge.kinds import Kind
 from pikanid.mismatch.judge.partial import Doubtful, Part, Present, _examined
 from pikanid.mismatch.report import part as reported_as
 from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -24,37 +25,6 @@ from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import surely
 from pikanid.mismatch.steps.surely import _without_shares
 from pikanid.reporting.diagnosis_page import page
-
-RULE = DEFAULTS.part
-
-
-def never(*_: object) -> float:
-    """An effect that does not act again in the train recordings."""
-    return 0.0
-
-
-def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool = True,
-           twin: str = "", parts: Any = None) -> Candidate:
-    return cast(Candidate, SimpleNamespace(
-        key=name, name=name, ids=(name,), families=families,
-        covers={key: {} for key in covers}, known=known, twin=twin,
-        parts=parts, parameters=(), exponent=None, absent=False, alike=twin,
-        site=SimpleNamespace(v="v")))
-
-
-COULOMB = effect("coulomb_friction", "dry friction")
-HYSTERESIS = effect("hysteresis", "dry friction")
-DRAG = effect("quadratic_drag", "drag")
-
-
-def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: float = 0.95,
-            later: float | None = None) -> Weighed:
-    """An explanation that leaves so much [σ²], and so much of each held-out sample [σ]."""
-    h: Any = SimpleNamespace(effects=effects, values={}, blurred=frozenset())
-    predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
-                                     inert=frozenset())
-    return Weighed(h, predicted, left, 0.0, weight, share,
-                   frozenset(k for e in effects for k in kinds_of(e, h, RULE.dry)))
 
 
 def examined(*found: Weighed, family: Any = "dry friction") -> Present | Doubtful:

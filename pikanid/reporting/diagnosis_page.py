@@ -94,7 +94,7 @@ def _surely(dx: Diagnosis) -> str:
         return ""
     sheet = Sheet(("family", "here as", "values, with errors that count the remainder",
                    "times as much left without it"), tuple((
-                       p.family,
+                       p.title if p.or_family else p.family,
                        p.name + ("" if p.ids or not p.compared else
                                  f" (not sure; compared with {', '.join(p.compared)})"),
                        "; ".join(

@@ -21,6 +21,8 @@ Resistance = Callable[..., Array]  # (speed (N,), each parameter but the size) -
 Parts = Callable[[Sequence[float]], Sequence[Mapping[str, Sequence[float]]]]
 # (values by name, states (L,) by name) -> values by name, from each of which a fit begins
 Begin = Callable[[Mapping[str, float], Mapping[str, Array]], Sequence[Mapping[str, float]]]
+# definition: families of laws of one channel, which have a slope: a scale error is one of them
+CURVES = ("input curve", "sensor curve")
 SYMBOLIC = "symbolic:"  # before the formula, in the id of a law that no catalogue holds
 
 

@@ -94,9 +94,9 @@ def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
-    """The best lasting hypotheses, the best ones without each family of the first, those with
-    another member of it, beside its own and in its place, those that need none of its channels, and
-    the nominal model.
+    """The best lasting hypotheses, the best ones without each family of the first, and without it
+    and each that stands in its place, those with another member of it, beside its own and in its
+    place, those that need none of its channels, and the nominal model.
     """
     left = lasting(ranked)
     chosen = left[: rule.pool]
@@ -104,7 +104,10 @@ def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
     for kind in kinds_in(first, rule.dry) if first else ():
         apart = {h.fit: members(kind, h, rule.dry) for h in left}
         own = {e.key for e in apart[first.fit]} if first else set()
-        chosen += [h for h in left if not apart[h.fit]][: rule.rivals]
+        without = [h for h in left if not apart[h.fit]]
+        chosen += without[: rule.rivals]
+        for other in {k for h in without[: rule.rivals] for k in kinds_in(h, rule.dry)}:
+            chosen += [h for h in without if not members(other, h, rule.dry)][: rule.rivals]
         others = [h for h in left if any(e.key not in own for e in apart[h.fit])]
         chosen += others[: rule.rivals]
         chosen += [h for h in others if all(e.key not in own for e in apart[h.fit])][: rule.rivals]

@@ -22,6 +22,19 @@ Again = Callable[[Candidate, Hypothesis, Hypothesis], float]
 
 
 @dataclass(frozen=True)
+class Instead:
+    """A family that may be there in another one's place.
+
+    Attributes:
+        kind: Family of physics, and where.
+        effect: The best explanation's with it member of it.
+    """
+
+    kind: Kind
+    effect: Candidate
+
+
+@dataclass(frozen=True)
 class Present:
     """A family that is surely there, and its name where that is sure as well.
 
@@ -33,6 +46,8 @@ class Present:
         probability, probability_family: Posterior of the effect, and of the family.
         dominance, dominance_within: κ over explanations without the family, and without the effect.
         share: Of the held-out misfit's square that the best explanation with it explains.
+        instead: Another family, where only that one of both is there is sure: what is said of the
+            family holds for both together, and no name is sure.
     """
 
     kind: Kind
@@ -44,6 +59,7 @@ class Present:
     dominance: float
     dominance_within: float
     share: float
+    instead: Instead | None = None
 
     @property
     def family(self) -> Family:
@@ -104,7 +120,7 @@ def surely_there(explained: Explanations, scale: float, settings: Settings,
     rule, found, lead = settings.part, explained.weighed, explained.lead
     if lead is None:
         return None
-    examined = [_examined(kind, lead, found, rule, scale * settings.least_proof, again)
+    examined = [_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again)
                 for kind in kinds_in(lead.hypothesis, rule.dry)]
     present = [p for p in examined if isinstance(p, Present)]
     # that a family is there somewhere says no more where a place of it is sure
@@ -130,8 +146,30 @@ def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:
     return not kind.place and any(k.place and k.family == kind.family for k in kinds)
 
 
+def _one_of_two(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
+                proof: float, again: Again) -> Present | Doubtful:
+    """A family of the leading explanation, surely there; else that it is or another one, which all
+    explanations hold that do nearly as well without it; else why neither is sure.
+
+    A family that is improbable is not one of two.
+    """
+    alone = _examined(kind, lead, found, rule, proof, again)
+    if isinstance(alone, Present) or smaller(
+            sum(w.weight for w in found if kind.among(w.kinds)), rule.rate):
+        return alone
+    asked = rule.dominance_of(kind.family)
+    others = [w for w in found if not kind.among(w.kinds)][: rule.rivals]
+    near = [w for w in others if smaller(dominance(lead, [w], rule), asked)]
+    shared = frozenset.intersection(*(w.kinds for w in near)) if near else frozenset()
+    instead = [Instead(other, members(other, near[0].hypothesis, rule.dry)[0])
+               for other in sorted(shared - lead.kinds)]
+    either = (_examined(kind, lead, found, rule, proof, again, other) for other in instead)
+    return max((one for one in either if isinstance(one, Present)),
+               key=lambda one: one.dominance, default=alone)
+
+
 def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
-              proof: float, again: Again) -> Present | Doubtful:
+              proof: float, again: Again, instead: Instead | None = None) -> Present | Doubtful:
     """A family of the leading explanation: surely there, or why not.
 
     Args:
@@ -141,13 +179,15 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
         rule: What is asked.
         proof: χ² that the family must be worth in the held-out recordings.
         again: What it is worth within the train recordings.
+        instead: Another family: whether it or that one is there.
     """
-    holders = [w for w in found if kind.among(w.kinds)]
-    others = [w for w in found if not kind.among(w.kinds)]
+    either = (kind,) if instead is None else (kind, instead.kind)
+    holders = [w for w in found if any(k.among(w.kinds) for k in either)]
+    others = [w for w in found if not any(k.among(w.kinds) for k in either)]
     own_effects = members(kind, lead.hypothesis, rule.dry)
     effect = own_effects[0]
     total = sum(w.weight for w in holders)
-    kappa, asked = dominance(lead, others, rule), rule.dominance_of(kind.family)
+    kappa, asked = dominance(lead, others, rule), max(rule.dominance_of(k.family) for k in either)
     if smaller(total, 1 - rule.rate):
         return Doubtful(kind, effect, f"its probability is {total:.3g}")
     if smaller(kappa, asked):
@@ -175,14 +215,14 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     # takes up what other laws leave
     clearly = rule.dominance if isinstance(effect.exponent, Parameter) else rule.within
     blurred = effect.key in lead.hypothesis.blurred
-    exact = all(e.known for e in own_effects) and not (
+    exact = instead is None and all(e.known for e in own_effects) and not (
         blurred or other_form or smaller(own, 1 - rule.rate) or smaller(within, clearly)
         # as sure as the family itself, whatever is left
         or (smaller(lead.share, rule.exact) and smaller(within, rule.dominance)))
-    compared = {e.key: e.name for w in holders for e in members(kind, w.hypothesis, rule.dry)
-                if e.key != effect.key}
+    compared = {e.key: e.name for w in holders for k in either
+                for e in members(k, w.hypothesis, rule.dry) if e.key != effect.key}
     return Present(kind, effect, effect.ids if exact else (),
-                   compared, own, total, kappa, within, lead.share)
+                   compared, own, total, kappa, within, lead.share, instead)
 
 
 def rivals(kind: Kind, effect: Candidate, found: Iterable[Weighed]) -> list[Weighed]:

@@ -119,12 +119,13 @@ def _channels(answer: Answer, candidates: Sequence[Candidate]) -> tuple[Channel,
         others = {c.channel for c in candidates for i in c.ids if i in names and i not in e.ids}
         return acts_in(e) if e.channel in others else acts_in(e) | others
 
-    def of_family(family: str) -> frozenset[Channel]:
-        return frozenset(c.channel for c in candidates if family in c.families)
+    def of_families(*families: str) -> frozenset[Channel]:
+        return frozenset(c.channel for c in candidates if {*families} & {*c.families})
 
     found: list[set[Channel]] = []
     if answer.part is not None:
-        told = [of(p.effect, p.names) if p.names else of_family(p.family)
+        told = [of(p.effect, p.names) if p.names else of_families(
+                    p.family, *([p.instead.kind.family] if p.instead else ()))
                 for p in answer.part.present]
         found = [{*answer.channels, *(next(iter(c)) for c in told if len(c) == 1)}]
     for h in () if answer.part is not None else answer.given:

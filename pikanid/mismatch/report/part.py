@@ -36,6 +36,8 @@ class Present:
         share: Of the held-out misfit's square that the best explanation explains.
         parameters: Estimates, with standard errors as the noise alone would have them.
         std_with_remainder: Standard errors with the remainder counted in.
+        or_family: Another family, where one of both is surely there, and which one is not sure;
+            else empty.
     """
 
     family: str
@@ -50,10 +52,13 @@ class Present:
     share: float
     parameters: Mapping[str, Value]
     std_with_remainder: Mapping[str, float]
+    or_family: str = ""
 
     @property
     def title(self) -> str:
-        """The name where it is sure, otherwise the family."""
+        """The name where it is sure, otherwise the family, or both of two."""
+        if self.or_family:
+            return f"either {self.family} or {self.or_family}"
         return self.name if self.ids else self.family
 
     @property
@@ -75,7 +80,8 @@ class Present:
 
     def to_dict(self) -> dict[str, Any]:
         """For diagnosis.json."""
-        return {"family": self.family, "ids": list(self.ids) or None, "exact": bool(self.ids),
+        return {"family": self.family, "or_family": self.or_family or None,
+                "ids": list(self.ids) or None, "exact": bool(self.ids),
                 "expression": self.expression, "alternatives": list(self.alternatives),
                 "probability": self.probability, "probability_family": self.probability_family,
                 "dominance": self.dominance, "dominance_within": self.dominance_within,

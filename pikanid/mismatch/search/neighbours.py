@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.candidate import CURVES, Candidate
 from pikanid.mismatch.fitting.decisions import in_order
 from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
@@ -140,10 +140,13 @@ def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
 
 def with_relatives(h: Hypothesis, effect: Candidate, candidates: Sequence[Candidate]
                    ) -> Iterator[Job]:
-    """Every other member of an effect's families in that one's place, but forms next to members."""
+    """Every other member of an effect's families in that one's place, but forms next to members; of
+    a scale error curves of a channel as well, whose slope it is.
+    """
+    families = {*effect.families, *(CURVES if "gain" in effect.families else ())}
     for other in candidates:
         if (other.fits and not other.next_to and other.key not in h.key
-                and other.site.v == effect.site.v and set(other.families) & set(effect.families)):
+                and other.site.v == effect.site.v and set(other.families) & families):
             yield (*_rest(h, effect), other), [h.point]
 
 

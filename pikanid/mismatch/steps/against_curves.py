@@ -25,7 +25,7 @@ from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.explanations import Explanations
-from pikanid.mismatch.judge.kinds import members
+from pikanid.mismatch.judge.kinds import Kind, members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over
 from pikanid.mismatch.judge.partial import Doubtful, Part, Present, rivals
 from pikanid.model import Model
@@ -51,7 +51,7 @@ def against_curves(case: Case, explained: Explanations, part: Part,
     present, doubtful = [], list(part.doubtful)
     for p in part.present:
         own = members(p.kind, h, rule.dry)
-        asked = rule.dominance_of(p.family)
+        asked = max(rule.dominance_of(k.family) for k in _kinds(p))
         if own:
             rest = [e for e in h.effects if e not in own]
             kappa = _least(case, _in_its_place(case.model, h, p, rest), noise,
@@ -99,20 +99,20 @@ def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | 
     """
     site = p.effect.site
     return (with_free_curve(nominal, h, h.effects, s, site, h.minimum.chi2)
-            for s in site.moving if s != _argument(p))
+            for s in site.moving if s not in _arguments(p))
 
 
 def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate],
                   ) -> Iterator[Hypothesis | None]:
     """Free curves beside the `rest` of the effects, of what a family's members do not depend on."""
     site, near = p.effect.site, h.minimum.chi2
-    if p.family == "constant force":
+    families = {k.family for k in _kinds(p)}
+    if "constant force" in families:
         return  # a curve holds a constant, too
     yield from (with_free_curve(nominal, h, rest, s, site, near)
-                for s in site.moving if s != _argument(p))
-    if p.family == "gain":
-        return  # a curve of a channel has a slope
-    if p.family != "input curve":
+                for s in site.moving if s not in _arguments(p))
+    # a curve of a channel has a slope
+    if not families & {"gain", "input curve"}:
         yield from (with_free_input(nominal, h, rest, u, site, near) for u in site.inputs)
 
 
@@ -123,15 +123,27 @@ def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[H
         yield from (with_free_input(nominal, h, h.effects, u, site, near) for u in site.inputs)
     elif p.family == "sensor curve":
         yield with_free_sensor(nominal, h, h.effects, site, near)
-    elif argument := _argument(p):
-        yield with_free_curve(nominal, h, h.effects, argument, site, near)
+    else:
+        yield from (with_free_curve(nominal, h, h.effects, argument, site, near)
+                    for argument in _arguments(p))
 
 
-def _argument(p: Present) -> str:
-    """The state that a family's members depend on; empty where it is none, or several."""
-    site = p.effect.site
+def _kinds(p: Present) -> tuple[Kind, ...]:
+    """The families one of which is there."""
+    return (p.kind,) if p.instead is None else (p.kind, p.instead.kind)
+
+
+def _arguments(p: Present) -> set[str]:
+    """The states that the families' members depend on; none where it is none, or several."""
+    effects = [p.effect] if p.instead is None else [p.effect, p.instead.effect]
+    found = (_argument(k.family, e) for k, e in zip(_kinds(p), effects, strict=True))
+    return {argument for argument in found if argument}
+
+
+def _argument(family: str, effect: Candidate) -> str:
+    site = effect.site
     states = {"dry friction": site.v, "drag": site.v, "restoring force": site.q}
-    return states.get(p.family, p.effect.argument)
+    return states.get(family, effect.argument)
 
 
 def _least(case: Case, fits: Iterable[Hypothesis | None], noise: Sequence[dict[str, float]],

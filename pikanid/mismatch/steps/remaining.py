@@ -25,7 +25,8 @@ def present(answer: Answer) -> tuple[Present, ...]:
         found.append(Present(
             p.family, p.names, p.effect.name, p.effect.expression, p.alternatives, p.probability,
             p.probability_family, _finite(p.dominance), _finite(p.dominance_within), p.share,
-            values, {n: v.std for n, v in wider.items()}))
+            values, {n: v.std for n, v in wider.items()},
+            p.instead.kind.family if p.instead else ""))
     return tuple(found)
 
 

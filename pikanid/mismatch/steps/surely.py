@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from pikanid.mismatch.beyond.free_channels import sure_channels
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.candidate import CURVES, Candidate, Family
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
@@ -29,7 +29,6 @@ from pikanid.mismatch.steps.against_curves import against_curves
 from pikanid.mismatch.steps.within_train import worth_within_train
 
 TOGETHER = "several effects together can take up most of anything, and none is sure by itself"
-CURVES = ("input curve", "sensor curve")  # definition: families of laws of one channel
 
 
 def with_sure_part(case: Case, answer: Answer, site: Site) -> Answer:
@@ -93,8 +92,9 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
             break
         explained, part = weighed()
     # nothing of an explanation is sure that was not left out of it, of the last one found neither
-    while explained and any([search.refine(_without_each_family(h, settings.part.dry), h.key)
-                             for h in explained.leaders]):
+    while explained and any([
+            *(search.refine(_without_each_family(h, settings.part.dry), h.key)
+              for h in explained.leaders), _without_either(search, explained, part)]):
         explained, part = weighed()
     if explained is None or part is None:
         return explained, None
@@ -109,13 +109,30 @@ def _likely(explained: Explanations, rate: float) -> list[Candidate]:
         w.weight for w in explained.weighed if key in w.hypothesis.key), rate)]
 
 
-def _one_more(search: Search, lead: Hypothesis) -> None:
-    """Fit the most promising effects that last beside an explanation's own."""
-    if len(lead.effects) < search.settings.budget.effects:
-        screen = Screen(lead, [c for c in beside(lead, search.candidates) if c.lasts])
-        search.refine([((*lead.effects, c), starts) for c, starts in screen.singles(
-            search.settings.budget.beside_one,
-            search.settings.search.much * lead.minimum.chi2)], lead.key)
+def _one_more(search: Search, lead: Hypothesis, but: Collection[Family] = ()) -> bool:
+    """Fit the most promising effects that last beside an explanation's own, but those of some
+    families; whether that found anything.
+    """
+    if len(lead.effects) >= search.settings.budget.effects:
+        return False
+    screen = Screen(lead, [c for c in beside(lead, search.candidates)
+                           if c.lasts and not set(c.families) & set(but)])
+    return search.refine([((*lead.effects, c), starts) for c, starts in screen.singles(
+        search.settings.budget.beside_one,
+        search.settings.search.much * lead.minimum.chi2)], lead.key)
+
+
+def _without_either(search: Search, explained: Explanations, part: Part | None) -> bool:
+    """Fit what may explain as much without both of two families of which one is there; whether that
+    found anything.
+    """
+    found, lead = False, explained.leaders[0]
+    for p in part.present if part else ():
+        own = {e.key for e in members(p.kind, lead, search.settings.part.dry)}
+        rest = search.fits.get(lead.key - own)
+        if p.instead and rest:
+            found |= _one_more(search, rest, (p.family, p.instead.kind.family))
+    return found
 
 
 def _compared(search: Search, lead: Hypothesis) -> bool:

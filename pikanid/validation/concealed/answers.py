@@ -25,7 +25,8 @@ class Answer:
         probabilities: Of each.
         after: Value and standard error of each parameter that has one, after the diagnosis.
         held_out: RMSE after it over the noise; None where it is not given.
-        present: Family, and ids where the name is sure, of what is said to be surely there.
+        present: Of what is said to be surely there: families, one of which it is, and ids where the
+            name is sure.
     """
 
     verdict: str
@@ -34,7 +35,7 @@ class Answer:
     probabilities: tuple[float, ...]
     after: Mapping[str, tuple[float, float]]
     held_out: float | None
-    present: tuple[tuple[str, frozenset[str]], ...] = ()
+    present: tuple[tuple[frozenset[str], frozenset[str]], ...] = ()
 
 
 def read_answer(diagnosis: Any, case: str) -> Answer:
@@ -110,10 +111,12 @@ def _hypothesis(entry: Entry) -> tuple[list[set[str]], float]:
             get["probability"].number(0.0, 1.0))
 
 
-def _present(entry: Entry) -> tuple[str, frozenset[str]]:
+def _present(entry: Entry) -> tuple[frozenset[str], frozenset[str]]:
     get = entry.table(("family", "ids"), None)
+    families = [get[key] for key in ("family", "or_family")
+                if key in get and get[key].value is not None]
     ids = [] if get["ids"].value is None else get["ids"].items(most=MOST)
-    return (get["family"].text(longest=LONGEST_ID),
+    return (frozenset(family.text(longest=LONGEST_ID) for family in families),
             frozenset(identifier.text(longest=LONGEST_ID) for identifier in ids))
 
 

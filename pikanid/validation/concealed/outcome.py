@@ -115,26 +115,29 @@ def outcome_of(case: Mapping[str, Any], truth: Truth, answer: Answer) -> tuple[O
     return "wrong", _reason(case, truth.effects, readings)
 
 
-def found(truth: Truth, answer: Answer, outcome: Outcome) -> tuple[int, int, int]:
-    """Of the hidden effects of at least `STRONG` σ: how many, found, and found by name.
+def found(truth: Truth, answer: Answer, outcome: Outcome) -> tuple[int, int, int, int]:
+    """Of the hidden effects of at least `STRONG` σ: how many, found, found by name, and found only
+    as one of two families.
 
     A wrong answer finds nothing.
     """
     strong = [k for k, distance in enumerate(truth.distances) if distance >= STRONG]
     if not strong or outcome not in ("right", "part"):
-        return len(strong), 0, 0
+        return len(strong), 0, 0, 0
     if answer.verdict == "partial":
         named = [any(ids & truth.effects[k] for _, ids in answer.present) for k in strong]
-        meant = [any(not ids and family in truth.families[k] for family, ids in answer.present)
-                 for k in strong]
+        family, either = ([any(not ids and families & truth.families[k] and len(families) <= most
+                               for families, ids in answer.present) for k in strong]
+                          for most in (1, 2))
     else:
         best = max((explanation for explanation in map(_readings, answer.hypotheses)
                     if contains([*truth.effects, *truth.laws], explanation)),
                    key=lambda explanation: sum(
                        any(effect & truth.effects[k] for effect in explanation) for k in strong))
         named = [any(effect & truth.effects[k] for effect in best) for k in strong]
-        meant = named
-    return len(strong), sum(map(any, zip(named, meant, strict=True))), sum(named)
+        family = either = named
+    every, known = (sum(map(any, zip(named, one, strict=True))) for one in (either, family))
+    return len(strong), every, sum(named), every - known
 
 
 def read(effect: set[str]) -> set[str]:
@@ -169,17 +172,17 @@ def _readings(explanation: Sequence[set[str]]) -> Effects:
 
 
 def _of_parts(truth: Truth,
-              present: Sequence[tuple[str, frozenset[str]]]) -> tuple[Outcome, str]:
+              present: Sequence[tuple[frozenset[str], frozenset[str]]]) -> tuple[Outcome, str]:
     if not present:
         return "silent", ""
     if not truth.effects:
         return "wrong", "nothing"
     named = [effect | {HELD[i] for i in effect & HELD.keys()}
              for effect in (*truth.effects, *truth.laws)]
-    families = [*truth.families, *truth.law_families]
-    for family, ids in present:
+    hidden = [*truth.families, *truth.law_families]
+    for families, ids in present:
         hit = (any(ids & effect for effect in named) if ids
-               else any(family in of_one for of_one in families))
+               else any(families & of_one for of_one in hidden))
         if not hit:
             return "wrong", "other" if ids else "family"
     return "part", ""

@@ -65,6 +65,7 @@ class Score:
         strong: How many hidden effects are at least 80σ strong.
         found: How many of them an answer that is not wrong gives, by name or family.
         found_by_name: How many by name.
+        found_of_two: How many only as one of two families.
     """
 
     case: str
@@ -84,6 +85,7 @@ class Score:
     strong: int = 0
     found: int = 0
     found_by_name: int = 0
+    found_of_two: int = 0
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
     given = answer.hypotheses
     outcome, reason = outcome_of(case, truth, answer)
     answered = answer.verdict in ANSWERS and bool(given)
-    strong, by_any, by_name = found(truth, answer, outcome)
+    strong, by_any, by_name, of_two = found(truth, answer, outcome)
     return Score(
         case["id"], case["class"], case["nameable"], float(case["visibility"]["nominal"]),
         answer.verdict, answer.mismatch, outcome, reason, len(given),
@@ -158,7 +160,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
         answered and any(same([read(effect) for effect in given[0]], t)
                          for t in (truth.effects, truth.visible) if t),
         _within(case["base"], answer.after), answer.held_out,
-        bool(truth.laws), strong, by_any, by_name)
+        bool(truth.laws), strong, by_any, by_name, of_two)
 
 
 def tally(scores: Iterable[Score]) -> dict[str, Share]:
@@ -167,7 +169,8 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
     `right` counts nameable cases only; `wrong` counts all, `wrong_strictly` also answers that name
     the visible part; `wrong_but_knowable` leaves out the answers that no method could have known to
     be wrong; `false_alarm` counts cases that hide nothing, `missed` those whose effect is at least
-    5σ strong.  `found` and `found_by_name` count hidden effects of at least 80σ beside a remainder.
+    5σ strong.  `found`, `found_by_name` and `found_of_two` count hidden effects of at least 80σ
+    beside a remainder.
     """
     every = list(scores)
     nameable = [s for s in every if s.nameable]
@@ -190,6 +193,7 @@ def tally(scores: Iterable[Score]) -> dict[str, Share]:
         "surely_in_part": Share(sum(s.outcome == "part" for s in every), len(every)),
         "found": Share(sum(s.found for s in every if s.beside), strong_beside),
         "found_by_name": Share(sum(s.found_by_name for s in every if s.beside), strong_beside),
+        "found_of_two": Share(sum(s.found_of_two for s in every if s.beside), strong_beside),
         "formula": Share(sum(s.outcome == "formula" for s in every), len(every)),
         "false_alarm": Share(sum(s.mismatch for s in nothing), len(nothing)),
         "missed": Share(sum(not s.mismatch for s in strong), len(strong)),
