@@ -16,6 +16,7 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.neighbours import (
     closest_of_each,
+    with_curves,
     with_parts,
     with_relatives,
     with_simpler,
@@ -80,6 +81,20 @@ def test_effects_that_are_the_parts_of_one_law_are_that_law(case: Case, bias: fl
     assert cast(Mapping[str, float], start)["c_one"] == pytest.approx(0.2)
     assert not list(with_sums(hypothesis(case, "coulomb_friction", "cubic_stiffness"),
                               case.search.candidates))
+
+
+def test_a_scale_error_may_be_the_slope_of_a_curve(case: Case) -> None:
+    h = hypothesis(case, "input_gain", "cubic_stiffness")
+    jobs = {frozenset(keys(effects)): starts for effects, starts in with_curves(
+        h, case.candidates)}
+    assert all("cubic_stiffness" in k and "input_gain" not in k for k in jobs)
+    dead = jobs[frozenset({"input_dead_zone", "cubic_stiffness"})]
+    # from every level, small and large, with all else as it was
+    levels = [cast(Mapping[str, float], start)["u_dead"] for start in dead]
+    assert len(levels) > 4 and max(levels) > 30 * min(levels) > 0
+    assert {cast(Mapping[str, float], start)["k3"] for start in dead} == {h.values["k3"]}
+    assert frozenset({"sensor_nonlinearity", "cubic_stiffness"}) in jobs
+    assert not list(with_curves(hypothesis(case, "cubic_stiffness"), case.candidates))
 
 
 def test_relatives_are_of_one_family_and_not_there_yet(case: Case) -> None:

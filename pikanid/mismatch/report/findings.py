@@ -255,7 +255,8 @@ class DiagnosisData:
                 "tell apart."
         if self.verdict == "partial" and self.remainder is not None:
             more = ", and something else" if self.remainder.p_value < self.settings.adequate else ""
-            return head + f"surely {listed([p.title for p in self.present])}{more}. " \
+            sure = sorted(self.present, key=lambda p: bool(p.or_family))
+            return head + f"surely {listed([p.title for p in sure])}{more}. " \
                 f"{self.remainder.sentence()}."
         if self.verdict == "unconfirmed":
             return head + "perhaps " + "; or ".join(titles) + ", not confirmed" + (

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pikanid.mismatch.catalogue.candidate import CURVES, Candidate
+from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.decisions import in_order
 from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
@@ -140,14 +141,28 @@ def with_twins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
 
 def with_relatives(h: Hypothesis, effect: Candidate, candidates: Sequence[Candidate]
                    ) -> Iterator[Job]:
-    """Every other member of an effect's families in that one's place, but forms next to members; of
-    a scale error curves of a channel as well, whose slope it is.
-    """
-    families = {*effect.families, *(CURVES if "gain" in effect.families else ())}
+    """Every other member of an effect's families in that one's place, but forms next to members."""
     for other in candidates:
         if (other.fits and not other.next_to and other.key not in h.key
-                and other.site.v == effect.site.v and set(other.families) & families):
+                and other.site.v == effect.site.v and set(other.families) & set(effect.families)):
             yield (*_rest(h, effect), other), [h.point]
+
+
+def with_curves(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With each curve of a channel in the place of a scale error, which may be its slope, from
+    every level at which it may act: what a dead zone takes off is far from nothing.
+    """
+    curves = [c for c in candidates if c.fits and not c.next_to and c.key not in h.key
+              and set(c.families) & set(CURVES)]
+    gains = [e for e in h.effects if "gain" in e.families]
+    if not curves or not gains:
+        return
+    found = directions(h.whitened, h.minimum.theta, curves)
+    for k, curve in enumerate(curves):
+        starts = [{**h.point, **sign.start} for sign, owner in zip(
+            found.directions, found.owner, strict=True) if owner == k and not sign.scales]
+        for gain in gains:
+            yield (*_rest(h, gain), curve), starts or [h.point]
 
 
 def with_walls(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
