@@ -6,12 +6,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from weighing import effect
 
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.judge.explanations import Explanations
 from pikanid.mismatch.judge.kinds import Kind, kinds_of
-from pikanid.mismatch.judge.partial import Instead, Part, Present
+from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -43,8 +44,10 @@ def judged(case: Case, key: str) -> Part:
 
 
 def test_an_amplifier_that_bends_is_no_mode() -> None:
+    """That is, or a curve of the input."""
     found = judged(case_of(MODEL.map_input("u_x", function="0.6*tanh(u_x/0.6)")), "second_mode")
-    assert not found.present and "of what it does not depend on" in found.doubtful[0].why
+    [p] = found.present
+    assert not p.names and p.instead and p.instead.kind == Kind("input curve")
 
 
 def test_no_curve_takes_the_place_of_a_mode() -> None:
@@ -92,11 +95,41 @@ def test_no_curve_stands_for_either_of_two_families(
     for name in ("with_free_curve", "with_free_input"):
         monkeypatch.setattr(curves, name, lambda *args: args[3])
     h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
-    assert list(curves._in_its_place(MODEL, h, sure_of(*families), [])) == tried
+    assert [fit for _, fit in curves._in_its_place(MODEL, h, sure_of(*families), [])] == tried
 
 
-def effect(name: str) -> Any:
-    return SimpleNamespace(key=name, ids=(name,))
+SPRING, CURVE = Kind("restoring force", "v"), Kind("input curve")
+
+
+@pytest.mark.parametrize(("families", "kappas", "held", "instead", "dominance"), [
+    (("mode", ""), {SPRING: 9.0, None: 8.0, CURVE: 7.0}, "", None, 7.0),
+    (("mode", ""), {SPRING: 0.9, None: 8.0, CURVE: 7.0}, "", SPRING, 7.0),
+    (("mode", ""), {SPRING: 9.0, None: 8.0, CURVE: 0.7}, "", CURVE, 8.0),
+    (("gain", ""), {SPRING: 1.0, None: 17.0}, "", SPRING, 17.0)])
+def test_where_only_curves_of_one_family_do_as_well_it_is_one_of_two(
+        families: tuple[str, str], kappas: dict[Kind | None, float], held: str,
+        instead: Kind | None, dominance: float) -> None:
+    found = against(families, kappas, held)
+    assert isinstance(found, Present) and found.dominance == dominance and not found.names
+    assert (found.instead.kind if found.instead else None) == instead
+
+
+@pytest.mark.parametrize(("families", "kappas", "held"), [
+    (("mode", ""), {SPRING: 9.0, None: 0.8}, ""),  # a curve of the rate is of two families
+    (("mode", ""), {SPRING: 0.9, CURVE: 0.8}, ""),  # curves of two families
+    (("mode", ""), {SPRING: 0.9, CURVE: 7.0}, "restoring force"),  # which is there anyway
+    (("mode", "timing"), {SPRING: 0.9, CURVE: 7.0}, ""),  # one of two already
+    (("gain", ""), {SPRING: 1.0, None: 15.0}, "")])  # of a scale error more is asked
+def test_where_more_curves_do_as_well_none_is_sure(
+        families: tuple[str, str], kappas: dict[Kind | None, float], held: str) -> None:
+    found = against(families, kappas, held)
+    assert isinstance(found, Doubtful) and f"leaves {min(kappas.values()):.2g} times" in found.why
+
+
+def against(families: tuple[str, str], kappas: dict[Kind | None, float], held: str
+            ) -> Present | Doubtful:
+    h: Any = SimpleNamespace(effects=(effect("spring", held),) if held else (), blurred=())
+    return curves._against(sure_of(*families), h, DEFAULTS.part, list(kappas.items()))
 
 
 @pytest.mark.parametrize(("held", "sure", "verdict"), [

@@ -2,8 +2,12 @@
 
 A family is not sure where a free curve in its place leaves little more, of a state or an input that
 its members do not depend on: a magnet is no friction with a memory, and an amplifier that bends is
-no mode.  A name is not where a free curve beside it, of what it depends on, leaves far less: then
-its form is another one; nor where another member of its family does as well once a curve of what
+no mode.  Where only curves of the deflection do, or only those of inputs, one is there of the
+family and a restoring force, or a curve of the input: a scale error is a spring beside the model's
+own to the letter.
+
+A name is not sure where a free curve beside it, of what it depends on, leaves far less: then its
+form is another one; nor where another member of its family does as well once a curve of what
 neither depends on stands beside either.
 """
 
@@ -25,9 +29,10 @@ from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.explanations import Explanations
-from pikanid.mismatch.judge.kinds import Kind, members
+from pikanid.mismatch.judge.kinds import Kind, kinds_of, members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over
-from pikanid.mismatch.judge.partial import Doubtful, Part, Present, rivals
+from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, rivals
+from pikanid.mismatch.settings.verdict import PartSettings
 from pikanid.model import Model
 
 RIVALS = 2  # limit: other members of a family that are tried with a curve beside them
@@ -51,21 +56,44 @@ def against_curves(case: Case, explained: Explanations, part: Part,
     present, doubtful = [], list(part.doubtful)
     for p in part.present:
         own = members(p.kind, h, rule.dry)
-        asked = max(rule.dominance_of(k.family) for k in _kinds(p))
         if own:
             rest = [e for e in h.effects if e not in own]
-            kappa = _least(case, _in_its_place(case.model, h, p, rest), noise,
-                           p.dominance * own_left) / own_left
-            if smaller(kappa, asked):
-                doubtful.append(Doubtful(
-                    p.kind, p.effect, "a free curve of what it does not depend on leaves "
-                    f"{kappa:.2g} times as much in its place, {asked:.2g} are asked"))
+            found = _against(p, h, rule, [
+                (kind, _least(case, [fit], noise, p.dominance * own_left) / own_left)
+                for kind, fit in _in_its_place(case.model, h, p, rest)])
+            if isinstance(found, Doubtful):
+                doubtful.append(found)
                 continue
+            p = found
             if p.names and not _has_its_form(case, explained, h, p, own_left, noise):
                 p = replace(p, names=())
-            p = replace(p, dominance=min(p.dominance, kappa))
         present.append(p)
     return replace(part, present=tuple(present), doubtful=tuple(doubtful))
+
+
+def _against(p: Present, h: Hypothesis, rule: PartSettings,
+             curves: Sequence[tuple[Kind | None, float]]) -> Present | Doubtful:
+    """A family, or that one of it and the family of curves is there, or why neither is sure.
+
+    Args:
+        p: The family.
+        h: The explanation that holds it.
+        rule: What is asked.
+        curves: In its place: the family that each is of, if it is of one, and κ.
+    """
+    asked = max(rule.dominance_of(k.family) for k in _kinds(p))
+    near = {kind for kind, kappa in curves if smaller(kappa, asked)}
+    least = min((kappa for kind, kappa in curves if kind not in near), default=np.inf)
+    p = replace(p, dominance=min(p.dominance, least))
+    if not near:
+        return p
+    kind = near.pop()
+    held = {k for e in h.effects for k in kinds_of(e, h, rule.dry)}
+    if kind is None or near or kind in held or p.instead:
+        least = min(kappa for _, kappa in curves)
+        return Doubtful(p.kind, p.effect, "a free curve of what it does not depend on leaves "
+                        f"{least:.2g} times as much in its place, {asked:.2g} are asked")
+    return replace(p, names=(), instead=Instead(kind, p.effect))
 
 
 def _searched(case: Case, h: Hypothesis) -> Hypothesis | None:
@@ -103,17 +131,22 @@ def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | 
 
 
 def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate],
-                  ) -> Iterator[Hypothesis | None]:
-    """Free curves beside the `rest` of the effects, of what a family's members do not depend on."""
+                  ) -> Iterator[tuple[Kind | None, Hypothesis | None]]:
+    """Free curves beside the `rest` of the effects, of what a family's members do not depend on,
+    each with the family that it is of; of a rate it would be of two.
+    """
     site, near = p.effect.site, h.minimum.chi2
     families = {k.family for k in _kinds(p)}
     if "constant force" in families:
         return  # a curve holds a constant, too
-    yield from (with_free_curve(nominal, h, rest, s, site, near)
-                for s in site.moving if s not in _arguments(p))
+    for s in site.moving:
+        if s not in _arguments(p):
+            yield (Kind("restoring force", site.v) if s == site.q else None,
+                   with_free_curve(nominal, h, rest, s, site, near))
     # a curve of a channel has a slope
     if not families & {"gain", "input curve"}:
-        yield from (with_free_input(nominal, h, rest, u, site, near) for u in site.inputs)
+        yield from ((Kind("input curve"), with_free_input(nominal, h, rest, u, site, near))
+                    for u in site.inputs)
 
 
 def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
