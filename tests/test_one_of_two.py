@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 from weighing import COULOMB, DRAG, RULE, effect, never, weighed
 
+from pikanid.mismatch.judge import explanations
 from pikanid.mismatch.judge.explanations import Weighed
 from pikanid.mismatch.judge.kinds import Kind
-from pikanid.mismatch.judge.partial import Doubtful, Present, _one_of_two
+from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, _one_of_two
 from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps import surely
 
 SPRING, GAIN = effect("cubic_stiffness", "restoring force"), effect("input_gain", "gain")
 
@@ -56,3 +61,29 @@ def test_a_family_that_is_sure_by_itself_stands_for_no_other() -> None:
     both = of_two(Kind("dry friction", "v"), weighed((COULOMB, DRAG), 1.0, 0.995),
                   weighed((DRAG,), 2.0, 0.005), weighed((), 50.0, 0.0))
     assert isinstance(both, Doubtful)
+
+
+def test_what_holds_neither_of_two_families_is_fitted_beside_the_rest(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    lead, rest = (SimpleNamespace(effects=e, key=frozenset(one.key for one in e), values={},
+                                  blurred=frozenset()) for e in ((GAIN, DRAG), (DRAG,)))
+    tried: list[Any] = []
+    monkeypatch.setattr(surely, "_one_more", lambda *args: bool(tried.append(args[1:])) or True)
+    search: Any = SimpleNamespace(settings=DEFAULTS, fits={rest.key: rest})
+    explained: Any = SimpleNamespace(leaders=(lead,))
+    either: Any = SimpleNamespace(kind=Kind("gain"), family="gain",
+                                  instead=Instead(Kind("restoring force", "v"), SPRING))
+    sure: Any = SimpleNamespace(kind=Kind("drag", "v"), family="drag", instead=None)
+    assert surely._without_either(search, explained, Part((either, sure), (), lead, 1.0, 0.9))
+    assert tried == [(rest, ("gain", "restoring force"))]
+    assert not surely._without_either(search, explained, Part((sure,), (), lead, 1.0, 0.9))
+    assert not surely._without_either(search, explained, None)
+
+
+def test_the_best_without_both_families_are_compared() -> None:
+    """However many do better that hold the one or the other."""
+    gain, *springs, neither = (
+        SimpleNamespace(effects=e, values={}, blurred=frozenset(), fit=k, symbolic=False)
+        for k, e in enumerate([(GAIN,), *[(SPRING,)] * 30, (DRAG,)]))
+    pool = explanations._pool([gain, *springs, neither], RULE)
+    assert neither in pool and len(pool) < 20

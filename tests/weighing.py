@@ -24,8 +24,8 @@ def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool 
            twin: str = "", parts: Any = None) -> Candidate:
     return cast(Candidate, SimpleNamespace(
         key=name, name=name, ids=(name,), families=families,
-        covers={key: {} for key in covers}, known=known, twin=twin,
-        parts=parts, parameters=(), exponent=None, absent=False, alike=twin,
+        covers={key: {} for key in covers}, known=known, twin=twin, lasts=True,
+        parts=parts, parameters=(), exponent=None, channel="dynamics", absent=False, alike=twin,
         site=SimpleNamespace(v="v")))
 
 
