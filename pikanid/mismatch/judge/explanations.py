@@ -106,7 +106,7 @@ def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
         own = {e.key for e in apart[first.fit]} if first else set()
         without = [h for h in left if not apart[h.fit]]
         chosen += without[: rule.rivals]
-        for other in {k for h in without[: rule.rivals] for k in kinds_in(h, rule.dry)}:
+        for other in sorted({k for h in without[: rule.rivals] for k in kinds_in(h, rule.dry)}):
             chosen += [h for h in without if not members(other, h, rule.dry)][: rule.rivals]
         others = [h for h in left if any(e.key not in own for e in apart[h.fit])]
         chosen += others[: rule.rivals]
