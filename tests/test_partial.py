@@ -224,6 +224,7 @@ def test_a_partial_answer_says_what_is_sure_and_what_is_left() -> None:
     assert "93 % of the held-out misfit is explained" in said and "0.004 rad are left" in said
     assert "something else" not in diagnosis(p_value=0.5).sentence()
     two = replace(FRICTION, or_family="gain")
+    assert "gain (here as Coulomb friction; which one is not sure, compared with" in two.sentence()
     assert "surely a delay and either dry friction or gain, and" in replace(
         diagnosis(), present=(two, DELAY)).sentence()
     text = str(diagnosis())

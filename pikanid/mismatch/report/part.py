@@ -68,7 +68,8 @@ class Present:
 
     def sentence(self) -> str:
         """In words."""
-        unsure = f"; its form is not sure, compared with {', '.join(self.compared)}" * bool(
+        what = "which one" if self.or_family else "its form"
+        unsure = f"; {what} is not sure, compared with {', '.join(self.compared)}" * bool(
             self.compared)
         here = "" if self.name == self.family else f"here as {self.name}"
         said = (here + unsure).removeprefix("; ")
