@@ -71,11 +71,11 @@ def test_what_holds_neither_of_two_families_is_fitted_beside_the_rest(
     monkeypatch.setattr(surely, "_one_more", lambda *args: bool(tried.append(args[1:])) or True)
     search: Any = SimpleNamespace(settings=DEFAULTS, fits={rest.key: rest})
     explained: Any = SimpleNamespace(leaders=(lead,))
-    either: Any = SimpleNamespace(kind=Kind("gain"), family="gain",
-                                  instead=Instead(Kind("restoring force", "v"), SPRING))
-    sure: Any = SimpleNamespace(kind=Kind("drag", "v"), family="drag", instead=None)
+    either, sure = (Present(kind, e, (), {}, 1.0, 1.0, 9.0, 1.0, 0.9, other) for kind, e, other in (
+        (Kind("gain"), GAIN, Instead(Kind("restoring force", "v"), SPRING)),
+        (Kind("drag", "v"), DRAG, None)))
     assert surely._without_either(search, explained, Part((either, sure), (), lead, 1.0, 0.9))
-    assert tried == [(rest, ("gain", "restoring force"))]
+    assert tried == [(rest, ["gain", "restoring force"])]
     assert not surely._without_either(search, explained, Part((sure,), (), lead, 1.0, 0.9))
     assert not surely._without_either(search, explained, None)
 

@@ -66,6 +66,11 @@ class Present:
         """Of physics."""
         return self.kind.family
 
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """The families one of which is there."""
+        return (self.kind,) if self.instead is None else (self.kind, self.instead.kind)
+
 
 @dataclass(frozen=True)
 class Doubtful:

@@ -125,7 +125,7 @@ def _channels(answer: Answer, candidates: Sequence[Candidate]) -> tuple[Channel,
     found: list[set[Channel]] = []
     if answer.part is not None:
         told = [of(p.effect, p.names) if p.names else of_families(
-                    p.family, *([p.instead.kind.family] if p.instead else ()))
+                    *(k.family for k in p.kinds))
                 for p in answer.part.present]
         found = [{*answer.channels, *(next(iter(c)) for c in told if len(c) == 1)}]
     for h in () if answer.part is not None else answer.given:

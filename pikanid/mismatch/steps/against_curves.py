@@ -81,7 +81,7 @@ def _against(p: Present, h: Hypothesis, rule: PartSettings,
         rule: What is asked.
         curves: In its place: the family that each is of, if it is of one, and κ.
     """
-    asked = max(rule.dominance_of(k.family) for k in _kinds(p))
+    asked = max(rule.dominance_of(k.family) for k in p.kinds)
     near = {kind for kind, kappa in curves if smaller(kappa, asked)}
     least = min((kappa for kind, kappa in curves if kind not in near), default=np.inf)
     p = replace(p, dominance=min(p.dominance, least))
@@ -136,7 +136,7 @@ def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Cand
     each with the family that it is of; of a rate it would be of two.
     """
     site, near = p.effect.site, h.minimum.chi2
-    families = {k.family for k in _kinds(p)}
+    families = {k.family for k in p.kinds}
     if "constant force" in families:
         return  # a curve holds a constant, too
     for s in site.moving:
@@ -161,15 +161,10 @@ def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[H
                     for argument in _arguments(p))
 
 
-def _kinds(p: Present) -> tuple[Kind, ...]:
-    """The families one of which is there."""
-    return (p.kind,) if p.instead is None else (p.kind, p.instead.kind)
-
-
 def _arguments(p: Present) -> set[str]:
     """The states that the families' members depend on; none where it is none, or several."""
     effects = [p.effect] if p.instead is None else [p.effect, p.instead.effect]
-    found = (_argument(k.family, e) for k, e in zip(_kinds(p), effects, strict=True))
+    found = (_argument(k.family, e) for k, e in zip(p.kinds, effects, strict=True))
     return {argument for argument in found if argument}
 
 

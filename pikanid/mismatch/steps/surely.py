@@ -128,11 +128,10 @@ def _without_either(search: Search, explained: Explanations, part: Part | None) 
     found anything.
     """
     found, lead = False, explained.leaders[0]
-    for p in part.present if part else ():
+    for p in (p for p in part.present if p.instead) if part else ():
         own = {e.key for e in members(p.kind, lead, search.settings.part.dry)}
-        rest = search.fits.get(lead.key - own)
-        if p.instead and rest:
-            found |= _one_more(search, rest, (p.family, p.instead.kind.family))
+        if rest := search.fits.get(lead.key - own):
+            found |= _one_more(search, rest, [k.family for k in p.kinds])
     return found
 
 
