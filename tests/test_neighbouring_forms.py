@@ -61,6 +61,18 @@ def test_a_wall_may_stiffen_on_each_side(by_key: dict[str, Candidate]) -> None:
         assert force(law, theta=0.1, wall=0.3) == 0
 
 
+def test_a_contact_is_brief_that_takes_less_than_a_third_of_a_half_swing(
+        by_key: dict[str, Candidate]) -> None:
+    """Half a period of x'' = -k x is π/√k; within a contact that brief, a wall may stiffen."""
+    wall = by_key["wall_impact"]
+    stiffness, swing = wall.parameters[1].name, wall.site.rate
+    assert wall.brief is not None
+    assert wall.brief({stiffness: 9.1 * swing**2}) and not wall.brief({stiffness: 8.9 * swing**2})
+    shapes = {c.ids[0] for c in by_key.values() if c.shape_of}
+    assert shapes == {"stiffening_wall"}
+    assert by_key["stiffening_wall"].shape_of == wall.ids
+
+
 def test_a_loop_may_be_a_spring_that_gives_way(by_key: dict[str, Candidate]) -> None:
     [law] = [c for c in by_key.values() if c.next_to == "hysteresis[bouc_wen]"]
     assert force(law, theta=0.1, z_yield=0.05) == pytest.approx(-2 / 5)

@@ -174,6 +174,17 @@ def test_a_law_that_contains_another_does_not_take_its_name(wider: Candidate) ->
     assert isinstance(found, Present) and found.names == ()
 
 
+@pytest.mark.parametrize(("brief", "shape_of", "names"), [
+    (True, ("wall_impact",), ("wall_impact",)), (False, ("wall_impact",), ()), (True, (), ())])
+def test_a_brief_contact_has_its_name_whatever_its_shape(
+        brief: bool, shape_of: tuple[str, ...], names: tuple[str, ...]) -> None:
+    wall = effect("wall_impact", "restoring force", brief=lambda values: brief)
+    other = effect("stiffening_wall", "restoring force", known=False, shape_of=shape_of)
+    found = examined(weighed((wall,), 1.0, 0.7), weighed((other,), 1.05, 0.299),
+                     weighed((DRAG,), 9.0, 0.001), family="restoring force")
+    assert isinstance(found, Present) and found.names == names
+
+
 @pytest.mark.parametrize(("names", "sure"), [((), {"sensor curve"}),
                                              (("sensor_saturation",), {"sensor curve", "gain"})])
 def test_a_curve_without_a_name_has_a_slope_of_its_own(names: tuple[str, ...], sure: set[str]

@@ -21,12 +21,13 @@ def never(*_: object) -> float:
 
 
 def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool = True,
-           twin: str = "", parts: Any = None) -> Candidate:
+           twin: str = "", parts: Any = None, shape_of: tuple[str, ...] = (),
+           brief: Any = None) -> Candidate:
     return cast(Candidate, SimpleNamespace(
         key=name, name=name, ids=(name,), families=families,
         covers={key: {} for key in covers}, known=known, twin=twin, lasts=True,
-        parts=parts, parameters=(), exponent=None, channel="dynamics", absent=False, alike=twin,
-        site=SimpleNamespace(v="v")))
+        parts=parts, shape_of=shape_of, brief=brief, parameters=(), exponent=None,
+        channel="dynamics", absent=False, alike=twin, site=SimpleNamespace(v="v")))
 
 
 COULOMB = effect("coulomb_friction", "dry friction")

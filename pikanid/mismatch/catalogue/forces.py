@@ -21,6 +21,7 @@ USUAL_PEAK = 2.5  # numerical: exponent of a hump, from about which fits of a co
 BRIEF, LASTING = 0.03, 0.25  # numerical: of a recording, how long what acts once is, and at most
 NEAREST = 0.1  # definition: of the half range, at which a wall may stand
 SIDE, BOTH = "negative side", "both sides"
+STIFF = 3  # definition: contacts that take as long as half a swing does, of a stiff stop
 SIDES = {"": (1,), SIDE: (-1,), BOTH: (1, -1)}  # definition: of the walls of each variant
 
 
@@ -150,6 +151,7 @@ def wall_impact(site: Site) -> list[Candidate]:
         return Candidate(("wall_impact",), name, text, "dynamics", site, (w, k),
                          lambda m: site.pushed(m, text), directions, variant, static=True,
                          stops_like=("sensor_saturation",),
+                         brief=lambda values: values[k.name] > (STIFF * site.rate) ** 2,
                          other_minima=(0.9, 0.985, 0.993, 0.997, 1.003, 1.007, 1.015, 1.05),
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))

@@ -121,9 +121,9 @@ def _stiffening(wall: Candidate) -> Candidate:
                  k.name: stiffness * max(top - at, 0.0) / max(top - share * at, 1e-9) ** 2}
                 for share in EASED]
 
-    return _decoy(wall, "stiffening_wall", wall_force(
-        site, distance.name, k.name, wall.variant, power=2),
-                  (distance, k), starts, wall.families)
+    text = wall_force(site, distance.name, k.name, wall.variant, power=2)
+    made = _decoy(wall, "stiffening_wall", text, (distance, k), starts, wall.families)
+    return replace(made, shape_of=wall.ids)
 
 
 def _saturating(drag: Candidate) -> Candidate:
