@@ -12,6 +12,8 @@ import numpy as np
 from pikanid.figures import new_figure, save_figure
 from pikanid.validation.concealed.score import Score, Share, reliability, tally
 
+CLOSE = 0.15  # of stated probabilities, whose labels would lie on each other
+
 INTRODUCTION = """
 Each case is a pair of recordings of a rig that hides an effect, a pair of effects, or nothing; the
 diagnosis gets the nominal model and the recordings. *Right*: the truth is among at most two
@@ -128,10 +130,11 @@ def draw_reliability(found: Sequence[Score], folder: Path) -> None:
         reach = np.clip([np.array(true) - bars[0], bars[1] - np.array(true)], 0.0, None)
         axis.errorbar(stated, true, yerr=reach, fmt="o", color="#1d4ed8", capsize=3,
                       label="answers, 95 %")
-    for k, (p, t, (_, share)) in enumerate(zip(stated, true, rows, strict=True)):
-        # neighbours in turn above and below
+    for p, after, t, (_, share) in zip(stated, [*stated[1:], 2.0], true, rows, strict=True):
+        # to the side where no neighbour's interval is
+        left = after - p < CLOSE
         axis.annotate(f"{share.count}/{share.n}", (p, t), textcoords="offset points",
-                      xytext=(5, 5 - 15 * (k % 2)), fontsize=8)
+                      xytext=(-5 if left else 5, 4), ha="right" if left else "left", fontsize=8)
     axis.set(xlabel="probability stated of the first hypothesis", ylabel="share that was true",
              xlim=(0, 1.2), ylim=(-0.05, 1.12))
     axis.legend(loc="upper left", fontsize=8)
