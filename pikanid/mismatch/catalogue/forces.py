@@ -20,8 +20,8 @@ NEXT_TO_NONE = 1e-9  # numerical: square of a distance from a peak, in quarters 
 USUAL_PEAK = 2.5  # numerical: exponent of a hump, from about which fits of a course begin
 BRIEF, LASTING = 0.03, 0.25  # numerical: of a recording, how long what acts once is, and at most
 NEAREST = 0.1  # definition: of the half range, at which a wall may stand
-SIDE, BOTH = "negative side", "both sides"
 STIFF = 3  # definition: contacts that take as long as half a swing does, of a stiff stop
+SIDE, BOTH = "negative side", "both sides"
 SIDES = {"": (1,), SIDE: (-1,), BOTH: (1, -1)}  # definition: of the walls of each variant
 
 

@@ -214,8 +214,8 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     other_form = not smaller(lead.left, rule.form * max(min(
         (w.left for w in holders if not holds(w.hypothesis, effect)
          and _wider(w.hypothesis, effect)), default=np.inf), rule.floor))
-    own = sum(w.weight for w in holders if _same(w.hypothesis, effect, lead))
-    within = dominance(lead, rivals(kind, effect, lead, holders), rule)
+    own = sum(w.weight for w in holders if _same(w.hypothesis, effect, lead.hypothesis))
+    within = dominance(lead, rivals(kind, effect, lead.hypothesis, holders), rule)
     # what needs a law outside the catalogue beside it has no name of its own, and a free exponent
     # takes up what other laws leave
     clearly = rule.dominance if isinstance(effect.exponent, Parameter) else rule.within
@@ -230,18 +230,18 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
                    compared, own, total, kappa, within, lead.share, instead)
 
 
-def rivals(kind: Kind, effect: Candidate, lead: Weighed, found: Iterable[Weighed]
+def rivals(kind: Kind, effect: Candidate, own: Hypothesis, found: Iterable[Weighed]
            ) -> list[Weighed]:
-    """Explanations with another effect of a kind in the place of the leading one's; a law that
-    contains the effect is no rival.
+    """Explanations with another effect of a kind in the place of one of `own`; a law that contains
+    the effect is no rival.
     """
-    return [w for w in found if kind.among(w.kinds) and not _same(w.hypothesis, effect, lead)
+    return [w for w in found if kind.among(w.kinds) and not _same(w.hypothesis, effect, own)
             and not _wider(w.hypothesis, effect)]
 
 
-def _same(h: Hypothesis, effect: Candidate, lead: Weighed) -> bool:
-    """Whether a hypothesis holds the leading one's effect, or in a brief contact a shape of it."""
-    brief = effect.brief is not None and effect.brief(lead.hypothesis.values)
+def _same(h: Hypothesis, effect: Candidate, own: Hypothesis) -> bool:
+    """Whether a hypothesis holds an effect of `own`, or in a brief contact a shape of it."""
+    brief = effect.brief is not None and effect.brief(own.values)
     return holds(h, effect) or (brief and any(
         set(e.shape_of) & set(effect.ids) and e.site.v == effect.site.v for e in h.effects))
 

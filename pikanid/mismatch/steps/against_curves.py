@@ -112,8 +112,7 @@ def _has_its_form(case: Case, explained: Explanations, h: Hypothesis, p: Present
     freed = _least(case, _with_its_form_free(case.model, h, p), noise, own_left / rule.form)
     if not smaller(own_left, rule.form * max(freed, rule.floor)):
         return False
-    among = [] if explained.lead is None else rivals(
-        p.kind, p.effect, explained.lead, explained.weighed)[:RIVALS]
+    among = rivals(p.kind, p.effect, h, explained.weighed)[:RIVALS]
     others = [o for w in among if (o := _searched(case, w.hypothesis)) is not None]
     if not others:
         return True
