@@ -21,7 +21,6 @@ from pikanid.mismatch.data.preparation import averaged, oversampling
 from pikanid.mismatch.design.separation import mean_precision, unexplained
 from pikanid.mismatch.design.sizing import _next
 from pikanid.mismatch.detect.residual_tests import frequency_bands
-from pikanid.mismatch.detect.tangent import _middle
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.progressive_horizon import lost
 from pikanid.mismatch.fitting.repeats import Spectra, modes_beside
@@ -47,17 +46,6 @@ def test_bands_share_out_the_lines_of_a_record() -> None:
 def test_a_fit_is_lost_by_its_chi2_per_row() -> None:
     assert lost(301.0, 100, DEFAULTS) and not lost(299.0, 100, DEFAULTS)
     assert not lost(301.0, 1000, DEFAULTS)
-
-
-def test_middles_of_cubics_are_exact() -> None:
-    """Inside; at both ends, where a neighbour is missing, half of both."""
-    t = np.arange(8.0)
-    for power in range(4):
-        rows = (t**power)[:, None] * np.array([1.0, -2.0])
-        got, wanted = _middle(rows), ((t[:-1] + 0.5) ** power)[:, None] * np.array([1.0, -2.0])
-        np.testing.assert_allclose(got[1:-1], wanted[1:-1], rtol=1e-12)
-        np.testing.assert_allclose(got[[0, -1]], 0.5 * (rows[[0, -2]] + rows[[1, -1]]))
-    np.testing.assert_allclose(_middle(np.array([[1.0], [3.0]])), [[2.0]])
 
 
 @pytest.mark.parametrize("slope", [1.0, 2.0, -1.5])

@@ -33,7 +33,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.remainder import condensed
-from pikanid.mismatch.detect.tangent import TOGETHER, Tangent
+from pikanid.mismatch.detect.tangent import SIGNS, Tangent
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Input
@@ -207,8 +207,8 @@ class _Motion:
                               lambda view: [])
         splines = BSpline.design_matrix(self.line.t, knots, DEGREE).tocsc()
         blocks = []
-        for k in range(0, splines.shape[1], TOGETHER):  # some at a time: all of them are large
-            forces = splines[:, k:k + TOGETHER].toarray().T
+        for k in range(0, splines.shape[1], SIGNS):  # some at a time: all of them are large
+            forces = splines[:, k:k + SIGNS].toarray().T
             columns = self.line.columns(
                 [(candidate, TangentDirection({}, force=f)) for f in forces])
             blocks.append(condensed(self.whitened.whiten(0, columns), len(columns), together))

@@ -7,9 +7,9 @@ solved along the fitted motion.  One pass over a recording serves every entry of
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from pikanid.simulation.input_paths import combined
 from pikanid.simulation.vectorfield import VectorField
 
 SMALL, MOVED = 1e-3, 1e-4  # numerical: least size of an input, and share moved for a difference
-TOGETHER = 100  # numerical: signs integrated at once
+SIGNS = 96  # numerical: signs integrated at once
 CELLS = 400_000  # numerical: signs times steps at once, to keep memory small
 STABLE = 1.5  # numerical: rate times step that the Runge-Kutta method follows well enough
 MOST_PARTS = 64  # numerical: of a step: stiffer motions are not followed
@@ -78,7 +78,7 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
                     for n, force in enumerate(added_forces(model, c, line)):
                         listed[k, n] = replace(listed[k, n], forces=force)
             blocks.append(line.columns([(chosen[k], s) for (k, _), s in listed.items()],
-                                       partial(whitened.whiten, r)))
+                                       functools.partial(whitened.whiten, r)))
         for column, (k, n) in enumerate(listed):
             if k in simulated:
                 blocks[-1][:, column] = simulated[k][r][:, n]
@@ -124,6 +124,7 @@ class Tangent:
         self.output = np.empty(grid.rows, int)
         self.output[seen.row] = seen.output
         self.levers: dict[str, np.ndarray] = {}
+        self.by_input: dict[str, np.ndarray] = {}
         self.view = self._view(field, whitened.records.recordings[r], experiment.held)
 
     def _thirds(self, field: VectorField, slopes: np.ndarray
@@ -184,40 +185,67 @@ class Tangent:
         """δy (rows, m) of every sign, whitened; a few at a time, to keep long recordings in
         memory.
         """
-        together = min(TOGETHER, max(CELLS // len(self.t), 1))
+        together = min(SIGNS, max(CELLS // len(self.t), 1))
         found = np.empty((len(self.stop), len(listed)))
         for k in range(0, len(listed), together):
             found[:, k:k + together] = whiten(self._columns(listed[k:k + together]))
         return found
 
     def _columns(self, listed: Sequence[tuple[Candidate, TangentDirection]]) -> np.ndarray:
-        L, n, m = len(self.t), self.x.shape[1], len(listed)
-        force, start = np.zeros((L, n, m)), np.zeros((n, m))
-        seen = np.zeros((L, len(self.model.outputs), m))
+        from pikanid.mismatch.detect.propagation import TOGETHER, add_forces, add_outputs
+
+        L, n, m = len(self.t), self.x.shape[1], -(-len(listed) // TOGETHER) * TOGETHER
+        M, B = self.steps
+        G, start = np.zeros((m, n, L - 1)), np.zeros((m, n))
+        seen = np.zeros((m, len(self.model.outputs), L))
         places = {s: i for i, s in enumerate(self.model.state_names)}
-        inputs = {i: j for j, i in enumerate(self.model.input_names)}
+        forces: list[tuple[int, int | np.integer, np.ndarray]] = []  # sign, equation, values
         for k, (candidate, sign) in enumerate(listed):
             if sign.force is not None and candidate.site.lever:
-                force[:, :, k] += sign.force[:, None] * self._lever(candidate.site)
+                lever = self._lever(candidate.site)
+                forces += [(k, i, sign.force * lever[:, i]) for i in np.flatnonzero(lever.any(0))]
             elif sign.force is not None:
-                force[:, places[candidate.site.v], k] += sign.force
+                forces.append((k, places[candidate.site.v], sign.force))
             if sign.forces is not None:
-                force[:, :, k] += sign.forces
+                forces += [(k, i, sign.forces[:, i]) for i in np.flatnonzero(sign.forces.any(0))]
             if sign.seen is not None:
-                o = self.model.output_names.index(candidate.site.output.name)
-                seen[:, o, k] += sign.seen
+                seen[k, self.model.output_names.index(candidate.site.output.name)] = sign.seen
             for name, value in sign.initial.items():
-                start[places[name], k] = value
-        F = np.empty((3, L - 1, n, m))
-        F[0], F[1], F[2] = force[:-1], _middle(force), force[1:]
-        for k, (_, sign) in enumerate(listed):
+                start[k, places[name]] = value
             for name, pushed in sign.push.items():
-                for block, (_, fu), du in zip(F, self.thirds, np.broadcast_to(
-                        pushed, (3, L)), strict=True):
-                    block[:, :, k] += fu[:, :, inputs[name]] * du[:-1, None]
-        state = self._integrated(F, start)
-        y = np.einsum("lqn,lnm->lqm", self.hx, state) + seen
-        return y[self.stop, self.output]
+                du = np.broadcast_to(pushed, (3, L))[:, :-1]
+                G[k] += np.einsum("pnl,pl->nl", self._input_steps(name), du)
+        if forces:
+            owner, row, values = zip(*forces, strict=True)
+            add_forces(B, np.array(values, float), np.array(owner), np.array(row), G)
+        add_outputs(M, G, start, self.hx, seen)
+        return np.ascontiguousarray(seen[:len(listed), self.output, self.stop].T)
+
+    @functools.cached_property
+    def steps(self) -> tuple[np.ndarray, np.ndarray]:
+        """`propagation.step_matrices` along the motion, by the classical Runge-Kutta method: over
+        dozens of periods small errors of phase would look like damping.
+        """
+        from pikanid.mismatch.detect.propagation import step_matrices
+
+        h = np.diff(self.t)
+        A = np.stack([fx for fx, _ in self.thirds])
+        every = max(len(h) // 50, 1)
+        few = h[::every, None, None] * A[0, ::every]
+        fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))
+        # states that forget within a step need shorter ones
+        parts = min(max(int(np.ceil(fastest / STABLE)), 1), MOST_PARTS)
+        return step_matrices(A, h, parts)
+
+    def _input_steps(self, name: str) -> np.ndarray:
+        """(3, n, L-1) what an input of 1 at the left end, the middle and the right end of each step
+        adds to the state at its end.
+        """
+        if name not in self.by_input:
+            j = self.model.input_names.index(name)
+            fu = np.stack([fu[:, :, j] for _, fu in self.thirds])
+            self.by_input[name] = np.einsum("pnil,pli->pnl", self.steps[1], fu)
+        return self.by_input[name]
 
     def _lever(self, site: Site) -> np.ndarray:
         """What a force of 1 adds to the rates of all states (L, n)."""
@@ -228,27 +256,3 @@ class Tangent:
                 self.t, self.x, self.u, np.append(self.p, 0.0))[1]
             self.levers[site.suffix] = slopes[:, :, -1]
         return self.levers[site.suffix]
-
-    def _integrated(self, F: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """δx (L, n, m) by the classical Runge-Kutta method: over dozens of periods small errors of
-        phase would look like damping.  Forces F (3, L-1, n, m) are cubics between stops, inputs
-        held.
-        """
-        from pikanid.mismatch.catalogue.recurrences import follow
-
-        h = np.diff(self.t)
-        A = np.stack([fx for fx, _ in self.thirds])
-        every = max(len(h) // 50, 1)
-        few = h[::every, None, None] * A[0, ::every]
-        fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))
-        # states that forget within a step need shorter ones
-        parts = min(max(int(np.ceil(fastest / STABLE)), 1), MOST_PARTS)
-        return np.asarray(follow(A, F, h, start, parts))
-
-
-def _middle(rows: np.ndarray) -> np.ndarray:
-    """Values (L-1, ...) between neighbouring rows (L, ...), by cubics where there are four."""
-    between = 0.5 * (rows[:-1] + rows[1:])
-    if len(rows) > 3:
-        between[1:-1] += (rows[1:-2] - rows[:-3] + rows[2:-1] - rows[3:]) / 16
-    return between

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -120,6 +121,11 @@ class Screen:
         scaled = np.linalg.lstsq(about.movable / norms, self.found.D, SPANNED)[0]
         self.taken = scaled / norms[:, None]
 
+    def forget_signs(self) -> None:
+        """Let go of all columns over time, which `pairs` alone asks for again."""
+        self.units = np.empty((0, self.units.shape[1]))
+        self.found = replace(self.found, D=self.units)
+
     def best(self, candidate: int, count: int = 1) -> list[int]:
         """A candidate's most telling signs, no two neighbours."""
         own = np.flatnonzero(self.found.owner == candidate)
@@ -197,7 +203,7 @@ class Screen:
         return [self.about.point_with(self.guess)] if self.about.far and self.guess else []
 
     def _start(self, candidate: Candidate, sign: int, amplitude: float) -> Start:
-        size = float(amplitude / self.lengths[sign])
+        size = float(steady(np.array(amplitude / self.lengths[sign])))
         start = start_from(candidate, self.found.directions[sign], size, self.about.point)
         if not self.found.directions[sign].scales:
             return start

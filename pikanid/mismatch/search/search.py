@@ -42,6 +42,7 @@ class Search:
         fits: The closest fit of each set of effects.
         begun: Where fits have begun.
         failed_searches: Effects that were looked for beyond all hills, and explained nothing.
+        screens: What may be added to hypotheses, by their fits and the candidates.
         guess: Parameters that the nominal model was given with.
         workers: Threads that fit side by side; the results do not depend on their number.
     """
@@ -55,6 +56,7 @@ class Search:
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     begun: set[object] = field(default_factory=set)
     failed_searches: set[frozenset[str]] = field(default_factory=set)
+    screens: dict[object, Screen] = field(default_factory=dict)
     spent: float = 0.0
     workers: int = 1
 
@@ -217,7 +219,7 @@ class Search:
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
-        new = replace(self, records=records, fits={}, begun=set(),
+        new = replace(self, records=records, fits={}, begun=set(), screens={},
                       failed_searches=set(self.failed_searches))
         new._fit_all([((), [self.base().point])], always=True)
         new.base()
@@ -242,7 +244,7 @@ class Search:
                 always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
         if len(hypothesis.effects) >= self.settings.budget.effects:
             return
-        screen = Screen(hypothesis, neighbours.beside(hypothesis, self.candidates))
+        screen = self._screened(hypothesis)
         needs, bent = self.settings.search, any(e.channel == "input" for e in hypothesis.effects)
         least = needs.much * hypothesis.minimum.chi2 if hypothesis.far else least
         jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
@@ -256,6 +258,14 @@ class Search:
         settled = frozenset() if hypothesis.far else hypothesis.key
         self._fit_all(jobs, always=anyway, settled=settled)
         self._fit_all(lost, again=True, settled=settled)
+
+    def _screened(self, hypothesis: Hypothesis) -> Screen:
+        beside = neighbours.beside(hypothesis, self.candidates)
+        asked = hypothesis.fit, tuple(c.key for c in beside)
+        if asked not in self.screens:  # the best ones are extended again and again
+            self.screens[asked] = Screen(hypothesis, beside)
+            self.screens[asked].forget_signs()
+        return self.screens[asked]
 
     def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False) -> Hypothesis:
         self._fit_all([(effects, starts)], again, always=True)
