@@ -121,11 +121,6 @@ class Screen:
         scaled = np.linalg.lstsq(about.movable / norms, self.found.D, SPANNED)[0]
         self.taken = scaled / norms[:, None]
 
-    def forget_signs(self) -> None:
-        """Let go of all columns over time, which `pairs` alone asks for again."""
-        self.units = np.empty((0, self.units.shape[1]))
-        self.found = replace(self.found, D=self.units)
-
     def best(self, candidate: int, count: int = 1) -> list[int]:
         """A candidate's most telling signs, no two neighbours."""
         own = np.flatnonzero(self.found.owner == candidate)
@@ -265,3 +260,17 @@ class Screen:
                 values[n] = start.values[n] + other.values[n] - now
             listed.append(((a, b), [Start(values, origin)]))
         return listed
+
+
+def kept(screens: dict[object, Screen], about: Hypothesis, candidates: Sequence[Candidate]
+         ) -> Screen:
+    """The screen of these candidates, from those that are kept: the best hypotheses are extended
+    again and again.  It lets go of the columns over time, which `Screen.pairs` alone asks for.
+    """
+    asked = about.fit, tuple(c.key for c in candidates)
+    if asked not in screens:
+        screen = Screen(about, candidates)
+        screen.units = np.empty((0, len(screen.z)))
+        screen.found = replace(screen.found, D=screen.units)
+        screens[asked] = screen
+    return screens[asked]

@@ -20,7 +20,7 @@ from pikanid.mismatch.fitting.progressive_horizon import hits, lost
 from pikanid.mismatch.search import neighbours
 from pikanid.mismatch.search.neighbours import Job
 from pikanid.mismatch.search.overdispersion import overdispersion
-from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, law, nothing
+from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, kept, law, nothing
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
@@ -233,8 +233,8 @@ class Search:
 
     def ranked(self) -> list[Hypothesis]:
         """Best first; the noise counts as what the best explanation leaves."""
-        scale = self.scale()
-        return in_order(self.fits.values(), lambda h: h.score(scale), Hypothesis.place)
+        score = partial(Hypothesis.score, scale=self.scale())
+        return in_order(self.fits.values(), score, Hypothesis.place)
 
     def scale(self) -> float:
         """The overdispersion: what χ² is divided by."""
@@ -244,7 +244,7 @@ class Search:
                 always: Callable[[Candidate], bool] = nothing, anyway: bool = False) -> None:
         if len(hypothesis.effects) >= self.settings.budget.effects:
             return
-        screen = self._screened(hypothesis)
+        screen = kept(self.screens, hypothesis, neighbours.beside(hypothesis, self.candidates))
         needs, bent = self.settings.search, any(e.channel == "input" for e in hypothesis.effects)
         least = needs.much * hypothesis.minimum.chi2 if hypothesis.far else least
         jobs: list[Job] = [((*hypothesis.effects, candidate), starts)
@@ -258,14 +258,6 @@ class Search:
         settled = frozenset() if hypothesis.far else hypothesis.key
         self._fit_all(jobs, always=anyway, settled=settled)
         self._fit_all(lost, again=True, settled=settled)
-
-    def _screened(self, hypothesis: Hypothesis) -> Screen:
-        beside = neighbours.beside(hypothesis, self.candidates)
-        asked = hypothesis.fit, tuple(c.key for c in beside)
-        if asked not in self.screens:  # the best ones are extended again and again
-            self.screens[asked] = Screen(hypothesis, beside)
-            self.screens[asked].forget_signs()
-        return self.screens[asked]
 
     def _fit(self, effects: Sequence[Candidate], starts: Starts, again: bool = False) -> Hypothesis:
         self._fit_all([(effects, starts)], again, always=True)
@@ -282,11 +274,9 @@ class Search:
         failed = frozenset(self.failed_searches)
 
         def work(job: Job, chi2: float) -> tuple[Hypothesis | None, Closest]:
-            (effects, starts), closest = job, Closest(chi2)
-            effects = sorted(effects, key=lambda e: order[e.key])
-            key = frozenset(e.key for e in effects)
-            return fitted(self.nominal, effects, self.records, starts, self.choices, closest,
-                          key if key in failed else settled), closest
+            closest, key = Closest(chi2), frozenset(e.key for e in job[0])
+            return fitted(self.nominal, sorted(job[0], key=lambda e: order[e.key]), self.records,
+                          job[1], self.choices, closest, key if key in failed else settled), closest
 
         def take(job: Job, result: tuple[Hypothesis | None, Closest]) -> None:
             found, _ = result
