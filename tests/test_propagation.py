@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from pikanid.mismatch.detect.propagation import (
     TOGETHER,
@@ -57,6 +58,22 @@ def test_forces_in_every_equation_and_beginnings_are_carried_along(parts: int, e
         wanted = np.stack([x[:, 0], 2 * x[:, 2] + T * x[:, 1]])
         np.testing.assert_allclose(y[k], wanted, atol=error * np.abs(wanted).max())
     assert not y[4:].any()
+
+
+@pytest.mark.parametrize("parts", [1, 4])
+def test_constant_matrix_gives_the_exponential(parts: int) -> None:
+    a = np.array([[0.0, 1.0], [-4.0, -0.3]])
+    M, _ = step_matrices(np.broadcast_to(a, (3, 200, 2, 2)).copy(), np.full(200, 0.02), parts)
+    whole = np.linalg.multi_dot(M[::-1])
+    assert whole == pytest.approx(expm(4.0 * a), abs=1e-6 / parts**4)
+
+
+def test_a_system_that_forgets_at_once_stays_stable_in_parts() -> None:
+    M, B = step_matrices(np.full((3, 50, 1, 1), -300.0), np.full(50, 0.01), 2)
+    G, y = np.zeros((TOGETHER, 1, 50)), np.zeros((TOGETHER, 1, 51))
+    add_forces(B, np.full((1, 51), 300.0), np.array([0]), np.array([0]), G)
+    add_outputs(M, G, np.zeros((TOGETHER, 1)), np.ones((51, 1, 1)), y)
+    assert y[0, 0, -1] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_what_is_seen_already_stays() -> None:
