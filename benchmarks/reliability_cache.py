@@ -115,19 +115,18 @@ class Cached:
     def function(self) -> bytes:
         """What functions of three modules give that numba has compiled."""
         from pikanid.approximators.local_basis import tabulate
-        from pikanid.mismatch.catalogue.recurrences import follow
+        from pikanid.mismatch.detect.propagation import step_matrices
         from pikanid.problem.backlash import play
         from pikanid.storage.jit import cached_jit
 
         t = np.linspace(0.0, 1.0, 50)
-        (found_play, found_follow) = (cached_jit()(f.py_func) for f in (play, follow))
+        (found_play, found_steps) = (cached_jit()(f.py_func) for f in (play, step_matrices))
         found_tabulate = cached_jit(error_model="numpy", nogil=True)(tabulate.py_func)
         carried = found_play(t, np.sin(9 * t), np.cos(9 * t), 0.1)
-        moved = found_follow(np.full((3, 49, 2, 2), -0.5), np.ones((3, 49, 2, 1)),
-                             np.diff(t), np.zeros((2, 1)), 2)
+        moved = found_steps(np.full((3, 49, 2, 2), -0.5), np.diff(t), 2)
         first, values = np.empty(50, int), np.empty((50, 4))
         found_tabulate(np.r_[[0.0] * 3, np.linspace(0, 1, 8), [1.0] * 3], 3, 0, t, first, values)
-        return b"".join(np.ascontiguousarray(a).tobytes() for a in (*carried, moved, values))
+        return b"".join(np.ascontiguousarray(a).tobytes() for a in (*carried, *moved, values))
 
     def source(self) -> bytes:
         """Samples of a compiled model."""
