@@ -27,7 +27,7 @@ from pikanid.mismatch import case
 from pikanid.mismatch import diagnose as api
 from pikanid.mismatch.beyond import formulas as symbols
 from pikanid.mismatch.data import noise_level
-from pikanid.mismatch.search import search
+from pikanid.mismatch.search import screen, search
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.mismatch.steps import reporting
 from pikanid.storage.outputs import atomically
@@ -37,8 +37,8 @@ from pikanid.validation.concealed.score import judge
 FACTORS = (0.75, 1.25)
 FEW = 3  # cases of each set that settings inside fits are tried on: nothing can be remembered
 REMEMBERED = ((noise_level, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
-              (symbols, "name_curve"), (case, "residual_tests"), (case, "held_out"),
-              (api, "force_shape"))
+              (screen, "Screen"), (symbols, "name_curve"), (case, "residual_tests"),
+              (case, "held_out"), (api, "force_shape"))
 # settings that no function of these looks up, nor what it returned: a change of one of them
 # changes no result of what is remembered
 UNREAD = frozenset({
