@@ -225,6 +225,16 @@ def test_what_is_said_beside_a_remainder_has_to_be_there(
     assert (score.found, score.found_by_name) == found
 
 
+@pytest.mark.parametrize(("hypotheses", "true"), [
+    ([["coulomb_friction"]], True), ([["coulomb_friction", "turbulence"]], True),
+    ([["coulomb_friction", "symbolic:-a*sin(m*theta + p)", "turbulence"]], True),
+    ([["turbulence"]], False), ([["coulomb_friction", "sensor_offset"]], False),
+    ([["quadratic_drag"], ["coulomb_friction"]], False)], ids=str)
+def test_beside_a_remainder_the_first_hypothesis_is_true_if_all_of_it_is_there(
+        hypotheses: list[list[str]], true: bool) -> None:
+    assert judge(ONE, answer(*hypotheses)).first_is_truth is true
+
+
 @pytest.mark.parametrize(("said", "outcome", "counts"), [
     (["dry friction or gain"], "part", (1, 0, 1)), (["gain or dry friction"], "part", (1, 0, 1)),
     (["gain or drag"], "wrong", (0, 0, 0)), (["timing", "gain or dry friction"], "part", (2, 0, 1)),

@@ -16,23 +16,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 from pikanid.validation.concealed.answers import check_case, read_answer
-from pikanid.validation.concealed.outcome import (
-    ANSWERS,
-    Outcome,
-    found,
-    outcome_of,
-    read,
-    same,
-    truth_of,
-)
+from pikanid.validation.concealed.outcome import ANSWERS, Outcome, found, outcome_of, truth_of
 from pikanid.validation.concealed.visibility import FROM_NOMINAL
 
 Entry = Mapping[str, Any]
+TRUE: tuple[Outcome, ...] = ("right", "visible", "formula")  # definition: of one hypothesis
 
 
 @dataclass(frozen=True)
@@ -57,7 +50,9 @@ class Score:
             or `other`; of a `long` one `visible` if only the visible part is in it.
         hypotheses: How many were given.
         probability: Of the most probable one; None where nothing is answered.
-        first_is_truth: Whether that one is the truth, its visible part, or a formula of its kind.
+        first_is_truth: Whether that one is the truth, its visible part, or a formula of its kind;
+            beside laws of no catalogue, whether it holds every hidden effect and nothing that does
+            not hide.
         within: Whether each base parameter lies within 3 standard errors of the truth; None where
             none is compared.
         held_out: RMSE after the diagnosis over the noise; None where it is not given.
@@ -157,8 +152,7 @@ def judge(case: Entry, diagnosis: Entry) -> Score:
         case["id"], case["class"], case["nameable"], float(case["visibility"]["nominal"]),
         answer.verdict, answer.mismatch, outcome, reason, len(given),
         answer.probabilities[0] if answered else None,
-        answered and any(same([read(effect) for effect in given[0]], t)
-                         for t in (truth.effects, truth.visible) if t),
+        answered and outcome_of(case, truth, replace(answer, hypotheses=given[:1]))[0] in TRUE,
         _within(case["base"], answer.after), answer.held_out,
         bool(truth.laws), strong, by_any, by_name, of_two)
 
