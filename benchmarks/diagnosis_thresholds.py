@@ -1,20 +1,17 @@
 """Do verdicts survive when a setting is a quarter smaller or larger?
 
-    python benchmarks/diagnosis_thresholds.py [--work build/diagnosis] [--cases 8] [--workers 2]
-
 Every field of `pikanid.Settings` is varied unless `LEFT_OUT` says why not.  One at a time is
 scaled, and recordings of the open sets are diagnosed again.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import itertools
 import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -32,10 +29,10 @@ from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.mismatch.steps import reporting
 from pikanid.storage.outputs import atomically
 from pikanid.strategies.nls import NLS
-from pikanid.validation.concealed.score import judge
+from pikanid.validation.concealed.score import Share, judge
 
 FACTORS = (0.75, 1.25)
-FEW = 3  # cases of each set that settings inside fits are tried on: nothing can be remembered
+BAD = ("wrong", "failed")
 REMEMBERED = ((noise_level, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
               (screen, "Screen"), (symbols, "name_curve"), (case, "residual_tests"),
               (case, "held_out"), (api, "force_shape"))
@@ -178,10 +175,15 @@ def answers(job: tuple[Path, str, Path, bool]) -> Answers:
         for factor in FACTORS if thoroughly or not threshold.inside_fits else ():
             settings = changed(threshold, factor)
             if settings is not None:
-                key = f"{threshold} x {factor}"
-                found[key] = answer(key, settings,
-                                    Memory() if threshold.inside_fits else memory.fork())
+                found[key_of(threshold, factor)] = answer(
+                    key_of(threshold, factor), settings,
+                    Memory() if threshold.inside_fits else memory.fork())
     return found
+
+
+def key_of(threshold: Threshold, factor: float) -> str:
+    """Of an answer."""
+    return f"{threshold} x {factor}"
 
 
 def explained(answer: Mapping[str, Any]) -> tuple[str, frozenset[Any]]:
@@ -193,25 +195,49 @@ def explained(answer: Mapping[str, Any]) -> tuple[str, frozenset[Any]]:
 
 @dataclass(frozen=True)
 class Tried:
-    """One case: its name, entry of the truth file, and answers."""
+    """What became of one case.
+
+    Attributes:
+        name: Of its set, and its own.
+        made: When, and by which versions.
+        mismatch: Whether something is missing by the default settings.
+        outcome: What the score makes of that answer.
+        tried: Names of the settings that were changed.
+        changed: Outcome where the verdict, or the ids of a hypothesis, became others, by key.
+    """
 
     name: str
-    truth: Mapping[str, Any]
-    answers: Answers
+    made: str
+    mismatch: bool
+    outcome: str
+    tried: tuple[str, ...]
+    changed: Mapping[str, str]
 
-    def outcome(self, key: str) -> str:
-        """What the score makes of an answer."""
-        answer = self.answers[key]
+    def was(self, threshold: Threshold, factor: float) -> str | None:
+        """The outcome with a setting changed; None where that was not tried."""
+        if threshold.name not in self.tried or changed(threshold, factor) is None:
+            return None
+        return self.changed.get(key_of(threshold, factor), self.outcome)
+
+
+def compared(name: str, made: str, truth: Mapping[str, Any], found: Answers) -> Tried:
+    """The answers of one case with that of the default settings."""
+    def outcome(answer: Mapping[str, Any]) -> str:
         return ("failed" if answer["verdict"].startswith("failed")
-                else judge(self.truth, answer).outcome)
+                else judge(truth, answer).outcome)
 
-    def survives(self, key: str) -> bool:
-        """Whether verdict and hypotheses are those of the default settings."""
-        return explained(self.answers[key]) == explained(self.answers[BASE])
+    base = found[BASE]
+    own = [t.name for t in thresholds() if any(key_of(t, f) in found for f in FACTORS)]
+    return Tried(name, made, base["mismatch"], outcome(base), tuple(own), {
+        key: outcome(answer) for key, answer in found.items()
+        if explained(answer) != explained(base)})
 
 
-def tried(cases: int, work: Path, workers: int, sets: Sequence[str] | None) -> list[Tried]:
-    """The first cases of each set that lies in the work folder."""
+def tried(cases: int, thorough: int, work: Path, workers: int, sets: Sequence[str] | None,
+          made: str) -> dict[str, dict[str, Any]]:
+    """The first cases of each set that lies in the work folder, `Tried` as dicts by name; of the
+    first `thorough` ones of each set, settings that act inside fits and tests are changed as well.
+    """
     jobs, truths = [], []
     for file in sorted(work.glob("*/truth.json")):
         name = file.parent.name
@@ -219,15 +245,19 @@ def tried(cases: int, work: Path, workers: int, sets: Sequence[str] | None) -> l
             for k, case in enumerate(json.loads(file.read_text())["cases"][:cases]):
                 truths.append((f"{name} {case['id']}", case))
                 jobs.append((file.parent / "recordings", case["id"],
-                             work / "thresholds" / name / case["id"], k < FEW))
+                             work / "thresholds" / name / case["id"], k < thorough))
     with ProcessPoolExecutor(workers) as pool:
-        return [Tried(name, truth, found) for (name, truth), found in zip(
-            truths, pool.map(answers, jobs), strict=True)]
+        return {name: asdict(compared(name, made, truth, found)) for (name, truth), found in zip(
+            truths, pool.map(answers, jobs), strict=True)}
 
 
-def section(cases: int, work: Path, workers: int, sets: Sequence[str] | None = None) -> str:
-    """The table: verdicts and outcomes that each threshold changes."""
-    found = tried(cases, work, workers, sets)
+def section(kept: Mapping[str, Mapping[str, Any]]) -> str:
+    """The table: verdicts and outcomes that each threshold changes.
+
+    Args:
+        kept: What `tried` has found, in any number of runs.
+    """
+    found = [Tried(**{**one, "tried": tuple(one["tried"])}) for one in kept.values()]
     rows: list[str] = []
     harmless: dict[int, list[str]] = {}
     moved: dict[str, dict[str, None]] = {}
@@ -239,17 +269,23 @@ def section(cases: int, work: Path, workers: int, sets: Sequence[str] | None = N
             rows += lines
         else:
             harmless.setdefault(counts[0], []).append(f"`{threshold}` ({_told(threshold.value)})")
-    missing = sum(c.answers[BASE]["mismatch"] for c in found)
-    few = min(FEW, cases) * len({c.name.split()[0] for c in found})
+    each = [(c, c.was(t, f), key_of(t, f) in c.changed)
+            for c in found for t in thresholds() for f in FACTORS if c.was(t, f) is not None]
+    missing = sum(c.mismatch for c in found)
+    few = sum(any(t.inside_fits and t.name in c.tried for t in thresholds()) for c in found)
     parts = [
         f"\n## Settings a quarter smaller and larger, {len(found)} cases\n",
-        f"The first cases of each set ({missing} of them with something missing), diagnosed again "
-        "with one setting changed; whole numbers move by one at least. Settings that act "
+        f"The first cases of several sets ({missing} of them with something missing), diagnosed "
+        "again with one setting changed; whole numbers move by one at least. Settings that act "
         f"inside fits and tests are tried on {few} of them. A verdict survives if it and the ids "
         "of all its hypotheses stay the same; an outcome is what the score makes of it. Numerical "
         "tolerances, bounds and starting values, which are no settings, are not varied.\n",
-        f"Verdicts that survive every change: {len(found) - len(moved)} of {len(found)}. "
-        f"Outcomes that do: {sum(_same_outcomes(c) for c in found)} of {len(found)}.\n"]
+        f"Verdicts that survive: {Share(sum(not moves for *_, moves in each), len(each))}; "
+        f"outcomes: {Share(sum(was == c.outcome for c, was, _ in each), len(each))}; became wrong: "
+        f"{sum(was in BAD and c.outcome not in BAD for c, was, _ in each)}.\n",
+        f"Cases whose verdict survives every change: {len(found) - len(moved)} of {len(found)}; "
+        "whose outcome does: "
+        f"{sum(set(c.changed.values()) <= {c.outcome} for c in found)} of {len(found)}.\n"]
     if rows:
         parts += ["| setting | value | changed verdicts | changed outcomes | became wrong |",
                   "| --- | --- | --- | --- | --- |", *rows, "", "Verdicts that do not survive: "
@@ -258,36 +294,25 @@ def section(cases: int, work: Path, workers: int, sets: Sequence[str] | None = N
               for own, names in sorted(harmless.items(), reverse=True)]
     parts += ["Not varied:\n", *(f"- {why}: " + ", ".join(
         f"`{t}`" for t in all_settings() if reason(t) == why) + "." for why in LEFT_OUT)]
+    parts += ["\nMade with:\n", *(f"- {made} ({', '.join(c.name for c in found if c.made == made)})"
+                                  for made in sorted({c.made for c in found}))]
     return "\n".join(parts) + "\n"
 
 
 def _row(threshold: Threshold, factor: float, found: Sequence[Tried]
          ) -> tuple[str, int, list[str]]:
     """A row of the table, how many cases were tried, and those whose verdict changes."""
-    key = f"{threshold} x {factor}"
-    own = [c for c in found if key in c.answers]
-    touched = [c for c in own if not c.survives(key)]
-    outcomes = [c for c in touched if c.outcome(key) != c.outcome(BASE)]
-    wrong = [c.name for c in outcomes if c.outcome(key) in ("wrong", "failed")]
+    key = key_of(threshold, factor)
+    own = [c for c in found if c.was(threshold, factor) is not None]
+    touched = [c for c in own if key in c.changed]
+    outcomes = [c for c in touched if c.changed[key] != c.outcome]
+    wrong = [c.name for c in outcomes if c.changed[key] in BAD]
     return (f"| `{threshold}` | {_told(threshold.value)} → {_told(scaled(threshold.value, factor))}"
             f" | {len(touched)} of {len(own)} | {len(outcomes)} of {len(own)} | "
             f"{', '.join(wrong) or '-'} |", len(own), [c.name for c in touched])
-
-
-def _same_outcomes(case: Tried) -> bool:
-    return {case.outcome(key) for key in case.answers} == {case.outcome(BASE)}
 
 
 def _told(value: Any) -> str:
     if isinstance(value, tuple):
         return "(" + ", ".join(_told(v) for v in value) + ")"
     return f"{value:.4g}"
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--work", type=Path, default=Path("build/diagnosis"))
-    parser.add_argument("--cases", type=int, default=8)
-    parser.add_argument("--workers", type=int, default=2)
-    chosen = parser.parse_args()
-    print(section(chosen.cases, chosen.work, chosen.workers))

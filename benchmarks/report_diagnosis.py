@@ -2,11 +2,12 @@
 
     python benchmarks/report_diagnosis.py [FOLDER] [--work build/diagnosis] [--cases 80]
         [--workers 2] [--only rich alarms ...] [--rounds 3] [--alarms 400] [--thresholds 8]
-        [--recordings silverbox ...]
+        [--thorough 3] [--recordings silverbox ...]
 
 Every set is made from its seed, every diagnosis is kept in the work folder: an interrupted run goes
 on where it stopped.  Scores are kept in FOLDER/diagnosis.json: sets and sections that are not asked
-for stay as they are.  Nothing of the truth reaches a diagnosis.
+for stay as they are, and so do cases with changed thresholds.  Nothing of the truth reaches a
+diagnosis.
 """
 
 from __future__ import annotations
@@ -93,11 +94,13 @@ def main() -> None:
     parser.add_argument("--thresholds", type=int, default=8,
                         help="cases of each set that are diagnosed again with every threshold "
                              "changed")
-    parser.add_argument("--thresholds-of", choices=[s.name for s in SETS], nargs="*",
-                        default=[s.name for s in SETS], help="sets that those are taken from")
+    parser.add_argument("--thorough", type=int, default=3,
+                        help="of these, cases of each set with thresholds inside fits changed")
+    every = rounds(SETS, MOST_ROUNDS)
+    parser.add_argument("--thresholds-of", choices=[s.name for s in every], nargs="*",
+                        help="sets that those are taken from; by default all in the work folder")
     parser.add_argument("--recordings", choices=list(diagnosis_real.RECORDINGS), nargs="*",
                         default=list(diagnosis_real.RECORDINGS), help="real ones to diagnose")
-    every = rounds(SETS, MOST_ROUNDS)
     parser.add_argument("--only", choices=[*(s.name for s in every), *SECTIONS], nargs="*",
                         help="sets and sections to run; by default all")
     given = parser.parse_args()
@@ -124,9 +127,7 @@ def main() -> None:
     sections: dict[str, Callable[[], str]] = {
         "decoys": lambda: diagnosis_decoys.section(given.work, given.workers, ["outside"]),
         "alarms": lambda: diagnosis_alarms.section(given.alarms, given.work, given.workers),
-        "thresholds": lambda: diagnosis_thresholds.section(
-            given.thresholds, given.work, given.workers,
-            [s.name for s in chosen if s.name in given.thresholds_of]),
+        "thresholds": lambda: _thresholds(kept, given),
         "real": lambda: _real(given.work, given.recordings)}
     for name in SECTIONS:
         if name in asked:
@@ -146,6 +147,14 @@ def _kept_set(one: Set, work: Path, cases: int, workers: int) -> dict[str, Any]:
             "scores": [asdict(score) for score, _ in found],
             "cpu": [answer["cpu"] for _, answer in found],
             "alone": _alone(work / one.name, [score.case for score, _ in longest])}
+
+
+def _thresholds(kept: dict[str, Any], given: argparse.Namespace) -> str:
+    """The section; cases of earlier runs stay in it."""
+    every = kept.setdefault("thresholds", {})
+    every.update(diagnosis_thresholds.tried(
+        given.thresholds, given.thorough, given.work, given.workers, given.thresholds_of, _made()))
+    return diagnosis_thresholds.section(every)
 
 
 def _real(work: Path, names: Sequence[str]) -> str:

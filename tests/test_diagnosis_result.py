@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import cast
 
 import pytest
 
 import pikanid as pk
+import pikanid.mismatch.diagnose as module
 from pikanid.estimate import Estimate
 from pikanid.mismatch.beyond.region import Interval
 from pikanid.mismatch.judge.verdict import Answer, Verdict
@@ -20,6 +22,8 @@ from pikanid.mismatch.steps.opening import open_case
 from pikanid.mismatch.steps.reporting import reported
 from pikanid.model.systems import sloshing
 from pikanid.reporting.diagnosis_page import _where
+
+Recordings = tuple[pk.Recording, ...] | None
 
 
 def explanation(name: str, expression: str, probability: float = 0.5) -> Explanation:
@@ -48,6 +52,42 @@ def test_where_is_said_in_words_and_as_data() -> None:
     none = replace(said, where=replace(said.where, channels=()))
     assert [d.where.channel for d in (said, several, none)] == ["dynamics", "several", "undecided"]
     assert "channel undecided" in str(none) and "undecided between" in _where(none)
+
+
+@pytest.mark.parametrize(("first", "other", "missed", "verdict"), [
+    ("unnamed", "partial", 2.0, "partial"), ("unconfirmed", "named", 2.0, "named"),
+    ("unnamed", "partial", 0.5, "unnamed"), ("unnamed", "unconfirmed", 2.0, "unnamed"),
+    ("unnamed", "none", 2.0, "unnamed"), ("partial", "named", 2.0, "partial"),
+    ("none", "named", 2.0, "none"), ("unnamed", pk.errors.BadRecording("short"), 2.0, "unnamed")])
+def test_recordings_are_exchanged_where_nothing_is_proved(
+        monkeypatch: pytest.MonkeyPatch, first: Verdict, other: Verdict | Exception, missed: float,
+        verdict: Verdict) -> None:
+    one, two = (pk.simulate(sloshing(), pk.excitation.two_pulse(), sigma=0.002, seed=seed)
+                for seed in (1, 2))
+    stretch = (0.0, 1.0)
+
+    def opened(model: pk.Model, train: Recordings, later: Recordings, quiet: object,
+               **rest: object) -> SimpleNamespace:
+        assert (train, later, quiet) in [((one,), (two,), stretch), ((two,), (one,), None),
+                                         ((one,), None, stretch)]
+        chi2 = 7.0 + (1.0 if train == (one,) else missed)
+        base = SimpleNamespace(minimum=SimpleNamespace(chi2=chi2), whitened=SimpleNamespace(rows=7))
+        return SimpleNamespace(train=train, proves=later is not None, base=base)
+
+    def diagnosed(case: SimpleNamespace, quiet: object, tell: object) -> Diagnosis:
+        if case.train == (one,):
+            return diagnosis(first)
+        if isinstance(other, Exception):
+            raise other
+        return replace(diagnosis(other), notes=("its own",))
+
+    monkeypatch.setattr(module, "open_case", opened)
+    monkeypatch.setattr(module, "_diagnosed", diagnosed)
+    found = pk.diagnose(sloshing(), one, two, quiet=stretch)
+    assert found.verdict == verdict
+    assert found.exchanged == (first != verdict)
+    assert found.notes == ((module.EXCHANGED, "its own") if found.exchanged else ())
+    assert pk.diagnose(sloshing(), one, quiet=stretch).verdict == first  # nothing to exchange
 
 
 @pytest.mark.parametrize("verdict", ["set", "unconfirmed"])

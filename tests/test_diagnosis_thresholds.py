@@ -1,5 +1,7 @@
 """Scaled settings: every field is varied or left out; a repeated diagnosis is exact."""
 
+import json
+from dataclasses import asdict
 
 import diagnosis_thresholds as varied
 import numpy as np
@@ -71,7 +73,7 @@ def test_a_memory_tells_arguments_apart_by_content():
     assert len(calls) == 5
 
 
-def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
+def test_a_section_says_what_does_not_survive():
     def answer(identifier):
         return {"verdict": "named", "mismatch": True, "hypotheses": [
             {"effects": [{"ids": [identifier]}], "probability": 1.0}]}
@@ -82,17 +84,23 @@ def test_a_section_says_what_does_not_survive(monkeypatch, tmp_path):
                             "best_rival_distance": 9.0}}
     keys = {f"{t} x {f}": answer("input_delay") for t in varied.thresholds()
             for f in varied.FACTORS}
-    case = varied.Tried("rich 001", truth, {
+    unset = sum(varied.changed(t, f) is None for t in varied.thresholds() for f in varied.FACTORS)
+    case = varied.compared("rich 001", "today", truth, {
         varied.BASE: answer("input_delay"), **keys,
         "verdict.decoy_handicap x 0.75": answer("sensor_delay"),
         "verdict.behind x 1.25": answer("wall")})
-    monkeypatch.setattr(varied, "tried", lambda *given: [case])
-    text = varied.section(1, tmp_path, 1)
-    assert "Verdicts that survive every change: 0 of 1. Outcomes that do: 0 of 1." in text
+    few = varied.compared("rich 002", "later", truth, {
+        key: answer("input_delay") for key in (varied.BASE, "verdict.behind x 0.75")})
+    assert few.tried == ("verdict.behind",)
+    text = varied.section(json.loads(json.dumps({"a": asdict(case), "b": asdict(few)})))
+    assert "whose verdict survives every change: 1 of 2; whose outcome does: 1 of 2." in text
+    assert "; became wrong: 1." in text
+    assert f"Verdicts that survive: {len(keys) - unset}/{len(keys) - unset + 2} (" in text
     assert "| `verdict.decoy_handicap` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
-    assert "| `verdict.behind` | 3 → 3.75 | 1 of 1 | 1 of 1 | rich 001 |" in text
+    assert "| `verdict.behind` | 3 → 3.75 | 1 of 2 | 1 of 2 | rich 001 |" in text
     assert "rich 001 (`verdict.behind`, `verdict.decoy_handicap`)" in text
     assert "No verdict of 1 depends on `" in text and "`verdict.improvement`" in text
+    assert "- later (rich 002)" in text
 
 
 def test_a_diagnosis_repeated_fits_nothing_anew(monkeypatch):

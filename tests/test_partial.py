@@ -313,3 +313,22 @@ def test_a_partial_answer_is_told_everywhere(diagnosed: pk.Diagnosis) -> None:
     assert "(probability" not in text + str(diagnosed)  # something else is there for sure
     assert "Surely there" in text and "dry friction" in text and "are left" in text
     assert "Surely: " in str(diagnosed)
+
+
+@pytest.mark.slow
+def test_a_motion_that_shows_little_refutes_what_another_one_tells() -> None:
+    # a wall that the smaller motion hardly touches: what it tells does not predict the larger one
+    parts = [pk.Parameter(name, value) for name, value in (
+        ("c", 0.5), ("k_w", 2000.0), ("w", 0.15), ("a", 0.3))]
+    truth = pk.systems.sloshing().with_term(
+        "theta_dot", "-c*tanh(theta_dot/0.02) - k_w*max(theta - w, 0) - a*sin(7*t)", parts)
+    small, large = (pk.simulate(truth, pk.excitation.planar_moves(count, 6.0, stroke=stroke, seed=k),
+                                sigma=0.002, seed=k)
+                    for k, count, stroke in ((1, 2, 0.15), (2, 4, 0.4)))
+    found = pk.diagnose(pk.systems.sloshing(), small, large)
+    assert (found.verdict, found.exchanged) == ("partial", True)
+    assert {p.family for p in found.present} == {"restoring force", "dry friction"}
+    assert found.to_dict()["exchanged"] is True
+    assert found.held_out is not None and found.held_out.recordings == (small.name,)
+    assert found.notes[0].startswith("Recordings exchanged")
+    assert "Recordings exchanged" in page(found, "run")

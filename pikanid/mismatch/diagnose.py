@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from pikanid import errors
 from pikanid.mismatch.beyond.force_shape import ForceShape, force_shape
@@ -13,6 +14,7 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import smaller
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.parallel import blas_on_one_thread, threads
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.diagnosis import Diagnosis
@@ -29,6 +31,9 @@ from pikanid.recording import Recording
 from pikanid.settings import of_kind
 
 Recordings = Recording | Sequence[Recording]
+SURE = ("none", "named", "set", "partial")  # definition: verdicts that are proved
+EXCHANGED = ("Recordings exchanged: the held-out ones are explained, and what was found is proved on "
+             "the others, which tell too little of it to be explained themselves.")
 
 
 def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
@@ -41,8 +46,10 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
     The model is refitted, its residual whitened by the noise and tested against all that the
     catalogue could have left there; entries, and pairs of them, are added inside the equations and
     refitted; what explains the recording must then predict `held_out`.  That proves an effect only
-    if it could have refuted it.  Of very long recordings the beginnings are diagnosed; a note says
-    so.
+    if it could have refuted it.  Where nothing is proved so and `held_out` shows more of what
+    is missing, that is explained and has to predict `train`: a motion that hardly shows a law tells
+    little of its parameters, and can refute them nevertheless.  Of very long recordings the
+    beginnings are diagnosed.  Notes say both.
 
     Args:
         model: Nominal model.  Where a state is the rate of another one, but for a constant factor,
@@ -87,22 +94,47 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         raise errors.BadModel(errors.nothing_free(model.name))
     later = None if held_out is None else several(held_out)
     with blas_on_one_thread():
-        found = _diagnosed(model, several(train), later, settings, quiet, tell,
-                           threads(workers, settings.budget.threads))
+        opened = partial(open_case, model, tell=tell, settings=settings,
+                         workers=threads(workers, settings.budget.threads))
+        case = opened(several(train), later, quiet)
+        found = _diagnosed(case, quiet, tell)
+        if later is not None and case.proves and found.verdict not in SURE:
+            tell("recordings exchanged")
+            found = _exchanged(case, partial(opened, later, several(train), None), tell) or found
     return replace(found, seconds=time.perf_counter() - begun)
 
 
-def _diagnosed(model: Model, train: tuple[Recording, ...], later: tuple[Recording, ...] | None,
-               settings: Settings, quiet: tuple[float, float] | None, tell: Callable[[str], None],
-               workers: int) -> Diagnosis:
-    case = open_case(model, train, later, quiet, tell, settings, workers)
+def _exchanged(case: Case, opened: Callable[[], Case], tell: Callable[[str], None]
+               ) -> Diagnosis | None:
+    """The diagnosis with the held-out recordings explained and the others held out, where those
+    show more of what is missing, and it is proved so.
+    """
+    try:
+        other = opened()
+        if not smaller(_missed(case.base), _missed(other.base)):
+            return None
+        found = _diagnosed(other, None, tell)
+    except errors.PikanidError:  # good enough to be predicted, not to be explained
+        return None
+    return None if found.verdict not in SURE or not found.mismatch else replace(
+        found, exchanged=True, notes=(EXCHANGED, *found.notes))
+
+
+def _missed(nominal: Hypothesis) -> float:
+    """χ² that the nominal model misses beside noise."""
+    return nominal.minimum.chi2 - nominal.whitened.rows
+
+
+def _diagnosed(case: Case, quiet: tuple[float, float] | None, tell: Callable[[str], None]
+               ) -> Diagnosis:
+    alpha = case.settings.alpha
     tell("detection")
     detection = case.detected()
-    if not smaller(detection.p_value, settings.alpha):
+    if not smaller(detection.p_value, alpha):
         return _nothing_left(case, detection)
     first, ranked = case.base, searched(case, tell)
     if case.base is not first and not smaller(
-            (detection := case.detected()).p_value, settings.alpha):
+            (detection := case.detected()).p_value, alpha):
         return _nothing_left(case, detection)  # the nominal model had been in a wrong minimum
     ranked = with_noise_of_the_rest(case, ranked, quiet, tell)
     tell("confirmation")

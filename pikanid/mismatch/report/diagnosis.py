@@ -50,6 +50,8 @@ class Diagnosis(DiagnosisData):
             anything does.
         present: What is surely there, where the verdict is "partial".
         remainder: What is left then.
+        exchanged: Whether the held-out recordings are the ones explained, and the proof is on the
+            others.
     """
 
     def to_dict(self) -> dict[str, Any]:
@@ -60,6 +62,7 @@ class Diagnosis(DiagnosisData):
             "mismatch": self.mismatch,
             "p_value": self.p_value,
             "alpha": self.alpha,
+            "exchanged": self.exchanged,
             "where": {"channel": self.where.channel, "channels": list(self.where.channels),
                       "equation": self.where.equation,
                       "depends_on": list(self.where.depends_on),

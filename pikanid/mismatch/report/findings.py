@@ -209,6 +209,7 @@ class DiagnosisData:
     doubt: str = ""
     present: tuple[Present, ...] = ()
     remainder: Remainder | None = None
+    exchanged: bool = False
 
     @property
     def alpha(self) -> float:
