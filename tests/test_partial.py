@@ -322,8 +322,8 @@ def test_a_motion_that_shows_little_refutes_what_another_one_tells() -> None:
         ("c", 0.5), ("k_w", 2000.0), ("w", 0.15), ("a", 0.3))]
     truth = pk.systems.sloshing().with_term(
         "theta_dot", "-c*tanh(theta_dot/0.02) - k_w*max(theta - w, 0) - a*sin(7*t)", parts)
-    small, large = (pk.simulate(truth, pk.excitation.planar_moves(count, 6.0, stroke=stroke, seed=k),
-                                sigma=0.002, seed=k)
+    small, large = (pk.simulate(truth, pk.excitation.planar_moves(
+        count, 6.0, stroke=stroke, seed=k), sigma=0.002, seed=k)
                     for k, count, stroke in ((1, 2, 0.15), (2, 4, 0.4)))
     found = pk.diagnose(pk.systems.sloshing(), small, large)
     assert (found.verdict, found.exchanged) == ("partial", True)

@@ -32,8 +32,8 @@ from pikanid.settings import of_kind
 
 Recordings = Recording | Sequence[Recording]
 SURE = ("none", "named", "set", "partial")  # definition: verdicts that are proved
-EXCHANGED = ("Recordings exchanged: the held-out ones are explained, and what was found is proved on "
-             "the others, which tell too little of it to be explained themselves.")
+EXCHANGED = ("Recordings exchanged: the held-out ones are explained, and what was found is proved "
+             "on the others, which tell too little of it to be explained themselves.")
 
 
 def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None, *,
