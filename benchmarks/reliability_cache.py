@@ -133,6 +133,7 @@ class Cached:
         from pikanid.problem.problem import bind
         from pikanid.simulation.simulator import Simulator
 
+        self.compiled.compiled.cache_clear()
         self.compiled._load.cache_clear()
         found = Simulator(self.model, bind(self.model, self.drive, need_outputs=False)).run(
             np.array([0.045, 0.15, 0.3, 9.81]), np.arange(4), states=True)
@@ -163,7 +164,7 @@ def _damages(number: int, rng: np.random.Generator) -> list[Damaged]:
     known = {kind: use() for kind, use in uses.items()}
     folder = cache.cache_folder()
     assert folder is not None
-    titles = {"tape": ("object_",), "function": ("play_", "follow_", "tabulate_"),
+    titles = {"tape": ("object_",), "function": ("play_", "step_matrices_", "tabulate_"),
               "source": ("model_",), "model": ("integrate_",)}
     # The integrator of tapes stays in memory: its entry would not be used again in this process.
     entries = {kind: sorted(p for p in folder.iterdir() if p.name.startswith(titles[kind])
