@@ -207,6 +207,19 @@ def test_a_name_is_as_sure_as_its_family_where_no_other_member_does_nearly_as_we
     assert isinstance(found, Present) and found.names == names
 
 
+@pytest.mark.parametrize("left, share, names", [
+    (1.1, 0.95, ("sensor_lag", "actuator_lag")), (1.3, 0.95, ("sensor_lag",)),
+    (1.3, 0.85, ("sensor_lag", "actuator_lag")), (5.0, 0.85, ("sensor_lag",))])
+def test_a_name_holds_what_small_motions_cannot_tell_from_it(
+        left: float, share: float, names: tuple[str, ...]) -> None:
+    lag, other = (effect(name, "timing", twin="lag") for name in ("sensor_lag", "actuator_lag"))
+    lead = weighed((lag,), 1.0, 0.995, share)
+    found = _examined(Kind("timing", ""), lead, [lead, weighed((other,), left, 0.004),
+                      weighed((DRAG,), 9.0, 0.001)], RULE, DEFAULTS.least_proof, never)
+    assert isinstance(found, Present) and found.names == names
+    assert [e.key for e in found.twins] == list(names[1:])
+
+
 def test_what_noise_hides_is_no_remainder() -> None:
     """Without a floor, explanations that leave nothing would dominate each other at random."""
     found = examined(weighed((COULOMB,), 1e-9, 0.995), weighed((DRAG,), 0.1, 0.005))

@@ -41,13 +41,15 @@ class Present:
     Attributes:
         kind: Family of physics, and where.
         effect: The best explanation's member of it.
-        names: The effect's ids, where no other member does as well; else empty.
+        names: The effect's ids and those of its twins, where no other member does as well; else
+            empty.
         alternatives: Other members that were compared: names by key.
         probability, probability_family: Posterior of the effect, and of the family.
         dominance, dominance_within: κ over explanations without the family, and without the effect.
         share: Of the held-out misfit's square that the best explanation with it explains.
         instead: Another family, where only that one of both is there is sure: what is said of the
             family holds for both together, and no name is sure.
+        twins: What small motions cannot tell from the effect and does about as well.
     """
 
     kind: Kind
@@ -60,6 +62,7 @@ class Present:
     dominance_within: float
     share: float
     instead: Instead | None = None
+    twins: tuple[Candidate, ...] = ()
 
     @property
     def family(self) -> Family:
@@ -220,14 +223,28 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     # takes up what other laws leave
     clearly = rule.dominance if isinstance(effect.exponent, Parameter) else rule.within
     blurred = effect.key in lead.hypothesis.blurred
+    # as sure as the family itself, where much is left
+    clearly = rule.dominance if smaller(lead.share, rule.exact) else clearly
     exact = instead is None and all(e.known for e in own_effects) and not (
-        blurred or other_form or smaller(own, 1 - rule.rate) or smaller(within, clearly)
-        # as sure as the family itself, whatever is left
-        or (smaller(lead.share, rule.exact) and smaller(within, rule.dominance)))
+        blurred or other_form or smaller(own, 1 - rule.rate) or smaller(within, clearly))
+    twins = _twins(effect, lead, holders, clearly * max(lead.left, rule.floor))
     compared = {e.key: e.name for w in holders for k in either
                 for e in members(k, w.hypothesis, rule.dry) if e.key != effect.key}
-    return Present(kind, effect, effect.ids if exact else (),
-                   compared, own, total, kappa, within, lead.share, instead)
+    names = dict.fromkeys(i for e in (effect, *twins) for i in e.ids)
+    return Present(kind, effect, tuple(names) if exact else (),
+                   compared, own, total, kappa, within, lead.share, instead, twins)
+
+
+def _twins(effect: Candidate, lead: Weighed, holders: Sequence[Weighed], enough: float
+           ) -> tuple[Candidate, ...]:
+    """What small motions cannot tell from an effect, in explanations that leave less than
+    `enough` with it in its place.
+    """
+    own = {e.key for e in lead.hypothesis.effects}
+    found = {e.key: e for w in holders if smaller(w.left, enough)
+             and all(e.key != effect.key for e in w.hypothesis.effects)
+             for e in w.hypothesis.effects if e.alike and e.alike == effect.alike and e.known}
+    return tuple(e for key, e in found.items() if key not in own)
 
 
 def rivals(kind: Kind, effect: Candidate, own: Hypothesis, found: Iterable[Weighed]

@@ -24,8 +24,9 @@ class Present:
 
     Attributes:
         family: Of physics, as "dry friction".
-        ids: Its name, where no other member of the family does as well; else empty.
-        name: Of the member in the best explanation, for people.
+        ids: Its name, where no other member of the family does as well, with what small motions
+            cannot tell from it, as a lag of the sensor from one of the actuator; else empty.
+        name: Of the member in the best explanation, for people; where that is sure, with those.
         expression: As that is added to the model.
         alternatives: Other members that were compared: names by key.
         probability: Posterior of that member.

@@ -7,6 +7,7 @@ from scipy.signal import periodogram
 
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.judge.partial import Doubtful
+from pikanid.mismatch.judge.partial import Present as Sure
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Proof, values_of
 from pikanid.mismatch.report.locate import loud_windows
@@ -23,11 +24,16 @@ def present(answer: Answer) -> tuple[Present, ...]:
         values, wider = (values_of(p.effect.parameters, h.values, h.std, by)
                          for by in (1.0, counts))
         found.append(Present(
-            p.family, p.names, p.effect.name, p.effect.expression, p.alternatives, p.probability,
+            p.family, p.names, _name(p), p.effect.expression, p.alternatives, p.probability,
             p.probability_family, _finite(p.dominance), _finite(p.dominance_within), p.share,
             values, {n: v.std for n, v in wider.items()},
             p.instead.kind.family if p.instead else ""))
     return tuple(found)
+
+
+def _name(p: Sure) -> str:
+    """Of the effect, with those of twins where that is sure."""
+    return " or ".join(dict.fromkeys((p.effect.name, *(t.name for t in p.twins if p.names))))
 
 
 def remainder(case: Case, answer: Answer, proof: Proof | None) -> Remainder | None:
