@@ -213,9 +213,12 @@ def test_a_name_is_as_sure_as_its_family_where_no_other_member_does_nearly_as_we
 def test_a_name_holds_what_small_motions_cannot_tell_from_it(
         left: float, share: float, names: tuple[str, ...]) -> None:
     lag, other = (effect(name, "timing", twin="lag") for name in ("sensor_lag", "actuator_lag"))
+    rounded = effect("sensor_lag", "timing", twin="lag")  # the same one in another shape
+    vars(rounded)["key"] = "sensor_lag[rounded]"
     lead = weighed((lag,), 1.0, 0.995, share)
-    found = _examined(Kind("timing", ""), lead, [lead, weighed((other,), left, 0.004),
-                      weighed((DRAG,), 9.0, 0.001)], RULE, DEFAULTS.least_proof, never)
+    every = [lead, weighed((other,), left, 0.003), weighed((rounded,), 1.0, 0.001),
+             weighed((DRAG,), 9.0, 0.001)]
+    found = _examined(Kind("timing", ""), lead, every, RULE, DEFAULTS.least_proof, never)
     assert isinstance(found, Present) and found.names == names
     assert [e.key for e in found.twins] == list(names[1:])
 

@@ -243,7 +243,8 @@ def _twins(effect: Candidate, lead: Weighed, holders: Sequence[Weighed], enough:
     own = {e.key for e in lead.hypothesis.effects}
     found = {e.key: e for w in holders if smaller(w.left, enough)
              and all(e.key != effect.key for e in w.hypothesis.effects)
-             for e in w.hypothesis.effects if e.alike and e.alike == effect.alike and e.known}
+             for e in w.hypothesis.effects if e.alike and e.alike == effect.alike and e.known
+             and not set(e.ids) <= set(effect.ids)}
     return tuple(e for key, e in found.items() if key not in own)
 
 
