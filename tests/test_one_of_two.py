@@ -12,6 +12,7 @@ from pikanid.mismatch.judge import explanations
 from pikanid.mismatch.judge.explanations import Weighed
 from pikanid.mismatch.judge.kinds import Kind
 from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, _one_of_two
+from pikanid.mismatch.search.neighbours import with_bent_scales
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import surely
 
@@ -87,3 +88,18 @@ def test_the_best_without_both_families_are_compared() -> None:
         for k, e in enumerate([(GAIN,), *[(SPRING,)] * 30, (DRAG,)]))
     pool = explanations._pool([gain, *springs, neither], RULE)
     assert neither in pool and len(pool) < 20
+
+
+def test_a_curve_of_an_input_is_compared_with_scales_that_bend() -> None:
+    """At the levels of a switched input a limit and a parabola pass through the same points."""
+    def law(key: str, family: str, channel: str = "input", next_to: str = "") -> Any:
+        return SimpleNamespace(key=key, families=(family,), channel=channel, next_to=next_to)
+
+    limit, drag = law("input_saturation", "input curve"), law("quadratic_drag", "drag", "dynamics")
+    bent = law("input_gain_bent_2", "gain", next_to="input_gain")
+    every = (limit, drag, bent, law("input_gain", "gain"),
+             law("sensor_gain_bent_2", "gain", "sensor", "sensor_gain"))
+    h: Any = SimpleNamespace(effects=(drag, limit), key={drag.key, limit.key}, point={"l": 1.0})
+    assert [*with_bent_scales(h, every)] == [((drag, bent), [{"l": 1.0}])]
+    h.effects = (drag,)
+    assert not [*with_bent_scales(h, every)]

@@ -165,6 +165,17 @@ def with_curves(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]
             yield (*_rest(h, gain), curve), starts or [h.point]
 
 
+def with_bent_scales(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With each scale of an input that bends in the place of a curve of one: at the few levels that
+    a switched input has, all of them pass through the same points.
+    """
+    bent = [c for c in candidates
+            if c.next_to and c.channel == "input" and "gain" in c.families and c.key not in h.key]
+    for effect in h.effects:
+        if "input curve" in effect.families:
+            yield from (((*_rest(h, effect), c), [h.point]) for c in bent)
+
+
 def with_walls(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """With each wall in the place of a limit of the sensor, at that limit: where a reading stops,
     the motion may.
