@@ -1,22 +1,24 @@
 """Do verdicts survive when a setting is a quarter smaller or larger?
 
 Every field of `pikanid.Settings` is varied unless `LEFT_OUT` says why not.  One at a time is
-scaled, and recordings of the open sets are diagnosed again.
+scaled, and recordings of the open sets are diagnosed again, unless the other value would have
+decided nothing otherwise (`watched`).
 """
 
 from __future__ import annotations
 
 import contextlib
-import itertools
+import copy
 import json
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 from remembering import Memory
+from watched import Watched, lifted
 
 import pikanid as pk
 from pikanid.errors import PikanidError
@@ -24,15 +26,17 @@ from pikanid.mismatch import case
 from pikanid.mismatch import diagnose as api
 from pikanid.mismatch.beyond import formulas as symbols
 from pikanid.mismatch.data import noise_level
+from pikanid.mismatch.fitting import decisions
 from pikanid.mismatch.search import screen, search
+from pikanid.mismatch.settings import thresholds as rates
+from pikanid.mismatch.settings import verdict
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.mismatch.steps import reporting
+from pikanid.objective import adequacy
 from pikanid.storage.outputs import atomically
 from pikanid.strategies.nls import NLS
-from pikanid.validation.concealed.score import Share, judge
 
 FACTORS = (0.75, 1.25)
-BAD = ("wrong", "failed")
 REMEMBERED = ((noise_level, "estimate"), (NLS, "fit"), (search, "fitted"), (search, "Screen"),
               (screen, "Screen"), (symbols, "name_curve"), (case, "residual_tests"),
               (case, "held_out"), (api, "force_shape"))
@@ -50,6 +54,10 @@ UNREAD = frozenset({
 SKIPPED: tuple[tuple[Any, str, Any], ...] = (
     (reporting, "advice", ""), (reporting, "force_over_time", None), (api, "patch", None),
     (reporting, "smallest", {}), (reporting, "local_force", None))
+# functions of settings that return a number, or decide, and do nothing else
+LIFTED = (*((rates, name) for name in ("quantile", "least_proof", "visible", "separated", "excess",
+                                       "contradiction", "dominance")),
+          (verdict, "dominance"), (adequacy, "_decides"), (decisions, "isfinite"))
 LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "says where, how large or what next once the verdict stands": (
         "band", "beyond.own", "beyond.line", "beyond.inside", "beyond.knots_a_period",
@@ -140,6 +148,11 @@ def diagnosed(train: pk.Recording, other: pk.Recording, settings: Settings, memo
     with contextlib.ExitStack() as stack:
         for where, name in REMEMBERED:
             stack.enter_context(patch.object(where, name, memory.of(getattr(where, name))))
+        return _diagnosed(train, other, settings)
+
+
+def _diagnosed(train: pk.Recording, other: pk.Recording, settings: Settings) -> dict[str, Any]:
+    with contextlib.ExitStack() as stack:
         for where, name, nothing in SKIPPED:
             stack.enter_context(patch.object(where, name, return_value=nothing))
         try:
@@ -151,168 +164,70 @@ def diagnosed(train: pk.Recording, other: pk.Recording, settings: Settings, memo
         for h in dx.hypotheses]}
 
 
+def watched(noted: set[str]) -> Settings:
+    """The defaults, whose changes are noted, by `key_of`, if they may lead to another answer."""
+    settings = copy.copy(DEFAULTS)
+    groups: dict[str, Any] = {"": settings}
+    for threshold in thresholds():
+        others = {key_of(threshold, f): scaled(threshold.value, f) for f in FACTORS
+                  if changed(threshold, f) is not None}
+        value: Any = Watched(threshold.value, others, noted)
+        if isinstance(threshold.value, tuple):
+            value = tuple(Watched(entry, {key: other[k] for key, other in others.items()}, noted)
+                          for k, entry in enumerate(threshold.value))
+        group, _, name = threshold.name.rpartition(".")
+        if group not in groups:
+            groups[group] = copy.copy(getattr(DEFAULTS, group))
+            # past their checks, which want numbers
+            object.__setattr__(settings, group, groups[group])
+        object.__setattr__(groups[group], name, value)
+    return settings
+
+
+def decisive(train: pk.Recording, other: pk.Recording) -> tuple[dict[str, Any], set[str]]:
+    """What a diagnosis answers, and the changes, by `key_of`, that may lead to another answer."""
+    noted: set[str] = set()
+    with contextlib.ExitStack() as stack:
+        for where, name in LIFTED:
+            stack.enter_context(patch.object(where, name, lifted(getattr(where, name))))
+        return _diagnosed(train, other, watched(noted)), noted
+
+
 Answers = dict[str, dict[str, Any]]
 BASE = "unchanged"
 
 
-def answers(job: tuple[Path, str, Path, bool]) -> Answers:
-    """Of one case, by threshold and factor; each is kept as a file."""
-    recordings, case, kept, thoroughly = job
+def answers(job: tuple[Path, str, Path]) -> Answers:
+    """Of one case, by threshold and factor: those that may differ; each is kept as a file."""
+    recordings, case, kept = job
     kept.mkdir(parents=True, exist_ok=True)
     train, other = (pk.Recording.read(f"{recordings}/{case}_{part}.csv")
                     for part in ("train", "held_out"))
     memory = Memory(UNREAD)
 
-    def answer(key: str, settings: Settings, remembered: Memory) -> dict[str, Any]:
-        file = kept / f"{key}.json"
+    def kept_as(name: str, make: Callable[[], Any]) -> Any:
+        file = kept / f"{name}.json"
         if not file.exists():
-            atomically(file, json.dumps(diagnosed(train, other, settings, remembered)).encode())
-        kept_answer: dict[str, Any] = json.loads(file.read_text())
-        return kept_answer
+            atomically(file, json.dumps(make()).encode())
+        return json.loads(file.read_text())
 
-    found = {BASE: answer(BASE, DEFAULTS, memory)}
+    def watch() -> tuple[dict[str, Any], list[str]]:
+        answer, noted = decisive(train, other)
+        return answer, sorted(noted)
+
+    base, noted = kept_as("watched", watch)
+    found = {BASE: kept_as(BASE, partial(diagnosed, train, other, DEFAULTS, memory))}
+    if found[BASE] != base:
+        raise RuntimeError(f"watched settings changed the diagnosis of {recordings}/{case}")
     for threshold in sorted(thresholds(), key=lambda t: t.inside_fits):
-        for factor in FACTORS if thoroughly or not threshold.inside_fits else ():
-            settings = changed(threshold, factor)
-            if settings is not None:
-                found[key_of(threshold, factor)] = answer(
-                    key_of(threshold, factor), settings,
-                    Memory() if threshold.inside_fits else memory.fork())
+        for factor in FACTORS:
+            settings, key = changed(threshold, factor), key_of(threshold, factor)
+            if settings is not None and key in noted:
+                own = Memory() if threshold.inside_fits else memory.fork()
+                found[key] = kept_as(key, partial(diagnosed, train, other, settings, own))
     return found
 
 
 def key_of(threshold: Threshold, factor: float) -> str:
     """Of an answer."""
     return f"{threshold} x {factor}"
-
-
-def explained(answer: Mapping[str, Any]) -> tuple[str, frozenset[Any]]:
-    """The verdict, and the ids of every hypothesis."""
-    return answer["verdict"], frozenset(
-        tuple(sorted(tuple(sorted(e["ids"])) for e in h["effects"]))
-        for h in answer["hypotheses"])
-
-
-@dataclass(frozen=True)
-class Tried:
-    """What became of one case.
-
-    Attributes:
-        name: Of its set, and its own.
-        made: When, and by which versions.
-        mismatch: Whether something is missing by the default settings.
-        outcome: What the score makes of that answer.
-        tried: Names of the settings that were changed.
-        changed: Outcome where the verdict, or the ids of a hypothesis, became others, by key.
-    """
-
-    name: str
-    made: str
-    mismatch: bool
-    outcome: str
-    tried: tuple[str, ...]
-    changed: Mapping[str, str]
-
-    def was(self, threshold: Threshold, factor: float) -> str | None:
-        """The outcome with a setting changed; None where that was not tried."""
-        if threshold.name not in self.tried or changed(threshold, factor) is None:
-            return None
-        return self.changed.get(key_of(threshold, factor), self.outcome)
-
-
-def compared(name: str, made: str, truth: Mapping[str, Any], found: Answers) -> Tried:
-    """The answers of one case with that of the default settings."""
-    def outcome(answer: Mapping[str, Any]) -> str:
-        return ("failed" if answer["verdict"].startswith("failed")
-                else judge(truth, answer).outcome)
-
-    base = found[BASE]
-    own = [t.name for t in thresholds() if any(key_of(t, f) in found for f in FACTORS)]
-    return Tried(name, made, base["mismatch"], outcome(base), tuple(own), {
-        key: outcome(answer) for key, answer in found.items()
-        if explained(answer) != explained(base)})
-
-
-def tried(cases: int, thorough: int, work: Path, workers: int, sets: Sequence[str] | None,
-          made: str) -> dict[str, dict[str, Any]]:
-    """The first cases of each set that lies in the work folder, `Tried` as dicts by name; of the
-    first `thorough` ones of each set, settings that act inside fits and tests are changed as well.
-    """
-    jobs, truths = [], []
-    for file in sorted(work.glob("*/truth.json")):
-        name = file.parent.name
-        if sets is None or name in sets:
-            for k, case in enumerate(json.loads(file.read_text())["cases"][:cases]):
-                truths.append((f"{name} {case['id']}", case))
-                jobs.append((file.parent / "recordings", case["id"],
-                             work / "thresholds" / name / case["id"], k < thorough))
-    with ProcessPoolExecutor(workers) as pool:
-        return {name: asdict(compared(name, made, truth, found)) for (name, truth), found in zip(
-            truths, pool.map(answers, jobs), strict=True)}
-
-
-def section(kept: Mapping[str, Mapping[str, Any]]) -> str:
-    """The table: verdicts and outcomes that each threshold changes.
-
-    Args:
-        kept: What `tried` has found, in any number of runs.
-    """
-    found = [Tried(**{**one, "tried": tuple(one["tried"])}) for one in kept.values()]
-    rows: list[str] = []
-    harmless: dict[int, list[str]] = {}
-    moved: dict[str, dict[str, None]] = {}
-    for threshold in thresholds():
-        lines, counts, touched = zip(*(_row(threshold, f, found) for f in FACTORS), strict=True)
-        for name in itertools.chain(*touched):
-            moved.setdefault(name, {})[f"`{threshold}`"] = None
-        if any(touched):
-            rows += lines
-        else:
-            harmless.setdefault(counts[0], []).append(f"`{threshold}` ({_told(threshold.value)})")
-    each = [(c, c.was(t, f), key_of(t, f) in c.changed)
-            for c in found for t in thresholds() for f in FACTORS if c.was(t, f) is not None]
-    missing = sum(c.mismatch for c in found)
-    few = sum(any(t.inside_fits and t.name in c.tried for t in thresholds()) for c in found)
-    parts = [
-        f"\n## Settings a quarter smaller and larger, {len(found)} cases\n",
-        f"The first cases of several sets ({missing} of them with something missing), diagnosed "
-        "again with one setting changed; whole numbers move by one at least. Settings that act "
-        f"inside fits and tests are tried on {few} of them. A verdict survives if it and the ids "
-        "of all its hypotheses stay the same; an outcome is what the score makes of it. Numerical "
-        "tolerances, bounds and starting values, which are no settings, are not varied.\n",
-        f"Verdicts that survive: {Share(sum(not moves for *_, moves in each), len(each))}; "
-        f"outcomes: {Share(sum(was == c.outcome for c, was, _ in each), len(each))}; became wrong: "
-        f"{sum(was in BAD and c.outcome not in BAD for c, was, _ in each)}.\n",
-        f"Cases whose verdict survives every change: {len(found) - len(moved)} of {len(found)}; "
-        "whose outcome does: "
-        f"{sum(set(c.changed.values()) <= {c.outcome} for c in found)} of {len(found)}.\n"]
-    if rows:
-        parts += ["| setting | value | changed verdicts | changed outcomes | became wrong |",
-                  "| --- | --- | --- | --- | --- |", *rows, "", "Verdicts that do not survive: "
-                  + "; ".join(f"{c} ({', '.join(by)})" for c, by in moved.items()) + ".\n"]
-    parts += [f"No verdict of {own} depends on {', '.join(names)}.\n"
-              for own, names in sorted(harmless.items(), reverse=True)]
-    parts += ["Not varied:\n", *(f"- {why}: " + ", ".join(
-        f"`{t}`" for t in all_settings() if reason(t) == why) + "." for why in LEFT_OUT)]
-    parts += ["\nMade with:\n", *(f"- {made} ({', '.join(c.name for c in found if c.made == made)})"
-                                  for made in sorted({c.made for c in found}))]
-    return "\n".join(parts) + "\n"
-
-
-def _row(threshold: Threshold, factor: float, found: Sequence[Tried]
-         ) -> tuple[str, int, list[str]]:
-    """A row of the table, how many cases were tried, and those whose verdict changes."""
-    key = key_of(threshold, factor)
-    own = [c for c in found if c.was(threshold, factor) is not None]
-    touched = [c for c in own if key in c.changed]
-    outcomes = [c for c in touched if c.changed[key] != c.outcome]
-    wrong = [c.name for c in outcomes if c.changed[key] in BAD]
-    return (f"| `{threshold}` | {_told(threshold.value)} → {_told(scaled(threshold.value, factor))}"
-            f" | {len(touched)} of {len(own)} | {len(outcomes)} of {len(own)} | "
-            f"{', '.join(wrong) or '-'} |", len(own), [c.name for c in touched])
-
-
-def _told(value: Any) -> str:
-    if isinstance(value, tuple):
-        return "(" + ", ".join(_told(v) for v in value) + ")"
-    return f"{value:.4g}"

@@ -1,8 +1,8 @@
 """How good are diagnoses?  Open sets of concealed recordings, scored: `reports/diagnosis.md`.
 
     python benchmarks/report_diagnosis.py [FOLDER] [--work build/diagnosis] [--cases 80]
-        [--workers 2] [--only rich alarms ...] [--rounds 3] [--alarms 400] [--thresholds 8]
-        [--thorough 3] [--recordings silverbox ...]
+        [--workers 2] [--only rich alarms ...] [--rounds 3] [--alarms 400] [--thresholds 3]
+        [--recordings silverbox ...]
 
 Every set is made from its seed, every diagnosis is kept in the work folder: an interrupted run goes
 on where it stopped.  Scores are kept in FOLDER/diagnosis.json: sets and sections that are not asked
@@ -26,7 +26,7 @@ from typing import Any
 import diagnosis_alarms
 import diagnosis_decoys
 import diagnosis_real
-import diagnosis_thresholds
+import thresholds_page
 from diagnosis_page import draw_reliability, page, scores
 from diagnosis_rows import Row, table
 from provenance import provenance
@@ -91,11 +91,9 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3, help="of the sets of all kinds of cases")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--alarms", type=int, default=400, help="clean recordings of each noise")
-    parser.add_argument("--thresholds", type=int, default=8,
+    parser.add_argument("--thresholds", type=int, default=3,
                         help="cases of each set that are diagnosed again with every threshold "
                              "changed")
-    parser.add_argument("--thorough", type=int, default=3,
-                        help="of these, cases of each set with thresholds inside fits changed")
     every = rounds(SETS, MOST_ROUNDS)
     parser.add_argument("--thresholds-of", choices=[s.name for s in every], nargs="*",
                         help="sets that those are taken from; by default all in the work folder")
@@ -152,9 +150,9 @@ def _kept_set(one: Set, work: Path, cases: int, workers: int) -> dict[str, Any]:
 def _thresholds(kept: dict[str, Any], given: argparse.Namespace) -> str:
     """The section; cases of earlier runs stay in it."""
     every = kept.setdefault("thresholds", {})
-    every.update(diagnosis_thresholds.tried(
-        given.thresholds, given.thorough, given.work, given.workers, given.thresholds_of, _made()))
-    return diagnosis_thresholds.section(every)
+    every.update(thresholds_page.tried(
+        given.thresholds, given.work, given.workers, given.thresholds_of, _made()))
+    return thresholds_page.section(every)
 
 
 def _real(work: Path, names: Sequence[str]) -> str:

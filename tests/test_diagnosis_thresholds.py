@@ -1,12 +1,16 @@
 """Scaled settings: every field is varied or left out; a repeated diagnosis is exact."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import diagnosis_thresholds as varied
 import numpy as np
 import pytest
+import thresholds_page
+from hypothesis import given
+from hypothesis import strategies as st
 from remembering import Memory
+from watched import Watched
 
 import pikanid as pk
 from pikanid.mismatch.search import search
@@ -73,6 +77,40 @@ def test_a_memory_tells_arguments_apart_by_content():
     assert len(calls) == 5
 
 
+@given(st.lists(st.floats(-3, 3), min_size=1, max_size=4),
+       st.floats(0.1, 3), st.floats(0.1, 3), st.floats(0.5, 2))
+def test_what_is_not_noted_changes_nothing(data, limit, scale, factor):
+    def program(limit, scale):
+        rows = np.array(data)
+        kept = rows[np.abs(rows) <= 2 * limit]
+        if not len(kept) or max(limit, 1.0) * scale**2 < 1.5:
+            return "few", len(kept)
+        spread = np.sqrt(scale) * kept.std() + round(-limit, 1) / 4
+        return ("wide" if spread > 0.1 else "narrow"), len(kept)
+
+    noted = set()
+    found = program(Watched(limit, {"limit": limit * factor}, noted),
+                    Watched(scale, {"scale": scale * factor}, noted))
+    assert found == program(limit, scale)
+    if "limit" not in noted:
+        assert program(limit * factor, scale) == found
+    if "scale" not in noted:
+        assert program(limit, scale * factor) == found
+
+
+@pytest.mark.parametrize("look", [float, int, str, range, np.cumsum, lambda n: [1, 2, 3][:n],
+                                  lambda n: f"{n:d}", lambda n: n.bit_length(), np.add.reduce])
+def test_whatever_else_looks_at_a_number_is_noted(look):
+    noted = set()
+    number = Watched(3, {"more": 4}, noted)
+    sum_of = 2 * number + 1
+    assert not noted
+    assert str(look(number)) == str(look(3))
+    assert noted == {"more"}
+    noted.clear()
+    assert sum_of == 7 and noted == {"more"}
+
+
 def test_a_section_says_what_does_not_survive():
     def answer(identifier):
         return {"verdict": "named", "mismatch": True, "hypotheses": [
@@ -83,19 +121,19 @@ def test_a_section_says_what_does_not_survive():
              "visibility": {"nominal": 40.0, "effects": [40.0], "best_rival": [],
                             "best_rival_distance": 9.0}}
     keys = {f"{t} x {f}": answer("input_delay") for t in varied.thresholds()
-            for f in varied.FACTORS}
-    unset = sum(varied.changed(t, f) is None for t in varied.thresholds() for f in varied.FACTORS)
-    case = varied.compared("rich 001", "today", truth, {
+            for f in varied.FACTORS if varied.changed(t, f) is not None}
+    case = thresholds_page.compared("rich 001", "today", truth, {
         varied.BASE: answer("input_delay"), **keys,
         "verdict.decoy_handicap x 0.75": answer("sensor_delay"),
         "verdict.behind x 1.25": answer("wall")})
-    few = varied.compared("rich 002", "later", truth, {
-        key: answer("input_delay") for key in (varied.BASE, "verdict.behind x 0.75")})
-    assert few.tried == ("verdict.behind",)
-    text = varied.section(json.loads(json.dumps({"a": asdict(case), "b": asdict(few)})))
+    assert case.diagnosed == len(keys)
+    few = replace(thresholds_page.compared("rich 002", "later", truth, {
+        varied.BASE: answer("input_delay")}), tried=("verdict.behind",))
+    text = thresholds_page.section(json.loads(json.dumps({"a": asdict(case), "b": asdict(few)})))
     assert "whose verdict survives every change: 1 of 2; whose outcome does: 1 of 2." in text
     assert "; became wrong: 1." in text
-    assert f"Verdicts that survive: {len(keys) - unset}/{len(keys) - unset + 2} (" in text
+    assert f"Verdicts that survive: {len(keys)}/{len(keys) + 2} (" in text
+    assert f" 2/{len(keys) + 2} (" in text
     assert "| `verdict.decoy_handicap` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
     assert "| `verdict.behind` | 3 → 3.75 | 1 of 2 | 1 of 2 | rich 001 |" in text
     assert "rich 001 (`verdict.behind`, `verdict.decoy_handicap`)" in text
@@ -130,3 +168,18 @@ def test_a_remembered_diagnosis_is_the_same():
         settings = varied.changed(SETTINGS[name], factor)
         assert varied.diagnosed(train, other, settings, memory.fork()) == varied.diagnosed(
             train, other, settings, Memory())
+
+
+@pytest.mark.slow
+def test_what_decides_nothing_otherwise_changes_no_diagnosis():
+    train, other = (pk.simulate(pk.systems.sloshing(), excitation.planar_moves(6, 10.0, seed=seed),
+                                sigma=0.002, seed=seed) for seed in (3, 4))
+    answer, noted = varied.decisive(train, other)
+    assert answer == varied.diagnosed(train, other, DEFAULTS, Memory())
+    changes = [(t, f) for t in varied.thresholds() for f in varied.FACTORS
+               if varied.changed(t, f) is not None]
+    idle = [(t, f) for t, f in changes if varied.key_of(t, f) not in noted]
+    assert len(changes) / 3 < len(idle) < len(changes)
+    for threshold, factor in idle[::12]:
+        assert varied.diagnosed(train, other, varied.changed(threshold, factor), Memory()
+                                ) == answer, varied.key_of(threshold, factor)
