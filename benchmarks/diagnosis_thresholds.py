@@ -12,7 +12,7 @@ import copy
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -206,7 +206,13 @@ def answers(job: tuple[Path, str, Path]) -> Answers:
     kept.mkdir(parents=True, exist_ok=True)
     train, other = (pk.Recording.read(f"{recordings}/{case}_{part}.csv")
                     for part in ("train", "held_out"))
-    memory = Memory(UNREAD)
+
+    @cache
+    def usual() -> Memory:
+        memory = Memory(UNREAD)
+        if diagnosed(train, other, DEFAULTS, memory) != base:
+            raise RuntimeError(f"watched settings changed the diagnosis of {recordings}/{case}")
+        return memory
 
     def kept_as(name: str, make: Callable[[], Any]) -> Any:
         file = kept / f"{name}.json"
@@ -219,15 +225,14 @@ def answers(job: tuple[Path, str, Path]) -> Answers:
         return answer, sorted(noted)
 
     base, noted = kept_as("watched", watch)
-    found = {BASE: kept_as(BASE, partial(diagnosed, train, other, DEFAULTS, memory))}
-    if found[BASE] != base:
-        raise RuntimeError(f"watched settings changed the diagnosis of {recordings}/{case}")
+    found = {BASE: base}
     for threshold in sorted(thresholds(), key=lambda t: t.inside_fits):
         for factor in FACTORS:
             settings, key = changed(threshold, factor), key_of(threshold, factor)
             if settings is not None and key in noted:
-                own = Memory() if threshold.inside_fits else memory.fork()
-                found[key] = kept_as(key, partial(diagnosed, train, other, settings, own))
+                found[key] = kept_as(key, partial(
+                    diagnosed, train, other, settings,
+                    Memory() if threshold.inside_fits else usual().fork()))
     return found
 
 
