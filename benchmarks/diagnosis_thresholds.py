@@ -32,9 +32,10 @@ from pikanid.mismatch.search import screen, search
 from pikanid.mismatch.settings import thresholds as rates
 from pikanid.mismatch.settings import verdict
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
-from pikanid.mismatch.steps import reporting
+from pikanid.mismatch.steps import reporting, surely
 from pikanid.objective import adequacy
 from pikanid.storage.outputs import atomically
+from pikanid.strategies import nls
 from pikanid.strategies.nls import NLS
 
 FACTORS = (0.75, 1.25)
@@ -46,15 +47,18 @@ REMEMBERED = ((noise_level, "estimate"), (NLS, "fit"), (search, "fitted"), (sear
 UNREAD = frozenset({
     "alpha", "power", "refusal", "refusal_together", "needless", "noise_excess", "noise_conflict",
     "search.promising", "search.kept", "search.much", "search.equal",
-    *(name for name, _ in DEFAULTS.items() if name.startswith(("quiet.", "noise.", "verdict."))
+    *(name for name, _ in DEFAULTS.items()
+      if name.startswith(("quiet.", "noise.", "verdict.", "part."))
       and name not in ("verdict.linear", "verdict.missed")),
     *(f"budget.{name}" for name in (
-        "singles", "pairs", "beside_one", "beside_more", "leading", "effects", "carried",
-        "carried_far", "effort", "setup", "rivals", "asked_again", "tested", "predicted"))})
+        "singles", "nominal_again", "pairs", "beside_one", "beside_more", "leading", "effects",
+        "carried", "carried_far", "effort", "setup", "rivals", "asked_again", "tested",
+        "predicted"))})
 # takes time and says nothing about the verdict
 SKIPPED: tuple[tuple[Any, str, Any], ...] = (
     (reporting, "advice", ""), (reporting, "force_over_time", None), (api, "patch", None),
-    (reporting, "smallest", {}), (reporting, "local_force", None))
+    (reporting, "smallest", {}), (reporting, "local_force", None), (surely, "sure_channels", ()),
+    (nls, "changed", {}))
 # functions of settings that return a number, or decide, and do nothing else
 LIFTED = (*((rates, name) for name in ("quantile", "least_proof", "visible", "separated", "excess",
                                        "contradiction", "dominance")),
