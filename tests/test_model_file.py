@@ -132,7 +132,11 @@ BROKEN = [
     (DRIVEN.replace("l = {", "sin = {"), "built-in"),
     ("states = 3\n[equations]\nx = \"1\"", "table"),
     ("equations = 3\n[states]\nx = {}", "table"),
-    ("[states]\nx = 1\n[equations]\nx = \"1\"", "table"),
+    ("[states]\nx = 1\n[equations]\nx = \"1\"", r"'x' under \[states\] is no table"),
+    ("[states]\nx = {}\n[outputs]\nx = \"x\"", r"like x = { expression = "),
+    *((DRIVEN.replace(f"[{section}]", f"[{section}]\ndomain = \"mechanics\"\n"),
+       rf"'domain' stands under \[{section}\].* before the first")
+      for section in ("states", "inputs", "parameters", "equations", "outputs")),
     (DRIVEN + "[splines]\ne = { degree = 3 }", "knots"),
     (DRIVEN + "[splines]\ne = { degree = 3.5, knots = [0, 1, 2] }", "integer"),
     (DRIVEN + "[splines]\ne = { degree = 0, knots = [0, 1, 2] }", "degree >= 1"),

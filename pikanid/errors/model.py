@@ -24,6 +24,21 @@ def stray_equation(name: str, states: Sequence[str]) -> str:
     return f"There is an equation for '{name}', which is not a state (states: {listed(states)})."
 
 
+def no_section(source: str, section: str) -> str:
+    return f"'{source}': '{section}' is no table: begin a line with [{section}]."
+
+
+def no_table_entry(source: str, section: str, name: str) -> str:
+    first = 'expression = "...", ' if section == "outputs" else ""
+    return (f"'{source}': '{name}' under [{section}] is no table: write a line like "
+            f"{name} = {{ {first}unit = \"m\" }}.")
+
+
+def misplaced_key(source: str, section: str, key: str) -> str:
+    return (f"'{source}': '{key}' stands under [{section}], but is the model's own: move it to the "
+            "top of the file, before the first [table].")
+
+
 def not_in_model(what: str, name: str, known: Sequence[str], close: Sequence[str] = ()) -> str:
     return f"The model has no {what} '{name}' (it has: {listed(known)}).{did_you_mean(close)}"
 

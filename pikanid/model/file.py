@@ -35,6 +35,7 @@ from pikanid.storage.outputs import atomically
 M = TypeVar("M", bound=Operations)
 SECTIONS = ("name", "domain", "states", "inputs", "parameters", "equations", "outputs", "splines",
             "effects")
+OWN = SECTIONS[:2]  # of the model itself, no tables
 KEYS = {
     "states": ("unit", "initial", "guess", "bounds", "scope", "description"),
     "inputs": ("unit", "hold", "default", *INPUT_MAPS),
@@ -79,6 +80,9 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
     equations = content.get("equations", {})
     if not isinstance(equations, Mapping):
         raise errors.BadModel(errors.bad_value(f"'{source}': [equations]", "no table", "a table"))
+    for key in OWN:
+        if key in equations and key not in tables["states"]:
+            raise errors.BadModel(errors.misplaced_key(source, "equations", key))
     splines = tuple(_spline(n, e, source) for n, e in tables["splines"].items())
     parameters = {n: _parameter(n, e, source) for n, e in tables["parameters"].items()}
     for spline in splines:
@@ -175,9 +179,12 @@ def _known_keys(table: Mapping[str, Any], known: tuple[str, ...], source: str, w
 
 def _table(content: Mapping[str, Any], name: str, source: str) -> dict[str, Mapping[str, Any]]:
     table = content.get(name, {})
-    if not isinstance(table, Mapping) or not all(isinstance(e, Mapping) for e in table.values()):
-        raise errors.BadModel(errors.bad_value(
-            f"'{source}': [{name}]", "not a table of tables", "lines like  x = { unit = \"m\" }"))
+    if not isinstance(table, Mapping):
+        raise errors.BadModel(errors.no_section(source, name))
+    for key, entry in table.items():
+        if not isinstance(entry, Mapping):
+            raise errors.BadModel(errors.misplaced_key(source, name, str(key)) if key in OWN
+                                  else errors.no_table_entry(source, name, str(key)))
     if len(table) > MOST[name]:
         raise errors.BadModel(errors.too_many_entries(
             f"'{source}': [{name}]", len(table), MOST[name]))
