@@ -6,8 +6,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from opened import case, hypothesis, keys
 from weighing import COULOMB, DRAG, RULE, effect, never, weighed
 
+from pikanid.mismatch.case import Case
 from pikanid.mismatch.judge import explanations
 from pikanid.mismatch.judge.explanations import Weighed
 from pikanid.mismatch.judge.kinds import Kind
@@ -16,6 +18,7 @@ from pikanid.mismatch.search.neighbours import with_bent_scales
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import surely
 
+__all__ = ["case"]  # the fixture
 SPRING, GAIN = effect("cubic_stiffness", "restoring force"), effect("input_gain", "gain")
 
 
@@ -103,3 +106,14 @@ def test_a_curve_of_an_input_is_compared_with_scales_that_bend() -> None:
     assert [*with_bent_scales(h, every)] == [((drag, bent), [{"l": 1.0}])]
     h.effects = (drag,)
     assert not [*with_bent_scales(h, every)]
+
+
+def test_a_law_is_compared_with_what_contains_it_beside_all_the_rest(case: Case) -> None:
+    """From an exponent and a size: from nothing no step leads to an exponent."""
+    jobs: list[Any] = []
+    search: Any = SimpleNamespace(settings=DEFAULTS, candidates=case.candidates,
+                                  budget_exhausted=True, refine=lambda found, _: jobs.extend(found))
+    surely._compared(search, hypothesis(case, "quadratic_drag", "static_bias"))
+    starts = [start for effects, found in jobs for start in found
+              if keys(effects) == {"power_drag", "static_bias"}]
+    assert any(start.get("n") == 1.8 and "c_n" in start for start in starts)

@@ -24,6 +24,7 @@ from pikanid.mismatch.search.neighbours import (
     with_relatives,
     with_sums,
     with_walls,
+    with_wider,
 )
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.search.search import Search
@@ -137,15 +138,16 @@ def _without_either(search: Search, explained: Explanations, part: Part | None) 
 
 
 def _compared(search: Search, lead: Hypothesis) -> bool:
-    """Fit what an explanation is to be compared with: others of its effects' families, one law that
-    is the sum of several, curves whose slope a scale error may be, and scales that bend as a curve
-    does, and what does best without each effect, or each family; whether that found anything.
+    """Fit what an explanation is to be compared with: others of its effects' families, laws that
+    contain one of them, one law that is the sum of several, curves whose slope a scale error may
+    be, and scales that bend as a curve does, and what does best without each effect, or each
+    family; whether that found anything.
     """
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
         *with_next_form(lead, search.candidates), *with_walls(lead, search.candidates),
         *with_sums(lead, search.candidates), *with_curves(lead, search.candidates),
-        *with_bent_scales(lead, search.candidates),
+        *with_bent_scales(lead, search.candidates), *with_wider(lead, search.candidates),
         *_without_each_family(lead, search.settings.part.dry)], lead.key)
     return (not search.budget_exhausted and search.closer([lead])) or found
 
