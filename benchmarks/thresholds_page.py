@@ -113,7 +113,7 @@ def section(kept: Mapping[str, Mapping[str, Any]]) -> str:
         if any(touched):
             rows += lines
         else:
-            harmless.setdefault(counts[0], []).append(f"`{threshold}` ({_told(threshold.value)})")
+            harmless.setdefault(max(counts), []).append(f"`{threshold}` ({_told(threshold.value)})")
     each = [(c, c.was(t, f), key_of(t, f) in c.changed)
             for c in found for t in thresholds() for f in FACTORS if c.was(t, f) is not None]
     missing = sum(c.mismatch for c in found)

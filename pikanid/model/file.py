@@ -35,7 +35,7 @@ from pikanid.storage.outputs import atomically
 M = TypeVar("M", bound=Operations)
 SECTIONS = ("name", "domain", "states", "inputs", "parameters", "equations", "outputs", "splines",
             "effects")
-OWN = SECTIONS[:2]  # of the model itself, no tables
+OWN = SECTIONS[:2]  # layout: of the model itself, no tables
 KEYS = {
     "states": ("unit", "initial", "guess", "bounds", "scope", "description"),
     "inputs": ("unit", "hold", "default", *INPUT_MAPS),
