@@ -172,14 +172,16 @@ def test_a_remembered_diagnosis_is_the_same():
 
 @pytest.mark.slow
 def test_what_decides_nothing_otherwise_changes_no_diagnosis():
-    train, other = (pk.simulate(pk.systems.sloshing(), excitation.planar_moves(6, 10.0, seed=seed),
+    truth = pk.systems.sloshing().with_term(
+        "theta_dot", "-k3*theta**3", [pk.Parameter("k3", 60.0)])
+    train, other = (pk.simulate(truth, excitation.planar_moves(6, 10.0, seed=seed),
                                 sigma=0.002, seed=seed) for seed in (3, 4))
     answer, noted = varied.decisive(train, other)
-    assert answer == varied.diagnosed(train, other, DEFAULTS, Memory())
+    assert answer == varied.diagnosed(train, other, DEFAULTS, Memory()) and answer["mismatch"]
     changes = [(t, f) for t in varied.thresholds() for f in varied.FACTORS
                if varied.changed(t, f) is not None]
     idle = [(t, f) for t, f in changes if varied.key_of(t, f) not in noted]
     assert len(changes) / 3 < len(idle) < len(changes)
-    for threshold, factor in idle[::12]:
+    for threshold, factor in idle[::36]:
         assert varied.diagnosed(train, other, varied.changed(threshold, factor), Memory()
                                 ) == answer, varied.key_of(threshold, factor)

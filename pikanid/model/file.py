@@ -79,7 +79,7 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
     tables = {section: _table(content, section, source) for section in KEYS}
     equations = content.get("equations", {})
     if not isinstance(equations, Mapping):
-        raise errors.BadModel(errors.bad_value(f"'{source}': [equations]", "no table", "a table"))
+        raise errors.BadModel(errors.no_section(source, "equations"))
     for key in OWN:
         if key in equations and key not in tables["states"]:
             raise errors.BadModel(errors.misplaced_key(source, "equations", key))
