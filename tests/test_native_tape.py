@@ -18,7 +18,7 @@ from pikanid.simulation.native_tape import native
 from pikanid.simulation.simulator import Response, Simulator, Steps
 from pikanid.simulation.structure import Structure
 from pikanid.simulation.tape import tape
-from pikanid.simulation.translated import Translated
+from pikanid.simulation.translated import Translated, machine
 
 pytestmark = pytest.mark.compiled
 
@@ -90,6 +90,22 @@ def test_any_number_of_derivatives(active: int) -> None:
     every, some = run(simulator), run(simulator, active)
     assert np.array_equal(every.y, some.y)
     assert np.array_equal(every.sensitivity[:, :active], some.sensitivity)
+
+
+@pytest.mark.parametrize("term", ["-a*abs(theta_dot)*theta_dot", "-a*sign(theta_dot)"])
+def test_runs_without_derivatives_need_no_code_of_their_own(
+        term: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PIKANID_CACHE", str(tmp_path))
+    own, simulator = simulator_of(term), simulator_of(term)
+    simulator = Translated(simulator.model, simulator.experiment, estimated=(0, 1, 4))
+    machine.cache_clear()
+    native.cache_clear()
+    alone = run(simulator, 0)
+    p = values(simulator.model)
+    beside = simulator.run(p, np.array([0, 1, 4]), STEPS)
+    assert len([*(tmp_path / "compiled").glob("object_*")]) == 1
+    assert np.array_equal(alone.y, run(own, 0).y) and np.array_equal(alone.y, beside.y)
+    assert np.array_equal(beside.sensitivity, run(own).sensitivity[:, [0, 1, 4]])
 
 
 def test_what_has_been_translated_is_kept(

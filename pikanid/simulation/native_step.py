@@ -4,15 +4,20 @@ looks at a state.  That bookkeeping costs more than the formulas of a small mode
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
+from pikanid.simulation.native_formulas import Known, Moved, results, tangents, values
 from pikanid.simulation.native_text import Writer, blocks, splat
 from pikanid.simulation.tape import Tape
 
 LOOK = "ptr %r, ptr %d, double %t, double %gap, ptr %x, ptr %S, ptr %u, ptr %v, ptr %dtau"
 STEP = f"{LOOK}, double %h, ptr %xn, ptr %Sn"
-_SHARES = ("", "%half", "%half", "%h")  # of the step, after which the stages look
-_WEIGHTS = ("", "2.0", "2.0", "")
+STAGES = 4
+# shares of a step after which its stages look, and the weights of what they see
+TABLES = """
+@shares = private unnamed_addr constant [4 x double] [
+  double 0.0, double 0.5, double 0.5, double 1.0]
+@weights = private unnamed_addr constant [4 x double] [
+  double 1.0, double 2.0, double 2.0, double 1.0]
+"""
 
 
 def look(name: str, tape: Tape, lanes: int, moving_inputs: bool, *then: str) -> str:
@@ -43,55 +48,49 @@ def step(name: str, tape: Tape, lanes: int, live: set[int], moving_inputs: bool)
     """The function `name`: one step of length h from time t, states x (n,) and derivatives S
     (n, lanes) to xn and Sn; inputs are u + v gap at its start, and have delays dtau (m, lanes).
 
-    Calls `values_f` and, for any lanes, `tangents_f`.
+    The stages are a loop, in which states and what follows from them need no registers.
     """
     n, m = tape.sizes[:2]
     w = Writer(name, STEP)
-    w.lines.append("  %half = fmul double %h, 0.5")
     if moving_inputs:
         _put_inputs(w, n, m, lanes)
-    x = [w.load("x", i) for i in range(n)]
-    u, v = ([w.load(name, j) for j in range(m)] for name in "uv")
-    wide = {width: {c: splat(w, c, width) for c in ("%half", "%h", "2.0")}
-            for width in {width for _, width in blocks(lanes)}}
-    S = {(i, first): w.load("S", i * lanes + first, f"<{width} x double>")
-         for i in range(n) for first, width in blocks(lanes)}
-    kx: list[str] = []
-    kS: dict[tuple[int, int], str] = {}
-    sum_x, sum_S = list[str](), dict[tuple[int, int], str]()
-    for c, weight in zip(_SHARES, _WEIGHTS, strict=True):
-        w.store(w.op("fadd", "%t", c) if c else "%t", "r", 0)
-        gap = w.op("fadd", "%gap", c) if c else "%gap"
-        for j in range(m):
-            w.store(w.op("fadd", u[j], w.op("fmul", v[j], gap)), "r", 1 + n + j)
-        for i in range(n):
-            w.store(w.op("fadd", x[i], w.op("fmul", c, kx[i])) if c else x[i], "r", 1 + i)
-            for first, width in blocks(lanes):
-                kind, at = f"<{width} x double>", S[i, first]
-                if c:
-                    at = w.op("fadd", at, w.op("fmul", wide[width][c], kS[i, first], kind), kind)
-                w.store(at, "d", (1 + i) * lanes + first, kind)
-        w.run("values_f")
-        if lanes:
-            w.run("tangents_f")
-        out = tape.outputs["f"].tolist()
-        kx = [w.load("r", o) for o in out]
-        kS = {(i, first): w.load("d", o * lanes + first, f"<{width} x double>") if o in live
-              else "zeroinitializer" for i, o in enumerate(out) for first, width in blocks(lanes)}
-        sum_x = _summed(w, sum_x, kx, weight)
-        for (i, first), slope in kS.items():
-            width = dict(blocks(lanes))[first]
-            kind = f"<{width} x double>"
-            part = w.op("fmul", wide[width][weight], slope, kind) if weight else slope
-            sum_S[i, first] = w.op("fadd", sum_S[i, first], part, kind) if c else part
+    parts = list(blocks(lanes))
+    last, total = w.zeros(n), w.zeros(n)
+    last_S, total_S = w.zeros(n * lanes), w.zeros(n * lanes)
+    stage = w.loop("stages")
+    share, weight = w.element("shares", stage), w.element("weights", stage)
+    ahead = w.op("fmul", share, "%h")
+    gap = w.op("fadd", "%gap", ahead)
+    known: Known = {0: w.op("fadd", "%t", ahead)}
+    moved: Moved = {}
+    for i in range(n):
+        known[1 + i] = w.op("fadd", w.load("x", i), w.op("fmul", ahead, w.load(last, i)))
+        for first, width in parts:
+            kind, at = f"<{width} x double>", i * lanes + first
+            change = w.op("fmul", splat(w, ahead, width), w.load(last_S, at, kind), kind)
+            moved[1 + i, first] = w.op("fadd", w.load("S", at, kind), change, kind)
+    for j in range(m):
+        known[1 + n + j] = w.op("fadd", w.load("u", j), w.op("fmul", w.load("v", j), gap))
+    values(w, tape, "f", known)
+    slopes = results(w, tape, "f", known)
+    tangents(w, tape, "f", live, lanes, known, moved)
+    for i, (slope, o) in enumerate(zip(slopes, tape.outputs["f"].tolist(), strict=True)):
+        w.store(slope, last, i)
+        w.add(w.op("fmul", weight, slope), total, i)
+        for first, width in parts if o in live else ():
+            kind, at = f"<{width} x double>", i * lanes + first
+            if (o, first) not in moved:
+                moved[o, first] = w.load("d", o * lanes + first, kind)
+            w.store(moved[o, first], last_S, at, kind)
+            w.add(w.op("fmul", splat(w, weight, width), moved[o, first], kind), total_S, at, kind)
+    w.again("stages", stage, STAGES)
     sixth = w.op("fdiv", "%h", "6.0")
     for i in range(n):
-        w.store(w.op("fadd", x[i], w.op("fmul", sixth, sum_x[i])), "xn", i)
-    for first, width in blocks(lanes):
-        kind, factor = f"<{width} x double>", splat(w, sixth, width)
-        for i in range(n):
-            change = w.op("fmul", factor, sum_S[i, first], kind)
-            w.store(w.op("fadd", S[i, first], change, kind), "Sn", i * lanes + first, kind)
+        w.store(w.op("fadd", w.load("x", i), w.op("fmul", sixth, w.load(total, i))), "xn", i)
+        for first, width in parts:
+            kind, at = f"<{width} x double>", i * lanes + first
+            change = w.op("fmul", splat(w, sixth, width), w.load(total_S, at, kind), kind)
+            w.store(w.op("fadd", w.load("S", at, kind), change, kind), "Sn", at, kind)
     return w.text()
 
 
@@ -103,8 +102,3 @@ def _put_inputs(w: Writer, n: int, m: int, lanes: int) -> None:
             kind, at = f"<{width} x double>", j * lanes + first
             value = w.op("fmul", splat(w, slope, width), w.load("dtau", at, kind), kind)
             w.store(value, "d", (1 + n) * lanes + at, kind)
-
-
-def _summed(w: Writer, total: Sequence[str], slopes: Sequence[str], weight: str) -> list[str]:
-    parts = [w.op("fmul", weight, k) if weight else k for k in slopes]
-    return [w.op("fadd", t, p) for t, p in zip(total, parts, strict=True)] if total else parts

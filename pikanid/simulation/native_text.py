@@ -31,6 +31,32 @@ class Writer:
         at = self.put(f"getelementptr double, ptr %{array}, i64 {place}")
         self.lines.append(f"  store {kind} {value}, ptr {at}, align 8")
 
+    def zeros(self, count: int) -> str:
+        """The name of an array of so many numbers, all zero, that lives as long as the call."""
+        name = self.put(f"alloca double, i64 {max(count, 1)}")[1:]
+        for place in range(count):
+            self.store("0.0", name, place)
+        return name
+
+    def add(self, value: str, array: str, place: int, kind: str = "double") -> None:
+        """Add a value to what an array holds."""
+        self.store(self.op("fadd", self.load(array, place, kind), value, kind), array, place, kind)
+
+    def element(self, table: str, place: str) -> str:
+        """What a table holds at a place that is computed."""
+        at = self.put(f"getelementptr double, ptr @{table}, i64 {place}")
+        return self.put(f"load double, ptr {at}, align 8")
+
+    def loop(self, name: str) -> str:
+        """Begin a loop, the only one of the function; its counter, from zero."""
+        self.lines += [f"  br label %{name}", f"{name}:"]
+        return self.put(f"phi i64 [ 0, %entry ], [ %next, %{name} ]")
+
+    def again(self, name: str, counter: str, count: int) -> None:
+        """End the loop: it is run so many times."""
+        self.lines += [f"  %next = add i64 {counter}, 1", f"  %more = icmp slt i64 %next, {count}",
+                       f"  br i1 %more, label %{name}, label %done", "done:"]
+
     def call(self, function: str, *values: str) -> str:
         """A function of numbers."""
         return self.put(f"call double @{function}({', '.join(f'double {v}' for v in values)})")
@@ -50,7 +76,7 @@ class Writer:
 
     def text(self) -> str:
         """The function."""
-        return "\n".join([f"define void @{self.name}({self.signature}) {{", *self.lines,
+        return "\n".join([f"define void @{self.name}({self.signature}) {{", "entry:", *self.lines,
                           "  ret void", "}"])
 
 

@@ -46,7 +46,8 @@ class Translated(Simulator):
     """A `Simulator` of tapes: for models that are simulated a few dozen times only.
 
     Models with spline functions are compiled as usual.  `located`: the integrator stops at the
-    corners of the right-hand side, which pays where they are sharp.
+    corners of the right-hand side, which pays where they are sharp.  `estimated`: parameters whose
+    sensitivities will be asked for; runs without any need no machine code of their own then.
 
     >>> import numpy as np
     >>> from pikanid.recording import excitation
@@ -59,6 +60,7 @@ class Translated(Simulator):
     """
 
     located: bool = False
+    estimated: tuple[int, ...] = ()
 
     @functools.cached_property
     def corners(self) -> bool:
@@ -70,7 +72,9 @@ class Translated(Simulator):
         if method != "explicit" or not can_run(self.acting):
             return super().module(method)
         if method not in self._kept:
-            self._kept[method] = machine(tape(Structure(self.acting), self.located))
+            delayed = not self._undelayed and bool(self._delayed_by[list(self.estimated)].any())
+            self._kept[method] = machine(
+                tape(Structure(self.acting), self.located), self.estimated, delayed)
         return self._kept[method]
 
 
@@ -78,8 +82,8 @@ class Machine:
     """What `Simulator` asks of a compiled module: `integrate`; each thread has its own registers.
     """
 
-    def __init__(self, program: Tape):
-        self.program = program
+    def __init__(self, program: Tape, estimated: tuple[int, ...], delayed: bool):
+        self.program, self.estimated, self.delayed = program, estimated, delayed
         self.kernel = _kernel(program.sizes[4] > 0)
         self.own = threading.local()
 
@@ -99,15 +103,17 @@ class Machine:
         kept = self.own.__dict__.setdefault("kept", {})
         key = (active, delayed)
         if key not in kept:
-            code = native(self.program, active, delayed)
-            kept[key] = bound(self.program, active, code.addresses), code
+            code = (native(self.program, active, delayed) if active
+                    else native(self.program, self.estimated, self.delayed))
+            kept[key] = bound(
+                self.program, active, code.addresses if active else code.plain), code
         return kept[key][0]
 
 
 @functools.lru_cache(maxsize=512)
-def machine(program: Tape) -> Machine:
-    """The one machine of a tape."""
-    return Machine(program)
+def machine(program: Tape, estimated: tuple[int, ...], delayed: bool) -> Machine:
+    """The one machine of a tape, for the parameters whose sensitivities will be asked for."""
+    return Machine(program, estimated, delayed)
 
 
 @functools.cache

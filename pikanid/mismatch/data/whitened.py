@@ -87,8 +87,10 @@ class Whitened:
         self.problem = Problem(model, held)
         self.records = records
         self.settings = records.settings
-        self.simulators = [Translated(model, e) for e in self.problem.experiments]
-        self.columns = [self.problem.columns(r) for r in range(len(self.simulators))]
+        self.columns = [self.problem.columns(r) for r in range(len(self.problem.experiments))]
+        self.simulators = [
+            Translated(model, e, estimated=tuple(active.tolist()))
+            for e, (active, _) in zip(self.problem.experiments, self.columns, strict=True)]
         self.steps: list[Steps] = []
         # errors of the last choice of steps, and what is allowed of each where nothing is left [σ]
         self.weighed: list[tuple[float, float]] = []
@@ -111,7 +113,8 @@ class Whitened:
             self._weigh(steps, share)
             if simulator.corners and (steps is None or steps.error > allowed):
                 self.simulators[r] = Translated(
-                    simulator.model, simulator.experiment, located=True)
+                    simulator.model, simulator.experiment, located=True,
+                    estimated=simulator.estimated)
                 steps = self._steps(r, theta, allowed, finest)
                 if steps is None:  # a motion at rest on a corner meets it without end
                     self.simulators[r] = simulator

@@ -73,7 +73,8 @@ class Watched:
                 raise errors.BadSetting(errors.sigma_unknown(output.name))
         self.model, self.name = model, excitation.name
         self.problem = Problem(model, full)
-        self.simulator = Translated(model, self.problem.experiments[0])
+        self.simulator = Translated(model, self.problem.experiments[0],
+                                    estimated=tuple(self.problem.columns(0)[0].tolist()))
         self.spread = np.concatenate([np.asarray(s.sigma, float) for s in self.samples])
         self.steps: Steps | None = None
         self.kept: dict[bytes, WhitenedResponse] = {}  # at the model's own values, and the last one
