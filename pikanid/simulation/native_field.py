@@ -8,7 +8,7 @@ import numpy as np
 
 from pikanid.simulation.bound_tape import bound
 from pikanid.simulation.native_call import call_native
-from pikanid.simulation.native_tape import FUNCTIONS, native
+from pikanid.simulation.native_tape import native_field
 from pikanid.simulation.tape import GROUPS, Tape
 from pikanid.storage.jit import cached_jit
 
@@ -23,10 +23,8 @@ class NativeField:
         n, _, P, _, _ = program.sizes
         self.n, self.b = n, len(free)
         lanes = (*free, *(P + k for k in range(n)))
-        self.native = native(program, lanes, False)
-        tape = bound(program, lanes, self.native.addresses)
-        names = ("values_prelude", "tangents_prelude", f"values_{name}", f"tangents_{name}")
-        self.code = self.native.addresses[[FUNCTIONS.index(one) for one in names]]
+        self.code, self.kept = native_field(program, lanes, name)
+        tape = bound(program, lanes, self.code)
         self.at = tape.out[GROUPS.index(name)][list(rows)]
         self.r, self.d = tape.r, tape.d
         self.d[1 + np.arange(n), self.b + np.arange(n)] = 1.0

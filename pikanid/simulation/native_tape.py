@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import threading
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,64 +46,98 @@ class Native:
 
 @functools.lru_cache(maxsize=512)
 def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
-    """The functions of a tape for derivatives by the `active` parameters and initial states.
+    """What integrators of a tape call, for derivatives by the `active` parameters and initial
+    states.
 
     `moving_inputs`: the inputs move with the parameters, too, as where delays are estimated.
     """
+    engine = _linked(tape, ("integrated", active, moving_inputs),
+                     lambda: _text(tape, active, moving_inputs))
+    plain = (_NOTHING if name.startswith("tangents") else _WITHOUT.get(name, name)
+             for name in FUNCTIONS)
+    return Native(_addresses(engine, FUNCTIONS), _addresses(engine, tuple(plain)), engine)
+
+
+def native_field(tape: Tape, active: tuple[int, ...], group: str) -> tuple[np.ndarray, Any]:
+    """Addresses of a tape's prelude and its derivatives, and of a group and its derivatives by the
+    `active` parameters and states; what keeps them alive.
+    """
+    names = [f"{kind}_{part}" for part in ("prelude", group) for kind in ("values", "tangents")]
+    engine = _linked(tape, ("field", active, group), lambda: "\n".join(
+        _with_helpers([DECLARED, *_of_group(tape, "prelude", active, moving=False),
+                       *_of_group(tape, group, active, moving=False)])))
+    return _addresses(engine, names), engine
+
+
+def _linked(tape: Tape, key: tuple[object, ...], text: Callable[[], str]) -> Any:
+    """Machine code of a text, from the cache if the same has been translated before."""
     from llvmlite import binding
 
     writers = (Path(__file__).with_name(f"{name}.py") for name in (
         "tape", "native_tape", "native_formulas", "native_step", "native_text"))
-    name = named("object", sources(*writers), tape.sizes, active, moving_inputs, *(
+    name = named("object", sources(*writers), tape.sizes, *key, *(
         (name, found.tolist()) for table in (tape.code, tape.outputs)
         for name, found in table.items()))
     with _lock:
         binding.initialize_native_target()
         binding.initialize_native_asmprinter()
-        code = kept(name, lambda: _compiled(_text(tape, active, moving_inputs)))
+        code = kept(name, lambda: _compiled(text()))
         machine = binding.Target.from_default_triple().create_target_machine()
         engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
+    return engine
 
-    def addresses(*names: str) -> np.ndarray:
-        return np.array([engine.get_function_address(name) or engine.get_function_address(_NOTHING)
-                         for name in names])
 
-    return Native(addresses(*FUNCTIONS), addresses(*(
-        _NOTHING if name.startswith("tangents") else _WITHOUT.get(name, name)
-        for name in FUNCTIONS)), engine)
+def _addresses(engine: Any, names: Sequence[str]) -> np.ndarray:
+    return np.array([engine.get_function_address(name) or engine.get_function_address(_NOTHING)
+                     for name in names])
 
 
 def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:
     """All functions that an integrator of this tape may call; the others do `nothing`."""
-    n, m, P, _, K = tape.sizes
-    lanes, moving = len(active), moving_inputs and len(active) > 0
-    states, inputs = range(1, 1 + n), range(1 + n, 1 + n + m)
-    signs = [1 + n + m + P + k for k in range(K)]
-    seeds = {*states, *(inputs if moving else ()), *(1 + n + m + a for a in active if a < P),
-             *signs}
-    live, signed = reached(tape, seeds), reached(tape, set(signs))
-    parts = [DECLARED, TABLES, Writer(_NOTHING).text(), _values(tape, "prelude"),
+    lanes, moving, K = len(active), moving_inputs and len(active) > 0, tape.sizes[4]
+    live, signed = _live(tape, active, moving), reached(tape, set(_signs(tape)))
+    groups = ["prelude", "h", *(["f", "g", "g_rate"] if K else ["f"] if moving else [])]
+    parts = [DECLARED, TABLES, Writer(_NOTHING).text(),
+             *(text for group in groups for text in _of_group(tape, group, active, moving)),
              look("put", tape, 0, False), step("step", tape, 0, live, False),
-             _values(tape, "h"), look("look_h_only", tape, 0, False, "values_h")]
-    if moving or K:
-        parts += [_values(tape, "f"), _values(tape, "h_rate")]
+             look("look_h_only", tape, 0, False, "values_h")]
+    if moving:
+        parts.append(_values(tape, "h_rate"))
     if lanes:
-        parts += [*(_tangents(tape, group, f"tangents_{group}", live, lanes)
-                    for group in ("prelude", "h")),
-                  look("put_tangents", tape, lanes, moving),
+        parts += [look("put_tangents", tape, lanes, moving),
                   look("look_h", tape, lanes, moving, "values_h", "tangents_h"),
                   step("step_tangents", tape, lanes, live, moving)]
     if K:
-        parts += [*(_values(tape, group) for group in ("g", "g_rate")),
-                  look("look_g", tape, 0, False, "values_g"),
+        parts += [look("look_g", tape, 0, False, "values_g"),
                   _tangents(tape, "g_rate", "signs_g_rate", signed, K)]
-    if K and lanes:
-        parts += [_tangents(tape, group, f"tangents_{group}", live, lanes)
-                  for group in ("f", "g", "g_rate")]
-    parts += [text for name, text in HELPERS.items() if any(f"@{name}(" in p for p in parts)]
-    return "\n".join(parts)
+    return "\n".join(_with_helpers(parts))
+
+
+def _with_helpers(parts: Sequence[str]) -> Iterator[str]:
+    yield from parts
+    yield from (text for name, text in HELPERS.items() if any(f"@{name}(" in p for p in parts))
+
+
+def _of_group(tape: Tape, group: str, active: tuple[int, ...], moving: bool) -> Iterator[str]:
+    """The functions that compute a group, and its derivatives if there are any."""
+    yield _values(tape, group)
+    if active:
+        yield _tangents(tape, group, f"tangents_{group}", _live(tape, active, moving), len(active))
+
+
+def _signs(tape: Tape) -> range:
+    n, m, P, _, K = tape.sizes
+    return range(1 + n + m + P, 1 + n + m + P + K)
+
+
+def _live(tape: Tape, active: tuple[int, ...], moving: bool) -> set[int]:
+    """Registers that move with the active parameters, with states or with signs."""
+    n, m, P = tape.sizes[:3]
+    inputs = range(1 + n, 1 + n + m) if moving else ()
+    return reached(tape, {*range(1, 1 + n), *inputs, *_signs(tape),
+                          *(1 + n + m + a for a in active if a < P)})
 
 
 def _compiled(text: str) -> bytes:
