@@ -11,6 +11,7 @@ from pikanid.estimate import Estimate
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.outliers import without_lone
+from pikanid.mismatch.data.own_noise import with_own_noise
 from pikanid.mismatch.data.preparation import with_refined_noise
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
@@ -76,6 +77,7 @@ class Case:
         """
         if best.far or self.repeats is not None:
             return False
+        heard = self.heard(best)
         fit = as_estimate(best, self.before)
         # a large misfit may have led the nominal model's natural frequency far away
         here = self.model.with_values({n: best.values[n] for n in self.model.free_names})
@@ -89,11 +91,27 @@ class Case:
             if not self._same(other, new) and self._clears(best, other):
                 new = other
         if self._same(self.records, new) and not count:
-            return False
+            return heard
         self.records = new
         self.resumed(self.search)
         if self.later is not None:
             self.later = self.later.with_levels(new.levels[0])
+            self.heard(self.search.ranked()[0])
+        return True
+
+    def heard(self, best: Hypothesis) -> bool:
+        """Read the noise of held-out recordings from what the best explanation leaves of them;
+        whether that made a difference.
+        """
+        prediction = None if self.repeats is not None else self.predicted(best)
+        if self.later is None or prediction is None:
+            return False
+        new = with_own_noise(self.later, prediction.residuals, self.records.levels[0], self.rate,
+                             self.model.input_names)
+        if self._same(self.later, new):
+            return False
+        self.later = new
+        self.predictions.clear()
         return True
 
     def _clears(self, h: Hypothesis, records: Records) -> bool:

@@ -174,8 +174,11 @@ class Candidate:
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these.  Of two that act once each may be
         what the shape of the other lacks.  Forces on a coordinate act through a lever or do not:
-        some of each together would be any coupling.
+        some of each together would be any coupling.  One parameter is one quantity.
         """
+        own = {p.name: p.unit for p in self.parameters}
+        if any(own.get(p.name, p.unit) != p.unit for e in others for p in e.parameters):
+            return False
         if self.absent and any(e.absent and e.key != self.key for e in others):
             return False
         if self.pushes and any(e.pushes and e.site.v == self.site.v

@@ -105,6 +105,7 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
                     continue
                 for candidate in make(site):
                     if all(first[name] == site.v for name in _channels(candidate)):
+                        candidate = _told_apart(candidate)
                         if site.suffix and make in FORCES:
                             candidate = _placed(candidate, site.v in levered)
                         made.setdefault(candidate.key, replace(
@@ -131,6 +132,18 @@ def _placed(law: Candidate, levered: bool) -> Candidate:
     name = f"{law.name} on {site.q or site.v}" + (f" as {site.along} acts" if site.lever else "")
     own = f"{law.ids[0]}[{law.variant}]" if levered else ""
     return replace(law, name=name, twin=law.twin or own)
+
+
+def _told_apart(law: Candidate) -> Candidate:
+    """What happens to one of several inputs, or outputs, with its name."""
+    model, name = law.site.model, law.name
+    for channel in _channels(law):
+        several, word = ((model.inputs, "the input") if channel in law.site.inputs
+                         else (model.outputs, "the sensor"))
+        if len(several) > 1:
+            name = name.replace(word, f"{word} {channel}" if several is model.inputs
+                                else f"{word} of {channel}")
+    return replace(law, name=name)
 
 
 def _channels(candidate: Candidate) -> Sequence[str]:

@@ -168,7 +168,7 @@ def lags(site: Site) -> list[Candidate]:
                        "sensor", site, (tau,), lambda m: m.map_output(o, lag=tau.name), seen,
                        twin="lag")]
     for u in site.inputs:
-        t_u = Parameter(site.name("tau_a"), 0.5 * step, "s", within)
+        t_u = Parameter(site.name("tau_a", site.variant(u)), 0.5 * step, "s", within)
 
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[TangentDirection]:
             from pikanid.mismatch.catalogue.recurrences import lag_of_held
@@ -195,7 +195,7 @@ def input_gain(site: Site) -> list[Candidate]:
     """An input acts more or less than recorded."""
     found = []
     for u in site.inputs:
-        k = Parameter(site.name("k_in"), 1.0, "", (0.05, 20.0))
+        k = Parameter(site.name("k_in", site.variant(u)), 1.0, "", (0.05, 20.0))
 
         def directions(view: View, u: str = u, k: Parameter = k) -> list[TangentDirection]:
             return [TangentDirection({k.name: 1.0}, push={u: view.u[u]})]
@@ -210,8 +210,8 @@ def input_limits(site: Site) -> list[Candidate]:
     found = []
     for u in site.inputs:
         unit = site.model.input(u).unit
-        limit = Parameter(site.name("u_max"), 1e6, unit, (1e-9, INF))
-        width = Parameter(site.name("u_dead"), 0.0, unit, (0.0, INF))
+        limit = Parameter(site.name("u_max", site.variant(u)), 1e6, unit, (1e-9, INF))
+        width = Parameter(site.name("u_dead", site.variant(u)), 0.0, unit, (0.0, INF))
         for side, words in SIDES.items():
 
             def clipped(view: View, u: str = u, p: Parameter = limit, side: str = side
@@ -242,7 +242,8 @@ def input_backlash(site: Site) -> list[Candidate]:
     """Play behind the input: each time that it turns round it moves nothing for a while."""
     found = []
     for u in site.inputs:
-        half = Parameter(site.name("half_play"), 0.0, site.model.input(u).unit, (0.0, INF))
+        unit = site.model.input(u).unit
+        half = Parameter(site.name("half_play", site.variant(u)), 0.0, unit, (0.0, INF))
 
         def directions(view: View, u: str = u, half: Parameter = half) -> list[TangentDirection]:
             d = HeldInput(u, view.t, view.u[u], "zero")

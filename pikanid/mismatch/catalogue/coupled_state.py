@@ -21,7 +21,7 @@ def coupled_state(site: Site) -> list[Candidate]:
     found = []
     for y in (s for s in site.model.states if s.name != site.v):
         unit = units.product((site.force_unit, 1), (y.unit, -1)) if y.unit else ""
-        k = Parameter(site.name("k_of"), 0.0, unit)
+        k = Parameter(site.name("k_of", y.name), 0.0, unit)
         found.append(term(
             site, "coupled_state", f"a part of {site.v}' in proportion to {y.name}",
             f"{k.name}*{y.name}", k, _course(y.name), one_sided=False, variant=y.name))

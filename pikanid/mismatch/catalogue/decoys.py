@@ -168,7 +168,7 @@ def velocity_coupled_drive(site: Site) -> list[Candidate]:
     found = []
     for u in site.inputs:
         drive = site.model.input(u).unit
-        k = Parameter(site.name("k_uv"), 0.0, units.product(
+        k = Parameter(site.name("k_uv", site.variant(u)), 0.0, units.product(
             (site.force_unit, 1), (drive, -1), (site.speed_unit, -1)) if drive else "")
         found.append(term(
             site, "velocity_coupled_drive",
@@ -182,7 +182,7 @@ def soft_saturation(site: Site) -> list[Candidate]:
     found = []
     for u in site.inputs:
         unit = f"1/({site.model.input(u).unit or '1'})"
-        k = Parameter(site.name("k_soft"), 0.0, unit, (0.0, INF))
+        k = Parameter(site.name("k_soft", site.variant(u)), 0.0, unit, (0.0, INF))
         text = f"tanh({k.name}*{u} + 1e-9*{u})/({k.name} + 1e-9)"
 
         def directions(view: View, u: str = u, k: Parameter = k) -> list[TangentDirection]:
@@ -232,7 +232,7 @@ def rate_limit(site: Site) -> list[Candidate]:
     found = []
     for u in site.inputs:
         unit = units.product((site.model.input(u).unit, 1), ("s", -1))
-        most = Parameter(site.name("rate"), 1e9, unit, (1e-9, INF))
+        most = Parameter(site.name("rate", site.variant(u)), 1e9, unit, (1e-9, INF))
 
         def directions(view: View, u: str = u, most: Parameter = most) -> list[TangentDirection]:
             steps = np.diff(view.t)

@@ -195,7 +195,8 @@ def _settling(drift: Candidate) -> Candidate:
 def _bent(scale: Candidate, channel: str, n: int) -> Candidate:
     """(k + b yⁿ⁻¹) y of an input or an output y, in place of its scale alone."""
     site, k = scale.site, scale.parameters[0]
-    b = Parameter(site.name(f"b_{n}"), 0.0, units.product((_unit(scale, channel), 1 - n)))
+    of = site.variant(channel) if channel in site.inputs else ""
+    b = Parameter(site.name(f"b_{n}", of), 0.0, units.product((_unit(scale, channel), 1 - n)))
     text = f"{k.name}*{channel} + {b.name}*{channel}**{n}"
     return _curve(scale, channel, f"{scale.ids[0]}_bent_{n}", text, (k, b), lambda values, states: [
         {k.name: values[k.name], b.name: 0.0}])

@@ -136,9 +136,11 @@ class Site:
             return sp.S.Zero
         return -_at_rest(self.model, self.acceleration.diff(symbol(self.q)))
 
-    def name(self, wanted: str) -> str:
-        """A parameter or state name that neither the model nor an effect of a user uses yet."""
-        name = wanted + self.suffix
+    def name(self, wanted: str, of: str = "") -> str:
+        """A parameter or state name that neither the model nor an effect of a user uses yet; `of`
+        one of several inputs or states.
+        """
+        name = wanted + (f"_{of}" if of else "") + self.suffix
         while name in self.model.symbols or name in self.taken:
             name += "_x"
         return name

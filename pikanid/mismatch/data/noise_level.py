@@ -61,35 +61,22 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
         settings: What counts as noise.
         explained: Whether the fit leaves nothing that a test sees.
     """
-    from scipy.signal.windows import tukey
-
-    h = level.interval
-    grid = np.round((t - t[0]) / h).astype(int)
-    uneven = np.max(np.abs((t - t[0]) / h - grid)) > UNEVEN
-    if uneven or len(t) < settings.noise.least_spectrum:
+    found = _spectrum(level, t, residual, rate, settings.noise)
+    if found is None:
         return level
-    even = np.interp(np.arange(grid[-1] + 1), grid, residual)
-    share = len(t) / len(even)
-    window = tukey(len(even), TAPER)
-    power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)
-    omega = np.linspace(0, np.pi, len(power))
-    power /= np.maximum(bridged(grid), BRIDGED)
-    # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
-    low, top = (share * np.pi for share in settings.noise.begins)
-    high = (omega > np.clip(settings.noise.above * rate * h, low, top)) & (
-        omega < HIGHEST * np.pi)
+    omega, power, high, share, low = found
     spectra = [(omega[high], power[high], TAPERED * share)]
     source = "the residual's highest frequencies"
-    found = quiet or level.stretch
-    if found is not None:
-        inside = (channel.time >= found[0]) & (channel.time <= found[1]) & np.isfinite(
+    stretch = quiet or level.stretch
+    if stretch is not None:
+        inside = (channel.time >= stretch[0]) & (channel.time <= stretch[1]) & np.isfinite(
             channel.values)
         values = channel.values[inside]
         if len(values) >= settings.quiet.low:
             centred, first = (about_trend, TREND) if quiet is None else (about_mean, 1)
             p = np.abs(np.fft.rfft(centred(values))) ** 2 / len(values)
             spectra.append((np.linspace(0, np.pi, len(p))[first:], p[first:], 1.0))
-            source = f"a quiet stretch ({found[0]:g} s to {found[1]:g} s) and {source}"
+            source = f"a quiet stretch ({stretch[0]:g} s to {stretch[1]:g} s) and {source}"
     given = level.sigma if level.source == "given" else None
     sigma, rho, spread = _whittle(spectra, given, settings.noise)
     # What a fit leaves at all frequencies is noise and misfit: it may be more than noise, not less.
@@ -110,6 +97,46 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
     # a fit leaves nothing of a rounded signal at rest: where it moves there is more
     least = rounding_noise(channel.values, settings.rounding)
     return replace(level, sigma=max(sigma, least), rho=rho, spread=spread, source=source)
+
+
+def louder(level: NoiseModel, t: np.ndarray, residual: np.ndarray, rate: float,
+           settings: NoiseSettings) -> tuple[float, float] | None:
+    """How many times the power of a noise that another recording told a residual (N,) at times t
+    (N,) has at its highest frequencies, and the relative standard error of that; None where its
+    spectrum shows nothing.
+    """
+    found = _spectrum(level, t, residual, rate, settings)
+    if found is None:
+        return None
+    omega, power, high, share, _ = found
+    expected = level.sigma**2 * (1 - level.rho**2) * _shape(level.rho, omega[high])
+    ratio = _calm(power[high] / expected, settings.line)
+    return float(np.mean(ratio)), 1.0 / np.sqrt(TAPERED * share * len(ratio))
+
+
+def _spectrum(level: NoiseModel, t: np.ndarray, residual: np.ndarray, rate: float,
+              settings: NoiseSettings) -> tuple[Array, Array, Array, float, float] | None:
+    """ω [rad a sample] and power of a residual (N,) at times t (N,), which of them lie where no
+    motion reaches, the share of samples that are there, and the lowest such ω; None where samples
+    are few, or off an even grid.
+    """
+    from scipy.signal.windows import tukey
+
+    h = level.interval
+    grid = np.round((t - t[0]) / h).astype(int)
+    uneven = np.max(np.abs((t - t[0]) / h - grid)) > UNEVEN
+    if uneven or len(t) < settings.least_spectrum:
+        return None
+    even = np.interp(np.arange(grid[-1] + 1), grid, residual)
+    window = tukey(len(even), TAPER)
+    power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)
+    omega = np.linspace(0, np.pi, len(power))
+    power /= np.maximum(bridged(grid), BRIDGED)
+    # below a quarter of the band even where the oscillator is slow: impacts and steps reach far up
+    low, top = (bound * np.pi for bound in settings.begins)
+    high = (omega > np.clip(settings.above * rate * h, low, top)) & (
+        omega < HIGHEST * np.pi)
+    return omega, power, high, len(t) / len(even), low
 
 
 def bridged(grid: np.ndarray) -> np.ndarray:

@@ -38,6 +38,12 @@ class Records:
         """Relative standard error of the noise's power, where it is known least."""
         return max(level.spread for found in self.levels for level in found.values())
 
+    def sigma(self, output: str) -> float:
+        """σ of an output's noise; of several recordings the root mean square of their samples."""
+        counts = [np.isfinite(r[output].values).sum() for r in self.recordings]
+        squares = [found[output].sigma ** 2 for found in self.levels]
+        return float(np.sqrt(np.average(squares, weights=counts)))
+
     def beginning(self, rows: int) -> Records:
         """The same with about so many rows in all, each recording cut alike, from its start; not
         before each output has changed: a rig may rest at first.

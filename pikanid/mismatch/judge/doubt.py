@@ -54,6 +54,11 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             if below(abs(size - sizes[0].value), asks.sized * error):
                 return (f"the size of {e.name} may be nothing beside the rest ({size:.3g} with a "
                         f"standard error of {error:.2g})")
+        elif h.symbolic and sizes:
+            size, error = h.values[sizes[0].name], h.std[sizes[0].name]
+            if below(abs(size), asks.sized * error):
+                return (f"the recording does not determine {sizes[0].name} of {e.name} ({size:.3g} "
+                        f"with a standard error of {error:.2g}): other forms do as well")
         rest = h.key - {e.key}
         count = max(len(h.effects), len(e.covers) if h.symbolic else 1)
         asked = asks.strong[count - 1] * louder

@@ -22,6 +22,7 @@ class NoiseSettings:
         order_only: Relative standard error of a power, at most: then it is known by its order only.
         least_spectrum: Samples of a residual from which on its spectrum shows its noise.
         less: Standard errors of a power by which a fit has to leave less to refute it.
+        louder: Rate at which noise no louder than another recording's is taken to be.
         same: Relative change of σ below which a level read again is the same.
         same_correlation: Change of the correlation of neighbours below which it is.
         spike: [σ] by which a sample must leave its neighbours before there is a fit.
@@ -51,6 +52,7 @@ class NoiseSettings:
     order_only: Amount = 0.6
     least_spectrum: Count = 60
     less: Amount = 2.0
+    louder: Rate = 1e-3
     same: Amount = 0.05
     same_correlation: Share = 0.06
     spike: Amount = 5.0

@@ -108,4 +108,5 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     case = Case(nominal, records, held, proves, found, alone, search, base, before, notes, {}, {},
                 again, excuse)
     search.predicts, search.workers = case.predicts, workers
+    case.heard(base)
     return case

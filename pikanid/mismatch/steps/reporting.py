@@ -52,7 +52,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
             "The held-out recording is at rest, or too short: all that moves in it is worth "
             f"{shown.motion:.2g} of chi-squared, and {asked:.0f} are needed to confirm "
             "anything.")
-    levels = [level.sentence(o) for o, level in case.records.levels[0].items()]
+    levels = [level.sentence(o) + _louder(case, o)
+              for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, site)
     local = local_force(
         case.base, case.model, shape, site, answer.given[0] if answer.given else None) if (
@@ -73,6 +74,15 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         present=present(answer), remainder=remainder(case, answer, proof))
 
 
+def _louder(case: Case, output: str) -> str:
+    """What is to be said of an output's noise in held-out recordings, if anything."""
+    if case.later is None:
+        return ""
+    times = case.later.sigma(output) / case.records.sigma(output)
+    return (f" In the held-out recording {times:.2g} times as much."
+            if times > 1 + case.settings.noise.same else "")
+
+
 def _overdispersion(case: Case, answer: Answer) -> float:
     """What χ² is divided by: one where everything is explained."""
     if answer.part is not None:
@@ -88,7 +98,7 @@ def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
     share = best.noise if answer.verdict in ("named", "set") else 1.0
     outputs = {o.name: OutputError(before.rmse[o.name], after.rmse[o.name],
                                    after.rmse_moved[o.name],
-                                   case.later.levels[0][o.name].sigma * share, o.unit)
+                                   case.later.sigma(o.name) * share, o.unit)
                for o in case.model.outputs}
     return Proof(outputs, after.detection.p_value, _curves(case, before, after),
                  tuple(r.name for r in case.later.recordings))
