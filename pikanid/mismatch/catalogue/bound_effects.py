@@ -10,7 +10,8 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.between import effects_between
+from pikanid.mismatch.catalogue.site import Site, coordinates
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Effect, EffectForm, Model
 from pikanid.model.binding import Surroundings, bound
@@ -35,9 +36,10 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     effects = list(effects)
     forms = [e for e in effects if isinstance(e, EffectForm)]
     own = [e for e in effects if isinstance(e, Effect)]
-    if not forms:
-        return own
     site, first = sites[0], recordings[0]
+    between = [*effects_between(site.model, coordinates(site.model), ranges)]
+    if not forms and not between:
+        return own
     names = [*(i for i in site.model.input_names if i in first), *site.extra]
     around = Surroundings(
         site.model, tuple(dict.fromkeys(s.v for s in sites)), ranges(),
@@ -46,6 +48,11 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
         {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
         site.interval)
     extended = {_extended(site.model, e) for e in own}
+    for effect in between:
+        made = _extended(site.model, effect)
+        if made is not None and made not in extended:
+            own.append(effect)
+            extended.add(made)
     for form in forms:
         around = replace(around, taken=frozenset(n for e in own for n in e.names))
         for effect in bound(form, around):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -146,26 +146,37 @@ class Site:
         return name
 
 
+def coordinates(model: Model) -> list[tuple[str, str]]:
+    """States whose rate is another state, with that one."""
+    return [(s.name, e.name) for s in model.states
+            if (e := model.equations[s.name]).is_Symbol and e.name in model.state_names
+            and e.name != s.name]
+
+
 def sites(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
     """The coordinates that an output shows, one site each, and after them another one for each
-    coordinate on which forces act through a lever; without any coordinate, the equations of all
-    states that reach an output.
+    coordinate on which forces act through a lever, and the equations of all other states that reach
+    an output: a current beside a position, or all there are without any coordinate.
 
     Raises:
         BadModel: If no state reaches an output.
     """
-    pairs = [(s.name, e.name) for s in model.states
-             if (e := model.equations[s.name]).is_Symbol and e.name in model.state_names
-             and e.name != s.name]
+    pairs = coordinates(model)
     seen = [(q, v, o) for q, v in pairs for o in model.outputs if o.expression.has(symbol(q))]
     chosen = {q: (q, v, o) for q, v, o in reversed(seen)}
     if not chosen:
-        return _of_first_order(model, recordings)
+        first = _of_first_order(model, recordings, model.state_names, alone=True)
+        if not first:
+            raise errors.BadModel(errors.nothing_seen(model.name))
+        return first
     ordered = [chosen[q] for q, _ in pairs if q in chosen]
     found = [_site(model, recordings, q, v, o, f"_{q}" if len(ordered) > 1 else "")
              for q, v, o in ordered]
+    others = [s.name for s in model.states if s.name not in {n for pair in pairs for n in pair}]
+    found += _of_first_order(model, recordings, others, alone=False)
+    rates = [*(v for _, v in pairs), *others]
     return (*found, *(_along_lever(site, *how) for site in found if (
-        how := lever(model, site.v, [v for _, v in pairs])) is not None))
+        how := lever(model, site.v, rates)) is not None))
 
 
 def _along_lever(site: Site, along: str, shares: Mapping[str, sp.Expr]) -> Site:
@@ -174,14 +185,15 @@ def _along_lever(site: Site, along: str, shares: Mapping[str, sp.Expr]) -> Site:
                    suffix=f"{site.suffix}_{along}")
 
 
-def _of_first_order(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
-    """One site for each state, in the output that it reaches through the fewest others."""
-    found = [(s.name, o) for s in model.states if (o := _reached(model, s.name)) is not None]
-    if not found:
-        raise errors.BadModel(errors.nothing_seen(model.name))
+def _of_first_order(model: Model, recordings: tuple[Recording, ...], states: Sequence[str],
+                    alone: bool) -> tuple[Site, ...]:
+    """One site for each of these states, in the output that it reaches through the fewest others;
+    `alone`: there are no other sites.
+    """
+    found = [(v, o) for v in states if (o := _reached(model, v)) is not None]
     # what is seen itself comes first
     found.sort(key=lambda pair: not pair[1].expression.has(symbol(pair[0])))
-    return tuple(_site(model, recordings, "", v, o, f"_{v}" if len(found) > 1 else "")
+    return tuple(_site(model, recordings, "", v, o, "" if alone and len(found) == 1 else f"_{v}")
                  for v, o in found)
 
 

@@ -1,0 +1,120 @@
+"""Catalogue: laws between two coordinates, which act on one as they act back on the other.
+
+Where a parameter b of the model damps a relative speed w, or is a stiffness against a relative
+place d, ∂f/∂b is the same w (or d) in every equation, times what a force between the two does to
+that rate: so the model itself says how any other force between them acts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from pikanid.formula import units
+from pikanid.formula.expressions import TIME, symbol, to_text
+from pikanid.model import Effect, Model
+from pikanid.model.parts import Parameter
+
+Ranges = Mapping[str, tuple[float, float]]  # lowest and highest value of each state
+INF = float("inf")
+PLAY = 0.1  # numerical: share of a swing at which play is looked for first
+
+
+@dataclass(frozen=True)
+class _Between:
+    """Two coordinates x and y that act on each other by x - ratio*y."""
+
+    x: str
+    y: str
+    ratio: sp.Expr
+    shares: tuple[tuple[str, sp.Expr], ...]  # what a force adds to each rate
+
+    def of(self, x: str, y: str) -> str:
+        """The difference of two places, or of two speeds, as text."""
+        return to_text(symbol(x) - self.ratio * symbol(y))
+
+
+def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
+                    ranges: Callable[[], Ranges]) -> Iterator[Effect]:
+    """Dry friction, drag, play and a cubic spring between coordinates (place, speed).
+
+    >>> from pikanid.model import systems
+    >>> drive = systems.two_mass_drive()
+    >>> pairs = [("phi_m", "omega_m"), ("phi_l", "omega_l")]
+    >>> ranges = lambda: dict.fromkeys(drive.state_names, (-1.0, 1.0))
+    >>> [e.key for e in effects_between(drive, pairs, ranges)]
+    ['friction_between', 'drag_between', 'spring_between', 'play_between']
+    """
+    speed = dict(coordinates)
+    found: dict[_Between, dict[bool, str]] = {}
+    for name in model.parameter_names:
+        for places in (True, False):
+            one = _between(model, name, coordinates, places)
+            if one is not None:
+                found.setdefault(one, {}).setdefault(places, name)
+    seen = ranges() if found else {}
+    for one, by in found.items():
+        x, y, v, w = one.x, one.y, speed[one.x], speed[one.y]
+        place, rate = one.of(x, y), one.of(v, w)
+        far, fast = _reach(seen, one, model, x, y), _reach(seen, one, model, v, w)
+        length, across = model.state(x).unit, model.state(v).unit
+        sizes = {p: (model.parameter(name), far if p else fast, length if p else across)
+                 for p, name in by.items()}
+        push = max(abs(p.value) * reach for p, reach, _ in sizes.values()) or 1.0
+        force = next(units.product((p.unit, 1), (unit, 1)) for p, _, unit in sizes.values())
+
+        def law(key: str, words: str, family: str, shape: str, size: Parameter,
+                factor: sp.Expr | None = None, one: _Between = one) -> Effect:
+            factor = symbol(size.name) if factor is None else factor
+            return Effect(
+                f"{key}_between", f"{words} between {one.x} and {one.y}", (size,),
+                (size.name, 0.0), family=family, variant=f"{one.x},{one.y}",
+                add={r: f"{to_text(share * factor)}*{shape}" for r, share in one.shares})
+
+        yield law("friction", "dry friction", "dry friction", f"sign({rate})",
+                  Parameter(f"F_{x}_{y}", push, force, (0.0, INF)))
+        yield law("drag", "quadratic drag", "drag", f"abs({rate})*({rate})", Parameter(
+            f"D_{x}_{y}", push / fast**2, units.product((force, 1), (across, -2)), (0.0, INF)))
+        if True not in by:
+            continue
+        yield law("spring", "a cubic spring", "restoring force", f"({place})**3", Parameter(
+            f"K_{x}_{y}", push / far**3, units.product((force, 1), (length, -3))))
+        gap = Parameter(f"gap_{x}_{y}", PLAY * far, length, (0.0, INF))
+        yield law("play", "play", "restoring force", f"clip({place}, -{gap.name}, {gap.name})",
+                  gap, factor=-symbol(by[True]))
+
+
+def _between(model: Model, name: str, coordinates: Sequence[tuple[str, str]], places: bool
+             ) -> _Between | None:
+    """Which two coordinates act on each other in proportion to a parameter and the difference of
+    their places, or of their speeds; None where none do.
+    """
+    b = symbol(name)
+    slopes = {v: s for _, v in coordinates if (s := model.equations[v].diff(b)) != 0}
+    if len(slopes) < 2:
+        return None
+    own = {q if places else v: q for q, v in coordinates}
+    first = next(iter(slopes.values()))
+    used = [n for n in own if first.has(symbol(n)) and first.diff(symbol(n)) != 0]
+    moving = {TIME, b, *map(symbol, (*model.state_names, *model.input_names))}
+    if len(used) != 2:
+        return None
+    x, y = (symbol(n) for n in used)
+    by_x, by_y = (sp.simplify(first.diff(q)) for q in (x, y))
+    if (by_x.free_symbols | by_y.free_symbols) & moving or sp.simplify(
+            first - by_x * x - by_y * y) != 0:
+        return None
+    ratio = sp.simplify(-by_y / by_x)
+    shares = {v: sp.simplify(s / (x - ratio * y)) for v, s in slopes.items()}
+    if any(share.free_symbols & moving for share in shares.values()):
+        return None
+    return _Between(own[used[0]], own[used[1]], ratio, tuple(shares.items()))
+
+
+def _reach(seen: Ranges, one: _Between, model: Model, x: str, y: str) -> float:
+    """How far the difference of two states may swing to either side."""
+    at = {symbol(n): value for n, value in model.values.items()}
+    times = abs(float(sp.S(one.ratio).subs(at)))
+    return ((seen[x][1] - seen[x][0]) + times * (seen[y][1] - seen[y][0])) / 2 or 1.0
