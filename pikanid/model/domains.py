@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from pikanid.errors.wording import listed
 from pikanid.formula import units
 from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm
 from pikanid.model.effects_file import catalogues, read_effects
 from pikanid.model.lookup import Lookup
 
-# A catalogue is taken where every state has such a unit.  A voltage alone tells nothing: levels
-# and angles are recorded in volts as well.
-STATES = {"thermal": ("K",), "kinetics": ("mol/l", "mol", "kg/l"), "electrical": ("A",)}
+# A catalogue is taken where some state has a unit that tells its domain, and every other one such a
+# unit or one that goes with it.  A voltage alone tells nothing: levels and angles are recorded in
+# volts as well; nor does a length.
+STATES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l"), ("l",)),
+    "electrical": (("A",), ("V",)), "hydraulics": (("Pa",), ("l", "l/s"))}
 
 
 def catalogues_of(model: Lookup) -> tuple[str, ...]:
@@ -22,8 +28,15 @@ def catalogues_of(model: Lookup) -> tuple[str, ...]:
     """
     if model.domain is not None:
         return model.domain
-    return tuple(name for name in catalogues() if name in STATES and all(
-        any(units.convertible(s.unit, unit) for unit in STATES[name]) for s in model.states))
+    return tuple(name for name in catalogues() if name in STATES and _of(model, *STATES[name]))
+
+
+def _of(model: Lookup, telling: tuple[str, ...], beside: tuple[str, ...]) -> bool:
+    def like(unit: str, others: tuple[str, ...]) -> bool:
+        return any(units.convertible(unit, other) for other in others)
+
+    return any(like(s.unit, telling) for s in model.states) and all(
+        like(s.unit, telling + beside) for s in model.states)
 
 
 def candidates_of(model: Lookup) -> tuple[Effect | EffectForm, ...]:
@@ -32,6 +45,24 @@ def candidates_of(model: Lookup) -> tuple[Effect | EffectForm, ...]:
     """
     listed = (e for name in catalogues_of(model) for e in read_effects(name))
     return tuple({e.key: e for e in (*listed, *model.effects)}.values())
+
+
+def not_taken(model: Lookup, known: Iterable[str]) -> str:
+    """A sentence on the catalogues for models of its kind whose effects are not among the `known`
+    ones; empty where the model names its domain, or where something of every one is known.
+
+    >>> import pikanid as pk
+    >>> not_taken(pk.systems.sloshing(), ())[:58]
+    'No effects of the catalogue mechanics were looked for: `do'
+    """
+    ids = {*known}
+    moves = any(e.is_Symbol and e.name in model.state_names for e in model.equations.values())
+    left = [name for name in catalogues() if name not in catalogues_of(model)
+            and (name == "mechanics") == moves and not ids & {e.key for e in read_effects(name)}]
+    if model.domain is not None or not left:
+        return ""
+    return (f"No effects of the catalogue{'s' * (len(left) > 1)} {listed(left)} were looked for: "
+            "`domain = \"...\"` in the model, or --catalogue, adds them.")
 
 
 def taken(model: Lookup) -> str:

@@ -23,6 +23,7 @@ Make = Callable[[Site], list[Candidate]]
 # each with the families of physics that it belongs to
 ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (friction.coulomb_friction, ("dry friction",)),
+    (friction.linear_drag, ("drag",)),
     (friction.quadratic_drag, ("drag",)),
     (friction.power_drag, ("drag",)),
     (friction.amplitude_damping, ("drag",)),
@@ -71,8 +72,8 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
 )
 # what acts on a coordinate as a force, which a lever hands on to others
 FORCES: frozenset[Make] = frozenset((
-    friction.coulomb_friction, friction.quadratic_drag, friction.power_drag,
-    friction.amplitude_damping, friction.boundary_layer, friction.hysteresis,
+    friction.coulomb_friction, friction.linear_drag, friction.quadratic_drag,
+    friction.power_drag, friction.amplitude_damping, friction.boundary_layer, friction.hysteresis,
     forces.cubic_stiffness, forces.free_spring, forces.static_bias, forces.wall_impact,
     decoys.even_stiffness, decoys.quintic_stiffness, decoys.linear_stiffness,
     decoys.one_way_friction, decoys.stribeck_friction, decoys.dissipating_wall,

@@ -53,6 +53,17 @@ def coulomb_friction(site: Site) -> list[Candidate]:
     return [sharp, rounded]
 
 
+def linear_drag(site: Site) -> list[Candidate]:
+    """Resistance in proportion to the speed, where the model has none."""
+    if not site.q or site.resisted:
+        return []
+    k = Parameter(site.name("k_1"), 0.0, "1/s", (0.0, INF))
+    law = term(site, "linear_drag", "viscous damping", f"-{k.name}*{site.v}", k,
+               lambda w: -w.x[site.v], one_sided=True)
+    return [replace(law, static=True, resistance=np.abs, exponent=1.0, argument=site.v,
+                    powers=Powers(0, 1))]
+
+
 def quadratic_drag(site: Site) -> list[Candidate]:
     """Drag that grows with the square of the speed."""
     q = Parameter(site.name("q2"), 0.0, f"1/({site.unit})", (0.0, INF))
@@ -78,6 +89,7 @@ def power_drag(site: Site) -> list[Candidate]:
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
                       (c, n), lambda m: site.pushed(m, text), directions,
                       covers={"coulomb_friction" + site.suffix: {n.name: 0.3},
+                              "linear_drag" + site.suffix: {n.name: 1.05},
                               "quadratic_drag" + site.suffix: {n.name: 1.8}},
                       static=True, resistance=np.power, exponent=n, form="signed power",
                       argument=site.v)]

@@ -128,6 +128,12 @@ class Site:
         return tuple(p.name for p in self.model.parameters if p.free and p.name in used)
 
     @property
+    def resisted(self) -> bool:
+        """Whether a parameter of the model resists v in proportion at rest."""
+        return any(_at_rest(self.model, self.acceleration.diff(symbol(p)).diff(symbol(self.v))) != 0
+                   for p in self.model.parameter_names)
+
+    @property
     def stiffness(self) -> sp.Expr:
         """-∂a/∂q in equilibrium without inputs: what a constant force is held by; 0 where there is
         no coordinate.

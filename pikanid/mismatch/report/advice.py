@@ -31,11 +31,12 @@ def explore(driven: bool, rate: float) -> str:
         driven: Whether inputs act.
         rate: Natural frequency [rad/s]; 0 where nothing restores.
     """
-    swing = "a free decay from starts three times apart, until it rests"
+    swing = ("a free decay from starts three times apart, until it rests" if rate > 0 else
+             "a run from initial values three times apart, until all is steady")
     drive = ("a slow sweep through the resonance at two input levels" if rate > 0 else
              "steps of three or more sizes in both directions, each held until all is steady")
     wanted = ([swing] if rate > 0 or not driven else []) + ([drive] if driven else [])
-    return "; ".join([*wanted, "two seconds at rest before each"])
+    return "; ".join([*wanted, "a stretch in which nothing changes before each"])
 
 
 def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rate: float,
@@ -67,7 +68,8 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
                 "confirmed.")
     if given and (weak or not proves):
         return STRENGTHEN if weak else PROVE
-    return f"No law in the catalogue holds. Record {explore(driven, rate)}."
+    found = "None of these holds on all recordings" if given else "No law in the catalogue holds"
+    return f"{found}. Record {explore(driven, rate)}."
 
 
 def _separating(given: Sequence[Explanation], records: Records, rate: float, workers: int) -> str:
@@ -77,7 +79,9 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     names = titles_apart(given)
     text = f"To tell {' from '.join(names)}: "
     if len(driven) != 1 or not rate > 0:
-        return text + "let it move freely from starts at least three times apart, and long."
+        return text + ("let it move freely from starts at least three times apart, and long."
+                       if rate > 0 else "record it from initial values at least three times apart, "
+                       "until all is steady.")
     models = {name: e.model for name, e in zip(names, given, strict=True)}
     found = _best(models, records, driven[0], rate, workers)
     if found is None:

@@ -24,6 +24,7 @@ from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.steps.remaining import present, remainder
 from pikanid.model import Model
+from pikanid.model.domains import not_taken
 from pikanid.problem.problem import bind
 from pikanid.recording import Recording
 
@@ -47,6 +48,9 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
+    if answer.verdict in ("unnamed", "unconfirmed"):
+        known = (i for c in case.candidates for i in c.ids)
+        case.notes += filter(None, [not_taken(case.model, known)])
     if case.proves and (shown := case.predicted(best)) and below(shown.motion, asked):
         case.notes.append(
             "The held-out recording is at rest, or too short: all that moves in it is worth "
