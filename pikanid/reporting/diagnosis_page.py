@@ -61,7 +61,7 @@ def _proof(dx: Diagnosis) -> str:
 
 
 def _where(dx: Diagnosis) -> str:
-    spans = dx.where.seconds or "spread over the recording"
+    spans = dx.where.times or "spread over the recording"
     channel = " and ".join(f"the {c}" for c in dx.where.channels) or (
         "undecided between input, sensor and dynamics")
     region = f" It acts at {', '.join(map(str, dx.where.region))}." if dx.where.region else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from pikanid.figures import (
     tidy,
 )
 from pikanid.mismatch.report.findings import Curves, DiagnosisData, OutputError
+from pikanid.pieces.time_unit import time_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -92,6 +94,8 @@ def _output(name: str, curves: Curves, error: OutputError, extended: bool, moved
     """One output of the held-out recording: enlarged, and below what is left of all of it."""
     near, left = figure.subplots(2, 1)
     unit = with_unit("", error.unit)
+    size, second = time_unit(float(curves.t.max()))
+    curves = replace(curves, t=curves.t / size)
     shown = [("nominal model", curves.before, BEFORE, error.before)]
     if extended:
         shown.append(("extended model", curves.after, AFTER, error.after))
@@ -113,11 +117,11 @@ def _output(name: str, curves: Curves, error: OutputError, extended: bool, moved
               labelled(name, error.unit))
     _finished(left, f"Held-out {name}: what is left, and its RMSE; marked: enlarged above",
               labelled("left", error.unit))
-    left.set_xlabel("t [s]")
+    left.set_xlabel(labelled("t", second))
 
 
 def _furthest(curves: Curves) -> tuple[float, float]:
-    """The stretch [s] in which the nominal model leaves most, of those of equal length."""
+    """The stretch of time in which the nominal model leaves most, of those of equal length."""
     edges = np.linspace(curves.t.min(), curves.t.max(), STRETCHES + 1)
     which = np.clip(np.searchsorted(edges, curves.t, side="right") - 1, 0, STRETCHES - 1)
     worst = int(np.argmax(np.bincount(which, (curves.measured - curves.before) ** 2, STRETCHES)))
@@ -151,34 +155,37 @@ def _where(dx: DiagnosisData) -> list[Piece]:
         axes = figure.subplots(1 if force is None else 2, 1, sharex=True, squeeze=False)[:, 0]
         why = "band excludes zero" if force is not None and force.resolved else "louder than noise"
         fit = dx.before.fits[0]
-        axes[0].plot(fit.t, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
+        size, second = time_unit(float(fit.t.max()))
+        axes[0].plot(fit.t / size, fit.residual, color=BEFORE, lw=0.8, label="nominal model")
         if dx.hypotheses:
             after = dx.after.fits[0]
-            axes[0].plot(after.t, after.residual, color=AFTER, lw=0.8, label="extended model")
+            axes[0].plot(after.t / size, after.residual, color=AFTER, lw=0.8,
+                         label="extended model")
         if force is not None:
-            _force(axes[1], force, 1 - dx.settings.band)
+            _force(axes[1], force, 1 - dx.settings.band, size, second)
         for axis in axes:
             for k, (start, stop) in enumerate(dx.where.time):
-                axis.axvspan(start, stop, ymax=STRIP, color=LOUD, lw=0,
+                axis.axvspan(start / size, stop / size, ymax=STRIP, color=LOUD, lw=0,
                              label=why if k == 0 else None)
         _finished(axes[0], f"What is left of {fit.output} in {fit.recording}",
                   labelled("left", fit.unit))
         if force is not None:
             _finished(axes[1], "Force that would explain it, without what the free parameters can "
                       "do", labelled("force", force.unit))
-        axes[-1].set_xlabel("t [s]")
+        axes[-1].set_xlabel(labelled("t", second))
 
     return [(1.15 if force is None else 2.3, draw)]
 
 
-def _force(axis: Axes, force: ForceOverTime, level: float) -> None:
+def _force(axis: Axes, force: ForceOverTime, level: float, size: float, second: str) -> None:
+    t = force.t / size
     for width, alpha, name in ((force.critical, 0.12, f"{100 * level:g} % band, at once"),
                                (WIDE, 0.25, "pointwise")):
-        axis.fill_between(force.t, force.values - width * force.std,
+        axis.fill_between(t, force.values - width * force.std,
                           force.values + width * force.std, color=AFTER, alpha=alpha, lw=0,
                           label=name)
-    axis.plot(force.t, force.values, color=AFTER, lw=1.0,
-              label=f"mean over {force.resolution:.2g} s")
+    axis.plot(t, force.values, color=AFTER, lw=1.0,
+              label=f"mean over {force.resolution / size:.2g} {second}")
     axis.axhline(0.0, color=DATA, lw=0.8)
     # a spike, as where a recording begins beside its model, must not flatten all the rest
     reach = np.quantile(np.abs(force.values) + force.critical * force.std, 0.98)

@@ -16,12 +16,11 @@ from pikanid.mismatch.beyond.patch import Patch
 from pikanid.mismatch.beyond.region import Interval
 from pikanid.mismatch.catalogue.candidate import Channel
 from pikanid.mismatch.judge.verdict import Verdict
-from pikanid.mismatch.report.part import Present, Remainder, Value
+from pikanid.mismatch.report.part import SHOWN, Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
-
-SHOWN = 6  # layout: windows of time that are listed
+from pikanid.pieces.time_unit import spans
 
 
 @dataclass(frozen=True)
@@ -93,11 +92,9 @@ class Where:
         return "several" if self.channels else "undecided"
 
     @property
-    def seconds(self) -> str:
+    def times(self) -> str:
         """The first windows of time, in words; empty where there are none."""
-        told = ", ".join(f"{a:g} to {b:g} s" for a, b in self.time[:SHOWN])
-        more = len(self.time) - SHOWN
-        return f"{told}, and {more} more" if more > 0 else told
+        return spans(self.time, SHOWN)
 
 
 @dataclass(frozen=True)

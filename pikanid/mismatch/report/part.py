@@ -7,6 +7,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from pikanid.estimate.rounding import with_unit
+from pikanid.pieces.time_unit import spans
+
+SHOWN = 6  # layout: windows of time that are listed
 
 
 @dataclass(frozen=True)
@@ -137,8 +140,8 @@ class Remainder:
 
     def lines(self) -> list[str]:
         """Where it is, and what keeps more from being sure."""
-        spans = ", ".join(f"{a:g} to {b:g} s" for a, b in self.time[:6]) or "no stretch of it"
-        return [f"Left: half of it below {self.frequency:.3g} Hz; louder than noise at {spans}",
+        loud = spans(self.time, SHOWN) or "no stretch of it"
+        return [f"Left: half of it below {self.frequency:.3g} Hz; louder than noise at {loud}",
                 *(f"Not sure: {what}: {why}" for what, why in self.doubtful)]
 
     def to_dict(self) -> dict[str, Any]:

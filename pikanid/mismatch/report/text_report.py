@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from pikanid.estimate.rounding import rounded, with_unit
+from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.report.findings import DiagnosisData
+from pikanid.model import Model
+
+
+def _several(model: Model) -> bool:
+    """Whether more than one equation says more than that a state is another one's rate."""
+    return sum(not e.is_Symbol for e in model.equations.values()) > 1
 
 
 def lines_of(dx: DiagnosisData) -> list[str]:
     """Verdict, where, what, proof, what to do next, notes and settings, line by line."""
     lines = [dx.sentence()]
     if dx.mismatch:
-        place = " and ".join(dx.where.channels) or "channel undecided"
+        place = " and ".join(
+            f"dynamics, in {dx.where.equation}'" if c == "dynamics" and _several(dx.before.model)
+            else c for c in dx.where.channels) or "channel undecided"
         region = ", ".join(map(str, dx.where.region))
         lines.append(f"Where: {place}" + (f"; at {region}" if region else "")
-                     + (f"; in time at {dx.where.seconds}" if dx.where.time else ""))
+                     + (f"; in time at {dx.where.times}" if dx.where.time else ""))
         if dx.where.parameters:
             lines.append("  with a free force there: " + ", ".join(
                 f"{name} = {with_unit(rounded(v.value, v.std), v.unit)}"
@@ -23,7 +32,8 @@ def lines_of(dx: DiagnosisData) -> list[str]:
     for h in dx.hypotheses:
         lines.append(f"What: {h.title}{dx.odds(h)}")
         for e in h.effects:
-            lines.append(f"  {e.expression}   [{', '.join(e.ids)}]")
+            left = f"{e.equation}' += " if e.ids[0].startswith(SYMBOLIC) else ""
+            lines.append(f"  {left}{e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
                 lines.append(f"    {name} = {with_unit(rounded(v.value, v.std), v.unit)}")
     lines += [f"Not: {title}: {why}" for title, why in dx.not_given[:4]]
