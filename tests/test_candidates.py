@@ -236,3 +236,65 @@ def test_a_coordinate_beside_another_is_not_in_balance_by_itself() -> None:
     pushed = {c.key: c for c in found}["static_bias_phi_m"].applied(drive)
     assert pushed.state("phi_m").initial == 0
     assert pushed.equations["omega_m"] == drive.equations["omega_m"] + symbol("bias_phi_m")
+
+
+TWO_VALVES = {
+    "name": "vessel", "states": {"p": {"unit": "bar"}, "q": {"unit": "bar"}, "T": {"unit": "K"}},
+    "inputs": {"a": {"unit": "l/min"}, "b": {"unit": "V"}},
+    "parameters": {"k": {"unit": "bar/l", "guess": 0.1}, "c": {"unit": "1/s", "guess": 0.3},
+                   "d": {"unit": "1/(V*s)", "guess": 0.2}, "e": {"unit": "K/bar", "guess": 1.0}},
+    "equations": {"p": "k*a - d*b*p - c*(p - q)", "q": "c*(p - q)", "T": "c*(e*q - T)"},
+    "outputs": {"p": {"unit": "bar", "expression": "p"}, "T": {"unit": "K", "expression": "T"}},
+}
+
+
+def test_one_name_is_one_quantity() -> None:
+    """Two effects that may be added together never share a parameter by accident."""
+    model = Model.from_dict(TWO_VALVES)
+    t = 0.1 * np.arange(100)
+    recording = Recording({c.name: pk.Channel(c.name, t, 2 + np.sin(t), c.unit)
+                           for c in [*model.outputs, *model.inputs]})
+    found = [c for c in candidates(sites(model, (recording,))) if c.fits]
+    dead = [c for c in found if c.ids == ("input_dead_zone",)]
+    assert [p.name for c in dead for p in c.parameters] == ["u_dead_a_p", "u_dead_b_p"]
+    assert ["the input a" in c.name for c in dead] == [True, False]
+    assert {c.name for c in found if c.ids == ("sensor_offset",)} == {
+        "an offset of the sensor of p", "an offset of the sensor of T"}
+    declared: dict[str, set[str]] = {}
+    for c in found:
+        for p in c.parameters:
+            declared.setdefault(p.name, set()).add(p.unit)
+    assert {name: units for name, units in declared.items() if len(units) > 1} == {}
+    stored = [c for c in found if c.ids == ("coupled_state",) and c.site.v == "T"]
+    for first, second in (dead, stored):
+        both = second.applied(first.applied(model))  # refused where units do not fit
+        assert len(both.parameters) == len(model.parameters) + 2
+    other = replace(dead[1], parameters=(replace(dead[1].parameters[0],
+                                                 name=dead[0].parameters[0].name),))
+    assert dead[0].suits((dead[1],)) and not dead[0].suits((other,))
+
+
+WHEEL = {
+    "name": "wheel", "states": {"q": {"unit": "rad"}, "v": {"unit": "rad/s"},
+                                "w": {"unit": "rad/s"}},
+    "inputs": {"i": {"unit": "A"}},
+    "parameters": {"k": {"unit": "1/s^2", "guess": 30.0}, "b": {"unit": "1/s", "guess": 0.1},
+                   "m": {"unit": "rad/(A*s^2)", "guess": 2.0}, "r": {"value": 0.03}},
+    "equations": {"q": "v", "v": "-k*sin(q) - r*(m*i - b*w)", "w": "m*i - b*w"},
+    "outputs": {"q": {"unit": "rad", "expression": "q"}},
+}
+
+
+def test_a_state_beside_a_coordinate_has_an_equation_of_its_own() -> None:
+    """What resists a wheel acts back on what carries it, as the model's own resistance does."""
+    model = Model.from_dict(WHEEL)
+    recording = pk.simulate(model, pk.Recording.from_arrays(
+        0.01 * np.arange(200), {"i": np.sin(0.1 * np.arange(200))}, units={"i": "A"}))
+    found = {c.key: c for c in candidates(sites(model, (recording,)))}
+    plain, along = found["coulomb_friction_w"], found["coulomb_friction_w_b"]
+    assert plain.applied(model).equations["v"] == model.equations["v"]
+    more = {s: along.applied(model).equations[s] - model.equations[s] for s in "vw"}
+    assert sp.simplify(more["v"] + symbol("r") * more["w"]) == 0 and more["w"] != 0
+    # what the model has is offered once: viscous damping where there is none
+    assert "linear_drag" in found and "linear_drag_w" not in found
+    assert "linear_drag" not in {c.key for c in made(systems.sloshing())}

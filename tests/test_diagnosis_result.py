@@ -32,7 +32,7 @@ def explanation(name: str, expression: str, probability: float = 0.5) -> Explana
 
 
 def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:
-    nothing = cast(Estimate, None)
+    nothing = cast(Estimate, SimpleNamespace(model=sloshing()))
     return Diagnosis(verdict, 1e-9, DEFAULTS, Where(("dynamics",), "v", (), (), None), given, (),
                      nothing, nothing, None)
 
@@ -52,6 +52,16 @@ def test_where_is_said_in_words_and_as_data() -> None:
     none = replace(said, where=replace(said.where, channels=()))
     assert [d.where.channel for d in (said, several, none)] == ["dynamics", "several", "undecided"]
     assert "channel undecided" in str(none) and "undecided between" in _where(none)
+
+
+def test_long_times_are_in_hours_and_formulas_have_an_equation() -> None:
+    law = explanation("a law", "a*exp(-b*T)")
+    law = replace(law, effects=(replace(law.effects[0], ids=("symbolic:a*exp(-b*T)",),
+                                        equation="T"),))
+    said = replace(diagnosis("named", law), where=(
+        Where(("dynamics",), "T", (), ((3600.0, 18_000.0),), None)))
+    assert "in time at 1 to 5 h" in str(said)
+    assert "\n  T' += a*exp(-b*T)   [symbolic:a*exp(-b*T)]" in str(said)
 
 
 @pytest.mark.parametrize(("first", "other", "missed", "verdict"), [

@@ -15,7 +15,7 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.catalogue.bound_effects import bound_to
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.model.domains import candidates_of, catalogues_of, taken
+from pikanid.model.domains import candidates_of, catalogues_of, not_taken, taken
 from pikanid.model.effects_file import read_effects
 
 NAMES = {"thermal_rc": ("thermal",), "cascaded_tanks": ("hydraulics",),
@@ -42,11 +42,32 @@ def test_every_ready_made_model_takes_what_suits_it() -> None:
 
 @pytest.mark.parametrize(("unit", "names"), [
     ("degC", ("thermal",)), ("K", ("thermal",)), ("mg/l", ("kinetics",)),
-    ("mol/m^3", ("kinetics",)), ("mA", ("electrical",)), ("V", ()), ("m", ()), ("rad", ()),
-    ("", ())])
+    ("mol/m^3", ("kinetics",)), ("mA", ("electrical",)), ("V", ()),
+    ("bar", ("hydraulics",)), ("m", ()), ("rad", ()), ("", ())])
 def test_units_of_all_states_tell(unit: str, names: tuple[str, ...]) -> None:
     assert catalogues_of(decay(unit)) == names
     assert bool(taken(decay(unit))) == bool(names)
+
+
+@pytest.mark.parametrize(("first", "second", "names"), [
+    ("A", "V", ("electrical",)), ("V", "A", ("electrical",)), ("V", "V", ()),
+    ("g/l", "l", ("kinetics",)), ("l", "l", ()), ("bar", "m^3", ("hydraulics",)),
+    ("A", "m", ()), ("bar", "degC", ()), ("g/l", "bar", ())])
+def test_one_unit_tells_where_the_others_go_with_it(
+        first: str, second: str, names: tuple[str, ...]) -> None:
+    table = content(first)
+    table["states"] |= {"y": {"unit": second, "initial": "free"}}
+    table["equations"] |= {"y": "-k*y"}
+    assert catalogues_of(pk.Model.from_dict(table)) == names
+
+
+def test_what_was_not_looked_for_is_said() -> None:
+    said = not_taken(decay("V"), ())
+    assert "thermal" in said and "mechanics" not in said and "--catalogue" in said
+    known = [e.key for e in read_effects("thermal")]
+    assert "thermal" not in not_taken(decay("V"), known)
+    assert "catalogue mechanics " in not_taken(pk.systems.sloshing(), ())
+    assert not_taken(decay("V", domain=["hydraulics"]), ()) == ""
 
 
 def test_a_domain_comes_before_units_and_stays_in_the_file(tmp_path: Path) -> None:

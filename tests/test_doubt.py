@@ -63,6 +63,21 @@ def test_a_size_that_may_be_nothing_is_not_sure(
         assert sure == (said == "") and sure != ("may be nothing" in said)
 
 
+def test_a_formula_that_is_not_determined_is_no_name(
+        hypotheses: tuple[Case, list[Hypothesis]], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two parameters that go together may fit as well wherever they are."""
+    case, ranked = hypotheses
+    (effect,) = ranked[0].effects
+    formula = replace(effect, ids=("symbolic:a*tanh(b*theta)",), known=False, name="a law",
+                      parameters=(*effect.parameters, pk.Parameter("b", 1.0, "1/rad")))
+    found = [replace(ranked[0], effects=(formula,)), ranked[1]]
+    size = found[0].values["k3"]
+    for error, sure in ((size / 4.0, True), (4.0 * size, False)):
+        monkeypatch.setattr(Hypothesis, "std", {"k3": error, "b": 0.1})
+        said, _ = doubt(case, found, moved(2))
+        assert sure == (said == "") and sure != ("does not determine k3" in said)
+
+
 def test_what_is_at_rest_or_short_proves_nothing(
         hypotheses: tuple[Case, list[Hypothesis]]) -> None:
     for later in (moved(2, 0.0), moved(2).window(0.0, 0.045)):

@@ -16,6 +16,7 @@ from pikanid.estimate import file as estimate_file
 from pikanid.estimate.data import EstimateData, Fit
 from pikanid.estimate.rounding import rounded
 from pikanid.model import Model
+from pikanid.objective.settings import USUAL
 from pikanid.recording import Recording
 
 if TYPE_CHECKING:
@@ -260,8 +261,11 @@ class Estimate(EstimateData):
         found = self.rmse_by_output.items()
         sizes = [f"{value:.3g} {self._units[name]}".rstrip() + (
             f" of '{name}'" if len(found) > 1 else "") for name, value in found]
+        # noise that is read off the samples may be coloured: a test of white noise is no verdict
+        more = (", which is more than white noise leaves by chance: a diagnosis tells whether "
+                "anything is missing" if a.verdict == "fits" and a.p_value < USUAL.alpha else "")
         return (f"The fit {stop} and {what}: residual {', '.join(sizes)}, "
-                f"{ratio:.3g} times {noise}.")
+                f"{ratio:.3g} times {noise}{more}.")
 
     __repr__ = __str__
 

@@ -10,6 +10,7 @@ from pikanid.estimate.rounding import rounded
 from pikanid.figures import unit_text
 from pikanid.mismatch.report.drawing import plot_proof, plot_shape, plot_where
 from pikanid.mismatch.report.sheets import held_out, parameters
+from pikanid.mismatch.report.text_report import places
 from pikanid.pieces.html import drawn, tabled, text
 from pikanid.pieces.sheet import Sheet
 from pikanid.reporting.document import document
@@ -62,7 +63,7 @@ def _proof(dx: Diagnosis) -> str:
 
 def _where(dx: Diagnosis) -> str:
     spans = dx.where.times or "spread over the recording"
-    channel = " and ".join(f"the {c}" for c in dx.where.channels) or (
+    channel = " and ".join(f"the {c}" for c in places(dx)) or (
         "undecided between input, sensor and dynamics")
     region = f" It acts at {', '.join(map(str, dx.where.region))}." if dx.where.region else ""
     if dx.where.parameters:

@@ -10,7 +10,7 @@ from pikanid.simulation.tape import Tape
 
 LOOK = "ptr %r, ptr %d, double %t, double %gap, ptr %x, ptr %S, ptr %u, ptr %v, ptr %dtau"
 STEP = f"{LOOK}, double %h, ptr %xn, ptr %Sn"
-STAGES = 4
+STAGES = 4  # definition: of the classical method
 # shares of a step after which its stages look, and the weights of what they see
 TABLES = """
 @shares = private unnamed_addr constant [4 x double] [

@@ -89,7 +89,7 @@ def power_drag(site: Site) -> list[Candidate]:
     return [Candidate(("power_drag",), "drag with an exponent of its own", text, "dynamics", site,
                       (c, n), lambda m: site.pushed(m, text), directions,
                       covers={"coulomb_friction" + site.suffix: {n.name: 0.3},
-                              "linear_drag" + site.suffix: {n.name: 1.05},
+                              **{e.key: {n.name: 1.05} for e in linear_drag(site)},
                               "quadratic_drag" + site.suffix: {n.name: 1.8}},
                       static=True, resistance=np.power, exponent=n, form="signed power",
                       argument=site.v)]

@@ -5,21 +5,22 @@ from __future__ import annotations
 from pikanid.estimate.rounding import rounded, with_unit
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.report.findings import DiagnosisData
-from pikanid.model import Model
 
 
-def _several(model: Model) -> bool:
-    """Whether more than one equation says more than that a state is another one's rate."""
-    return sum(not e.is_Symbol for e in model.equations.values()) > 1
+def places(dx: DiagnosisData) -> list[str]:
+    """The channels in which something surely acts; of the dynamics with the equation, where the
+    model has several that say more than that a state is another one's rate.
+    """
+    equations = dx.before.model.equations.values()
+    which = f", in {dx.where.equation}'" if sum(not e.is_Symbol for e in equations) > 1 else ""
+    return [f"{c}{which}" if c == "dynamics" else c for c in dx.where.channels]
 
 
 def lines_of(dx: DiagnosisData) -> list[str]:
     """Verdict, where, what, proof, what to do next, notes and settings, line by line."""
     lines = [dx.sentence()]
     if dx.mismatch:
-        place = " and ".join(
-            f"dynamics, in {dx.where.equation}'" if c == "dynamics" and _several(dx.before.model)
-            else c for c in dx.where.channels) or "channel undecided"
+        place = " and ".join(places(dx)) or "channel undecided"
         region = ", ".join(map(str, dx.where.region))
         lines.append(f"Where: {place}" + (f"; at {region}" if region else "")
                      + (f"; in time at {dx.where.times}" if dx.where.time else ""))

@@ -1,0 +1,119 @@
+"""Laws between two coordinates, on a pair of carts that SciPy simulates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pikanid as pk
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.between import effects_between
+from pikanid.mismatch.catalogue.site import coordinates
+from pikanid.model import systems
+
+SIGMA = 0.002
+M, N, K, D, G = 1.0, 0.5, 60.0, 0.4, 40.0
+CARTS = {
+    "name": "two carts",
+    "states": {"a": {"unit": "m"}, "b": {"unit": "m"}, "v": {"unit": "m/s"}, "w": {"unit": "m/s"}},
+    "inputs": {"F": {"unit": "N", "hold": "zero"}},
+    "parameters": {"M": {"unit": "kg", "value": M}, "N": {"unit": "kg", "value": N},
+                   "k": {"unit": "N/m", "guess": 40.0, "bounds": [1.0, 500.0]},
+                   "d": {"unit": "N*s/m", "guess": 0.3, "bounds": [0.0, 10.0]},
+                   "g": {"unit": "N/m", "guess": 50.0, "bounds": [1.0, 500.0]},
+                   "c": {"unit": "N*s/m", "guess": 0.5, "bounds": [0.0, 10.0]}},
+    "equations": {"a": "v", "b": "w", "v": "(F - g*a - c*v - k*(a - b) - d*(v - w))/M",
+                  "w": "(k*(a - b) + d*(v - w))/N"},
+    "outputs": {"a": {"unit": "m", "expression": "a"}, "b": {"unit": "m", "expression": "b"}},
+}
+
+
+def between(model: pk.Model, reach: float = 1.0) -> dict[str, pk.Effect]:
+    ranges = dict.fromkeys(model.state_names, (-reach, reach))
+    return {e.key: e for e in effects_between(model, coordinates(model), lambda: ranges)}
+
+
+@pytest.mark.parametrize(("key", "force"), [
+    ("friction_between", lambda size, d, dv: size * np.sign(dv)),
+    ("drag_between", lambda size, d, dv: size * abs(dv) * dv),
+    ("spring_between", lambda size, d, dv: size * d**3),
+    ("play_between", lambda size, d, dv: K * (np.sign(d) * max(abs(d) - size, 0.0) - d))])
+def test_they_act_on_both_alike(key: str, force: Callable[[float, float, float], float]) -> None:
+    """Against the equations of motion: a force f between the carts adds -f/M and f/N."""
+    model = pk.Model.from_dict(CARTS).with_values(k=K)
+    effect = between(model)[key]
+    extended, rng = model.with_effect(effect), np.random.default_rng(1)
+    for _ in range(5):
+        x = dict(zip("abvw", rng.normal(size=4), strict=True))
+        size = float(rng.uniform(0.1, 0.5))
+        at = {symbol(n): v for n, v in {**model.values, **x, "F": 0.0,
+                                        effect.size.name: size}.items()}
+        f = force(size, x["a"] - x["b"], x["v"] - x["w"])
+        for state, share in (("v", -1 / M), ("w", 1 / N)):
+            more = (extended.equations[state] - model.equations[state]).subs(at)
+            assert float(more) == pytest.approx(share * f)
+
+
+def test_gears_are_counted() -> None:
+    """A shaft behind a gear: the difference of angles is weighed with the ratio."""
+    geared = pk.Model.from_dict({**CARTS, "equations": {
+        "a": "v", "b": "w", "v": "(F - g*a - c*v - 3*k*(3*a - b))/M", "w": "k*(3*a - b)/N"}})
+    found = between(geared)
+    assert [*found] == ["friction_between", "drag_between", "spring_between", "play_between"]
+    text = found["friction_between"].add["v"]
+    assert "sign" in text and "w" in text and ("3*v" in text or "w/3" in text)
+
+
+@pytest.mark.parametrize("name", ["sloshing", "sloshing_2d", "cart_pole", "double_pendulum"])
+def test_where_nothing_acts_between_there_are_none(name: str) -> None:
+    """Of a linkage `lever` says how forces in a joint act."""
+    assert between(getattr(systems, name)()) == {}
+
+
+def test_the_drive_has_a_shaft() -> None:
+    assert [*between(systems.two_mass_drive())] == [
+        "friction_between", "drag_between", "spring_between", "play_between"]
+
+
+def carts(seed: int, force: Callable[[float, float], float]) -> pk.Recording:
+    rng = np.random.default_rng(seed)
+    t = np.arange(600) * 0.02
+    F = np.repeat(rng.uniform(-8, 8, 25), 24)
+
+    def rate(time: float, x: np.ndarray) -> list[float]:
+        a, b, v, w = x
+        between = K * (a - b) + D * (v - w) + force(a - b, v - w)
+        u = F[min(int(time / 0.02 + 1e-9), len(F) - 1)]
+        return [v, w, (u - G * a - 0.6 * v - between) / M, between / N]
+
+    found = solve_ivp(rate, (0, t[-1]), np.zeros(4), "DOP853", t, rtol=1e-8, atol=1e-10,
+                      max_step=0.01)
+    y = found.y[:2] + SIGMA * rng.normal(size=(2, len(t)))
+    return pk.Recording.from_arrays(t, {"a": y[0], "b": y[1], "F": F},
+                                    units={"a": "m", "b": "m", "F": "N"})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "force", "parameter", "size"), [
+    ("friction_between", lambda d, dv: 0.8 * np.tanh(dv / 0.002), "F_a_b", 0.8),
+    ("play_between", lambda d, dv: -K * np.clip(d, -0.01, 0.01), "gap_a_b", 0.01)])
+def test_they_are_found(name: str, force: Callable[[float, float], float], parameter: str,
+                        size: float) -> None:
+    found = pk.diagnose(pk.Model.from_dict(CARTS), carts(1, force), carts(2, force))
+    assert found.verdict == "named", str(found)
+    (effect,) = found.hypotheses[0].effects
+    assert effect.ids == (name,)
+    assert effect.parameters[parameter].value == pytest.approx(size, rel=0.05)
+
+
+@pytest.mark.slow
+def test_friction_against_the_ground_is_told_apart() -> None:
+    def rubbing(seed: int) -> pk.Recording:
+        return carts(seed, partial(lambda d, dv: 0.0))
+
+    found = pk.diagnose(pk.Model.from_dict(CARTS), rubbing(3), rubbing(4))
+    assert found.verdict == "none", str(found)
