@@ -102,9 +102,12 @@ def test_messages_say_what_and_where() -> None:
         read("sine(x)")
     with pytest.raises(errors.BadModel, match=r"'kk' .*a test.*Did you mean 'k'"):
         read("kk*x")
+    with pytest.raises(errors.BadModel, match=r"'x > 1' .*a test.* clip, .*step\(x - level\)"):
+        read("sin(x > 1)")
 
 
-@pytest.mark.parametrize("name", ["t", "pi", "sin", "clip", "1a", "_s0", "a b", "", "é", "a-b"])
+@pytest.mark.parametrize("name", ["t", "pi", "sin", "clip", "1a", "_s0", "a b", "", "é", "a-b",
+                                  "lambda", "if"])
 def test_names_that_the_language_needs_cannot_be_used(name: str) -> None:
     with pytest.raises(errors.BadModel):
         check_name(name, "state")

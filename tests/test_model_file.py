@@ -99,6 +99,7 @@ def test_ready_made_models_round_trip(make: object, path: Path) -> None:
 BROKEN = [
     ("", "no states"),
     ("name = ", "cannot be read"),
+    ("name = -k*x", "stands in quotes"),
     ("x" * 100, "cannot be read"),
     (DRIVEN.replace("[states]", "[state]"), "unknown key 'state'"),
     (DRIVEN.replace("unit = \"rad\", initial", "units = \"rad\", initial"), "'units'"),

@@ -28,9 +28,12 @@ def formula_work(text: str, where: str) -> str:
             "functions and write shorter products.")
 
 
-def formula_forbidden(part: str, where: str) -> str:
+def formula_forbidden(part: str, where: str, functions: Sequence[str],
+                      compares: bool = False) -> str:
+    hint = (" A threshold is step(x - level), which is 1 above the level and 0 below it."
+            if compares else "")
     return (f"'{short(part)}' in the formula of {where} is not allowed: use numbers, names, "
-            "+ - * / **, parentheses and the listed functions.")
+            f"+ - * / **, parentheses and the functions {', '.join(functions)}.{hint}")
 
 
 def unknown_symbol(name: str, where: str, known: Sequence[str], close: Sequence[str]) -> str:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ast
 import difflib
+import keyword
 import math
 from collections.abc import Collection, Mapping
 
@@ -64,7 +65,7 @@ def check_name(name: str, what: str) -> str:
     if not isinstance(name, str) or not name.isidentifier() or not name.isascii() or (
             name.startswith("_") or len(name) > MAX_NAME):
         raise errors.BadModel(errors.bad_name(name, what))
-    if name in RESERVED:
+    if name in RESERVED or keyword.iskeyword(name):  # the grammar is Python's
         raise errors.BadModel(errors.reserved_name(name, what))
     return name
 
@@ -155,7 +156,9 @@ class _Reader:
 
     def fail(self, node: ast.AST) -> errors.BadModel:
         part = ast.get_source_segment(self.text.strip(), node) or self.text
-        return errors.BadModel(errors.formula_forbidden(part, self.where))
+        compares = isinstance(node, ast.Compare | ast.IfExp | ast.BoolOp)
+        return errors.BadModel(
+            errors.formula_forbidden(part, self.where, sorted(FUNCTIONS), compares))
 
     def afford(self, fits: bool) -> None:
         if not fits:

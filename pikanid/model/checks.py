@@ -12,7 +12,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from pikanid import errors
-from pikanid.formula.expressions import TIME, check_name
+from pikanid.formula.expressions import FUNCTIONS, TIME, check_name
 from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
 from pikanid.formula.limits import MAX_NAME
 from pikanid.model.effect import Effect
@@ -194,7 +194,8 @@ def _check_symbols(expr: sp.Expr, known: Iterable[str], where: str, model: Looku
     if unknown:
         raise errors.BadModel(errors.foreign_symbols(unknown, where))
     if forbidden:
-        raise errors.BadModel(errors.formula_forbidden(forbidden, where[0].lower() + where[1:]))
+        raise errors.BadModel(errors.formula_forbidden(
+            forbidden, where[0].lower() + where[1:], sorted(FUNCTIONS)))
 
 
 # a model is made from another by many small steps, each of which checks all formulas again

@@ -108,7 +108,10 @@ def toml_content(path: str | os.PathLike[str], wrong: Wrong) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise wrong("it is not text") from None
     except (ValueError, RecursionError) as problem:  # also an integer of thousands of digits
-        raise wrong(str(problem) or "it is nested too deep") from None
+        detail = str(problem) or "it is nested too deep"
+        if detail.startswith("Invalid value"):
+            detail += '; text, as a formula or a unit, stands in quotes: x = "-k*x"'
+        raise wrong(detail) from None
 
 
 def json_content(path: str | os.PathLike[str], wrong: Wrong) -> Any:
