@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +13,14 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.between import effects_between
-from pikanid.mismatch.catalogue.site import coordinates
+from pikanid.mismatch.catalogue.bound_effects import bound_to, reserved
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.site import coordinates, sites
 from pikanid.model import systems
 
 SIGMA = 0.002
 M, N, K, D, G = 1.0, 0.5, 60.0, 0.4, 40.0
-CARTS = {
+CARTS: dict[str, Any] = {
     "name": "two carts",
     "states": {"a": {"unit": "m"}, "b": {"unit": "m"}, "v": {"unit": "m/s"}, "w": {"unit": "m/s"}},
     "inputs": {"F": {"unit": "N", "hold": "zero"}},
@@ -110,10 +113,45 @@ def test_they_are_found(name: str, force: Callable[[float, float], float], param
     assert effect.parameters[parameter].value == pytest.approx(size, rel=0.05)
 
 
-@pytest.mark.slow
-def test_friction_against_the_ground_is_told_apart() -> None:
-    def rubbing(seed: int) -> pk.Recording:
-        return carts(seed, partial(lambda d, dv: 0.0))
-
-    found = pk.diagnose(pk.Model.from_dict(CARTS), rubbing(3), rubbing(4))
+def test_nothing_is_found_where_nothing_is() -> None:
+    found = pk.diagnose(pk.Model.from_dict(CARTS), carts(3, lambda d, dv: 0.0),
+                        carts(4, lambda d, dv: 0.0))
     assert found.verdict == "none", str(found)
+
+
+def test_two_ways_of_one_pair_are_told_apart() -> None:
+    """A damper behind a lever acts by another difference of the same two speeds."""
+    equations = {"a": "v", "b": "w", "v": "(F - g*a - c*v - k*(a - b) - 2*d*(2*v - w))/M",
+                 "w": "(k*(a - b) + d*(2*v - w))/N"}
+    model = pk.Model.from_dict({**CARTS, "equations": equations})
+    ranges = dict.fromkeys(model.state_names, (-1.0, 1.0))
+    found = [*effects_between(model, coordinates(model), lambda: ranges)]
+    assert len({(e.key, e.variant) for e in found}) == len(found) == 6
+    assert len({p.name for e in found for p in e.parameters}) == 6
+    recording = carts(5, lambda d, dv: 0.0)
+    own = bound_to([], sites(model, (recording,)), [recording], lambda: ranges)
+    assert len(candidates(reserved(sites(model, (recording,)), own), own)) > 60
+
+
+def test_names_of_the_user_stay_the_users() -> None:
+    table = {**CARTS, "parameters": {**CARTS["parameters"],
+                                     "F_a_b": {"unit": "N", "value": 1.0}}}
+    table["equations"] = {**CARTS["equations"],
+                          "v": "(F + F_a_b - g*a - c*v - k*(a - b) - d*(v - w))/M"}
+    model = pk.Model.from_dict(table)
+    friction = between(model)["friction_between"]
+    assert friction.size.name == "F_a_b_x"
+    mine = replace(friction, name="mine", variant="")
+    recording = carts(5, lambda d, dv: 0.0)
+    own = bound_to([mine], sites(model, (recording,)), [recording],
+                   lambda: dict.fromkeys(model.state_names, (-1.0, 1.0)))
+    assert [e.name for e in own if e.key == "friction_between"] == ["mine"]
+    assert not {p.name for e in own if e is not mine for p in e.parameters} & {*mine.names}
+
+
+def test_a_cart_that_only_rubs_on_the_other_may_rub_on_the_ground() -> None:
+    recording = carts(5, lambda d, dv: 0.0)
+    found = {s.v: s.resisted for s in sites(pk.Model.from_dict(CARTS), (recording,))}
+    assert found == {"v": True, "w": False}
+    undamped = pk.Model.from_dict(CARTS).fix(c=0.0)
+    assert not sites(undamped, (recording,))[0].resisted

@@ -51,14 +51,13 @@ def effects(
                   [*every_source(excitation), model, *catalogue])
     from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown
     from pikanid.model import systems
-    from pikanid.model.domains import candidates_of
     from pikanid.reporting.console import console
     from pikanid.reporting.tables import row, table
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
-    if not candidates_of(chosen):
-        raise errors.BadModel(errors.no_effects(chosen.name))
     shown = effects_shown(chosen, excited(chosen, excitation, duration, files))
+    if not shown:
+        raise errors.BadModel(errors.no_effects(chosen.name))
     if plot is not None and not all(one.failure for one in shown):
         save_figure(effects_figure(shown, chosen), plot)
     if quiet:

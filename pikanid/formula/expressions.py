@@ -156,9 +156,8 @@ class _Reader:
 
     def fail(self, node: ast.AST) -> errors.BadModel:
         part = ast.get_source_segment(self.text.strip(), node) or self.text
-        compares = isinstance(node, ast.Compare | ast.IfExp | ast.BoolOp)
-        return errors.BadModel(
-            errors.formula_forbidden(part, self.where, sorted(FUNCTIONS), compares))
+        return errors.BadModel(errors.formula_forbidden(
+            part, self.where, sorted(FUNCTIONS), isinstance(node, ast.Compare | ast.IfExp)))
 
     def afford(self, fits: bool) -> None:
         if not fits:
@@ -214,11 +213,11 @@ class _Reader:
         """Refuse a number that no float can hold, before anything grows from it."""
         if result.is_number:
             try:
-                finite = math.isfinite(float(result))
+                if math.isfinite(float(result)):
+                    return
             except (TypeError, OverflowError):
-                finite = False
-            if not finite:
-                raise self.fail(node)
+                pass
+            raise self.fail(node)
 
     def part(self, node: ast.AST, depth: int) -> sp.Expr:
         match node:
@@ -242,10 +241,8 @@ class _Reader:
         return found
 
     def name(self, name: str) -> sp.Expr:
-        if name == "pi":
-            return sp.pi
-        if name in self.names or name == "t":
-            return symbol(name)
+        if name in self.names or name in ("t", "pi"):
+            return sp.pi if name == "pi" else symbol(name)
         close = difflib.get_close_matches(name, [*self.names, *FUNCTIONS], 1)
         raise errors.BadModel(errors.unknown_symbol(name, self.where, sorted(self.names), close))
 

@@ -13,7 +13,7 @@ from pikanid.model.lookup import Lookup
 
 # A catalogue is taken where some state has a unit that tells its domain, and every other one such a
 # unit or one that goes with it.  A voltage alone tells nothing: levels and angles are recorded in
-# volts as well; nor does a length.
+# volts as well; nor does a length, which may be a level or a place.
 STATES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l"), ("l",)),
     "electrical": (("A",), ("V",)), "hydraulics": (("Pa",), ("l", "l/s"))}
@@ -49,7 +49,7 @@ def candidates_of(model: Lookup) -> tuple[Effect | EffectForm, ...]:
 
 def not_taken(model: Lookup, known: Iterable[str]) -> str:
     """A sentence on the catalogues for models of its kind whose effects are not among the `known`
-    ones; empty where the model names its domain, or where something of every one is known.
+    ones; empty where the model names its domain, or its units do.
 
     >>> import pikanid as pk
     >>> not_taken(pk.systems.sloshing(), ())[:58]
@@ -57,7 +57,7 @@ def not_taken(model: Lookup, known: Iterable[str]) -> str:
     """
     ids = {*known}
     moves = any(e.is_Symbol and e.name in model.state_names for e in model.equations.values())
-    left = [name for name in catalogues() if name not in catalogues_of(model)
+    left = [name for name in catalogues() if not catalogues_of(model)
             and (name == "mechanics") == moves and not ids & {e.key for e in read_effects(name)}]
     if model.domain is not None or not left:
         return ""

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 # Below hours, seconds are what recordings are made in.
 UNITS = (("d", 86400.0, 4.0), ("h", 3600.0, 3.0))  # limit: name, seconds, and from how many on
 
+SHORT = 0.05  # layout: of a unit: shorter windows are told in seconds
+
 
 def time_unit(longest: float) -> tuple[float, str]:
     """Seconds that a unit for times up to the `longest` [s] holds, and its name.
@@ -22,10 +24,12 @@ def spans(windows: Sequence[tuple[float, float]], shown: int) -> str:
     """The first windows of time [s] in words; empty where there are none.
 
     >>> spans([(0.0, 1.5), (3.0, 4.0)], 1), spans([(0.0, 20_000.0)], 1)
-    ('0 to 1.5 s, and 1 more', '0 to 5.556 h')
+    ('0 to 1.5 s, and 1 more', '0 to 5.5556 h')
     """
     size, unit = time_unit(max((stop for _, stop in windows), default=0.0))
-    digits = "g" if size == 1 else ".4g"
+    if any(stop - start < SHORT * size for start, stop in windows[:shown]):
+        size, unit = 1.0, "s"
+    digits = "g" if size == 1 else ".5g"
     told = ", ".join(f"{start / size:{digits}} to {stop / size:{digits}} {unit}"
                      for start, stop in windows[:shown])
     more = len(windows) - shown

@@ -58,6 +58,7 @@ def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
     return Native(_addresses(engine, FUNCTIONS), _addresses(engine, tuple(plain)), engine)
 
 
+@functools.lru_cache(maxsize=512)
 def native_field(tape: Tape, active: tuple[int, ...], group: str) -> tuple[np.ndarray, Any]:
     """Addresses of a tape's prelude and its derivatives, and of a group and its derivatives by the
     `active` parameters and states; what keeps them alive.
@@ -90,8 +91,11 @@ def _linked(tape: Tape, key: tuple[object, ...], text: Callable[[], str]) -> Any
 
 
 def _addresses(engine: Any, names: Sequence[str]) -> np.ndarray:
-    return np.array([engine.get_function_address(name) or engine.get_function_address(_NOTHING)
-                     for name in names])
+    found = [engine.get_function_address(name) or engine.get_function_address(_NOTHING)
+             for name in names]
+    if not all(found):
+        raise LookupError(f"of {', '.join(names)} not all have been written")
+    return np.array(found)
 
 
 def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:

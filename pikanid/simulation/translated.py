@@ -103,8 +103,8 @@ class Machine:
         kept = self.own.__dict__.setdefault("kept", {})
         key = (active, delayed)
         if key not in kept:
-            code = (native(self.program, active, delayed) if active
-                    else native(self.program, self.estimated, self.delayed))
+            wanted = (active, delayed) if active else (self.estimated, self.delayed)
+            code = native(self.program, *wanted)
             kept[key] = bound(
                 self.program, active, code.addresses if active else code.plain), code
         return kept[key][0]

@@ -7,7 +7,7 @@ that rate: so the model itself says how any other force between them acts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -37,8 +37,11 @@ class _Between:
 
 
 def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
-                    ranges: Callable[[], Ranges]) -> Iterator[Effect]:
-    """Dry friction, drag, play and a cubic spring between coordinates (place, speed).
+                    ranges: Callable[[], Ranges], taken: Iterable[str] = ()) -> Iterator[Effect]:
+    """Dry friction, drag, play and a cubic spring between coordinates (place, speed); `taken` are
+    names, beside the model's own, that their parameters must not have.
+
+    A spring or a damper must have a parameter of its own, that of no other pair.
 
     >>> from pikanid.model import systems
     >>> drive = systems.two_mass_drive()
@@ -55,8 +58,12 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
             if one is not None:
                 found.setdefault(one, {}).setdefault(places, name)
     seen = ranges() if found else {}
+    used, pairs = {*model.symbols, *taken}, set[tuple[str, str]]()
     for one, by in found.items():
         x, y, v, w = one.x, one.y, speed[one.x], speed[one.y]
+        # of two ways in which the same coordinates act on each other, the parameter tells which
+        which = (x, y, *by.values()) if (x, y) in pairs else (x, y)
+        pairs.add((x, y))
         place, rate = one.of(x, y), one.of(v, w)
         far, fast = _reach(seen, one, model, x, y), _reach(seen, one, model, v, w)
         length, across = model.state(x).unit, model.state(v).unit
@@ -65,23 +72,31 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
         push = max(abs(p.value) * reach for p, reach, _ in sizes.values()) or 1.0
         force = next(units.product((p.unit, 1), (unit, 1)) for p, _, unit in sizes.values())
 
+        def named(wanted: str, which: tuple[str, ...] = which) -> str:
+            name = "_".join((wanted, *which))
+            while name in used:
+                name += "_x"
+            used.add(name)
+            return name
+
         def law(key: str, words: str, family: str, shape: str, size: Parameter,
-                factor: sp.Expr | None = None, one: _Between = one) -> Effect:
+                factor: sp.Expr | None = None, one: _Between = one,
+                variant: str = ",".join(which)) -> Effect:
             factor = symbol(size.name) if factor is None else factor
             return Effect(
                 f"{key}_between", f"{words} between {one.x} and {one.y}", (size,),
-                (size.name, 0.0), family=family, variant=f"{one.x},{one.y}",
+                (size.name, 0.0), family=family, variant=variant,
                 add={r: f"{to_text(share * factor)}*{shape}" for r, share in one.shares})
 
         yield law("friction", "dry friction", "dry friction", f"sign({rate})",
-                  Parameter(f"F_{x}_{y}", push, force, (0.0, INF)))
+                  Parameter(named("F"), push, force, (0.0, INF)))
         yield law("drag", "quadratic drag", "drag", f"abs({rate})*({rate})", Parameter(
-            f"D_{x}_{y}", push / fast**2, units.product((force, 1), (across, -2)), (0.0, INF)))
+            named("D"), push / fast**2, units.product((force, 1), (across, -2)), (0.0, INF)))
         if True not in by:
             continue
         yield law("spring", "a cubic spring", "restoring force", f"({place})**3", Parameter(
-            f"K_{x}_{y}", push / far**3, units.product((force, 1), (length, -3))))
-        gap = Parameter(f"gap_{x}_{y}", PLAY * far, length, (0.0, INF))
+            named("K"), push / far**3, units.product((force, 1), (length, -3))))
+        gap = Parameter(named("gap"), PLAY * far, length, (0.0, INF))
         yield law("play", "play", "restoring force", f"clip({place}, -{gap.name}, {gap.name})",
                   gap, factor=-symbol(by[True]))
 
@@ -93,22 +108,30 @@ def _between(model: Model, name: str, coordinates: Sequence[tuple[str, str]], pl
     """
     b = symbol(name)
     slopes = {v: s for _, v in coordinates if (s := model.equations[v].diff(b)) != 0}
-    if len(slopes) < 2:
+    moving = {TIME, b, *map(symbol, (*model.state_names, *model.input_names))}
+    # an inertia or a length stays in its own slope: refused before anything is simplified
+    if len(slopes) < 2 or any(s.has(b) for s in slopes.values()):
         return None
     own = {q if places else v: q for q, v in coordinates}
     first = next(iter(slopes.values()))
-    used = [n for n in own if first.has(symbol(n)) and first.diff(symbol(n)) != 0]
-    moving = {TIME, b, *map(symbol, (*model.state_names, *model.input_names))}
+    used = [n for n in own if first.has(symbol(n))]
     if len(used) != 2:
         return None
     x, y = (symbol(n) for n in used)
-    by_x, by_y = (sp.simplify(first.diff(q)) for q in (x, y))
-    if (by_x.free_symbols | by_y.free_symbols) & moving or sp.simplify(
-            first - by_x * x - by_y * y) != 0:
+
+    def share(slope: sp.Expr, ratio: sp.Expr) -> sp.Expr | None:
+        """What the slope is times x - ratio*y, if that does not move."""
+        found = slope.diff(x)
+        if found.free_symbols & moving:
+            return None
+        return found if sp.expand(slope - found * (x - ratio * y)) == 0 else None
+
+    by_x, by_y = first.diff(x), first.diff(y)
+    if by_x == 0 or (by_x.free_symbols | by_y.free_symbols) & moving:
         return None
-    ratio = sp.simplify(-by_y / by_x)
-    shares = {v: sp.simplify(s / (x - ratio * y)) for v, s in slopes.items()}
-    if any(share.free_symbols & moving for share in shares.values()):
+    ratio = sp.cancel(-by_y / by_x)
+    shares = {v: share(s, ratio) for v, s in slopes.items()}
+    if ratio == 0 or any(found is None for found in shares.values()):
         return None
     return _Between(own[used[0]], own[used[1]], ratio, tuple(shares.items()))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -37,14 +38,17 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     forms = [e for e in effects if isinstance(e, EffectForm)]
     own = [e for e in effects if isinstance(e, Effect)]
     site, first = sites[0], recordings[0]
-    between = [*effects_between(site.model, coordinates(site.model), ranges)]
+    ranges = functools.cache(ranges)
+    names = {n for e in own for n in e.names}
+    between = [e for e in effects_between(site.model, coordinates(site.model), ranges, names)
+               if all(e.key != one.key for one in own)]
     if not forms and not between:
         return own
-    names = [*(i for i in site.model.input_names if i in first), *site.extra]
+    recorded = [*(i for i in site.model.input_names if i in first), *site.extra]
     around = Surroundings(
         site.model, tuple(dict.fromkeys(s.v for s in sites)), ranges(),
         {n: _range(first, n) for n in site.model.output_names if n in first},
-        {n: float(np.abs(first[n].values).max(initial=0.0)) for n in names},
+        {n: float(np.abs(first[n].values).max(initial=0.0)) for n in recorded},
         {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
         site.interval)
     extended = {_extended(site.model, e) for e in own}

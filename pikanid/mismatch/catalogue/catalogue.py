@@ -141,9 +141,10 @@ def _told_apart(law: Candidate) -> Candidate:
     for channel in _channels(law):
         several, word = ((model.inputs, "the input") if channel in law.site.inputs
                          else (model.outputs, "the sensor"))
-        if len(several) > 1:
-            name = name.replace(word, f"{word} {channel}" if several is model.inputs
-                                else f"{word} of {channel}")
+        if len(several) > 1 and word in name:
+            name = name.replace(word, f"{word} {'' if several is model.inputs else 'of '}{channel}")
+        elif len(several) > 1 and channel not in name.split():
+            name = f"{name} ({channel})"
     return replace(law, name=name)
 
 

@@ -129,9 +129,19 @@ class Site:
 
     @property
     def resisted(self) -> bool:
-        """Whether a parameter of the model resists v in proportion at rest."""
-        return any(_at_rest(self.model, self.acceleration.diff(symbol(p)).diff(symbol(self.v))) != 0
-                   for p in self.model.parameter_names)
+        """Whether a parameter of the model resists v itself in proportion, at rest: not a speed
+        relative to another coordinate's.
+        """
+        own = {self.q, self.v}
+        others = [symbol(n) for n in self.model.state_names if n not in own]
+
+        def resists(p: Parameter) -> bool:
+            slope = self.acceleration.diff(symbol(p.name))
+            return (p.free or p.value != 0) and _at_rest(
+                self.model, slope.diff(symbol(self.v))) != 0 and all(
+                _at_rest(self.model, slope.diff(other)) == 0 for other in others)
+
+        return any(resists(p) for p in self.model.parameters)
 
     @property
     def stiffness(self) -> sp.Expr:

@@ -37,8 +37,10 @@ def with_own_noise(records: Records, residuals: Sequence[Residual],
         if level.source == "given":
             continue
         left = values - from_inputs(records.recordings[r], t, values, inputs, records.settings)
-        found = louder(level, t, left, rate, records.settings.noise)
-        if found and np.log(found[0]) > certain * np.hypot(found[1], level.spread):
+        here = float(np.median(np.diff(t))) if len(t) > 1 else level.interval
+        at_that_rate = replace(level, interval=here, rho=level.rho ** (here / level.interval))
+        found = louder(at_that_rate, t, left, rate, records.settings.noise)
+        if found and found[0] > np.exp(certain * np.hypot(found[1], level.spread)):
             levels[r][name] = replace(level, sigma=level.sigma * np.sqrt(found[0]),
                                       spread=float(np.hypot(found[1], level.spread)))
     return replace(records, levels=tuple(levels))

@@ -61,7 +61,8 @@ class ShownEffect:
 
 
 def effects_shown(model: Model, excitation: Recording) -> tuple[ShownEffect, ...]:
-    """Simulate each effect that a model lists or takes from a catalogue, at its guess and without.
+    """Simulate each effect that a model lists, takes from a catalogue, or has between coordinates,
+    at its guess and without.
 
     Args:
         model: With effects (`Model.with_candidates`, or ``[effects]`` in its file) or a domain.
