@@ -121,3 +121,24 @@ def test_stopping_at_a_stiff_wall_needs_no_fine_steps() -> None:
     assert through.corners and not stopping.corners
     assert coarse < 2e-6
     assert fine > 50 * coarse
+
+
+def test_a_late_input_that_frees_what_sticks_moves_the_start_of_the_motion() -> None:
+    """The derivative by the delay, against a finite difference: at rest until the input jumps."""
+    model = Model.from_dict({
+        "name": "sledge", "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}},
+        "inputs": {"u": {"unit": "m/s^2", "hold": "zero", "delay": "tau"}},
+        "parameters": {"c": {"unit": "m/s^2", "value": 0.8}, "d": {"unit": "1/s", "value": 0.3},
+                       "tau": {"unit": "s", "guess": 0.013, "bounds": [0.0, 0.2]}},
+        "equations": {"x": "v", "v": "u - c*sign(v) - d*v"},
+        "outputs": {"x": {"unit": "m", "expression": "x"}}})
+    t = np.arange(0, 2.0, 0.05)
+    u = np.where(t < 0.5, 0.0, np.where(t < 1.1, 1.6, np.where(t < 1.5, -1.2, 0.2)))
+    drive = Recording.from_arrays(t, {"u": u, "x": t}, units={"u": "m/s^2", "x": "m"})
+    simulator = Translated(model, bind(model, drive))
+    p, k = values(model), model.parameter_names.index("tau")
+    step = 1e-6 * np.eye(len(p))[k]
+    found = simulator.run(p, np.array([k]), FINE).sensitivity[:, 0]
+    ahead, behind = (simulator.run(p + sign * step, steps=FINE).y for sign in (1, -1))
+    assert np.abs(found).max() > 0.1
+    np.testing.assert_allclose(found, (ahead - behind) / 2e-6, atol=1e-6)

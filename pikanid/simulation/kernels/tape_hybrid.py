@@ -104,29 +104,43 @@ def cross(b, stop, part, x, S, u, v, done, dtau, mode, end, which, kx, kS, xs, S
 
 
 @called
+def switch_one_by_one(b, t, gap, x, S, u_old, v_old, u, v, dtau, mode, before, held, rates):
+    """Inputs go to u, v one after the other, each with the modes that it finds and leaves: one that
+    comes later by dtau moves the state by (f- - f+) dtau.
+    """
+    n, m, A, r, code = b.sizes[0], b.sizes[1], S.shape[1], b.r, b.code
+    for j in range(m):
+        held[j], rates[j] = u_old[j] + v_old[j] * gap, v_old[j]
+    for j in range(m):
+        call_look(code[PUT], r, b.d, t, 0.0, x, S, held, rates, dtau)
+        put_signs(b, mode, b.flag[0])
+        call_native(code[VALUES_F], r, b.d)
+        for i in range(n):
+            before[i] = r[b.out[F, i]]
+        held[j], rates[j] = u[j], v[j]
+        begin(b, t, x, S, held, rates, dtau, mode)
+        call_look(code[PUT], r, b.d, t, 0.0, x, S, held, rates, dtau)
+        put_signs(b, mode, b.flag[0])
+        call_native(code[VALUES_F], r, b.d)
+        for i in range(n):
+            for a in range(A):
+                S[i, a] += (before[i] - r[b.out[F, i]]) * dtau[j, a]
+
+
+@called
 def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, output, row, inside,
-             X, Y, J, x, S, xs, Ss, xn, Sn, kx, kS, before, mode):
+             X, Y, J, x, S, xs, Ss, xn, Sn, kx, kS, before, mode, held, rates):
     """The classical Runge-Kutta method, stopping where the right-hand side jumps; see `run`."""
-    n, m, A, L, K = b.sizes[0], b.sizes[1], S.shape[1], len(T), b.sizes[4]
+    n, A, L, K = b.sizes[0], S.shape[1], len(T), b.sizes[4]
     r, d, out, code = b.r, b.d, b.out, b.code
-    sign, all_events = 1 + n + m + b.sizes[2], 0
+    sign, all_events = 1 + n + b.sizes[1] + b.sizes[2], 0
     prepare(b, p)
     for q in range(L):
         u, v = U[q], V[q]
         if jumps[q]:
             if delayed and q > 0 and A > 0:
-                call_look(code[PUT], r, d, T[q], T[q] - T[q - 1], x, S, U[q - 1], V[q - 1], dtau_in)
-                put_signs(b, mode, b.flag[0])
-                for j in range(m):
-                    call_native(code[VALUES_F], r, d)
-                    for i in range(n):
-                        before[i] = r[out[F, i]]
-                    r[1 + n + j] = U[q, j]
-                    put_signs(b, mode, b.flag[0])
-                    call_native(code[VALUES_F], r, d)
-                    for i in range(n):
-                        for a in range(A):
-                            S[i, a] += (before[i] - r[out[F, i]]) * dtau_in[j, a]
+                switch_one_by_one(b, T[q], T[q] - T[q - 1], x, S, U[q - 1], V[q - 1], u, v,
+                                  dtau_in, mode, before, held, rates)
             clear = fixed(mode)
             if clear:
                 call_look(code[LOOK_G], r, d, T[q], 0.0, x, S, u, v, dtau_in)
@@ -201,4 +215,5 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
     return run_tape(
         b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, output, row, inside,
         X, Y, J, x, S, x.copy(), S.copy(), x.copy(), S.copy(), np.empty((4, n)),
-        np.empty((4, *S.shape)), np.empty(n), np.ones(b.sizes[4]))
+        np.empty((4, *S.shape)), np.empty(n), np.ones(b.sizes[4]), np.empty(b.sizes[1]),
+        np.empty(b.sizes[1]))
