@@ -239,7 +239,7 @@ DELAY = replace(FRICTION, family="timing", ids=("input_delay",), name="a delay",
 
 
 def diagnosis(p_value: float = 1e-9) -> pk.Diagnosis:
-    nothing = cast(pk.Estimate, None)
+    nothing = cast(pk.Estimate, SimpleNamespace(model=pk.systems.sloshing()))
     return Diagnosis("partial", 1e-12, DEFAULTS, Where(("dynamics",), "v", (), (), None), (), (),
                      nothing, nothing, None, present=(FRICTION, DELAY),
                      remainder=replace(REMAINDER, p_value=p_value))

@@ -132,9 +132,9 @@ def test_windows_a_gap_apart_are_several() -> None:
 
 def test_a_long_list_of_windows_is_cut() -> None:
     several = tuple((float(k), k + 0.5) for k in range(9))
-    assert Where(("input",), "v", (), several[:2], None).seconds == "0 to 0.5 s, 1 to 1.5 s"
-    assert Where(("input",), "v", (), several, None).seconds.endswith("5 to 5.5 s, and 3 more")
-    assert Where(("input",), "v", (), (), None).seconds == ""
+    assert Where(("input",), "v", (), several[:2], None).times == "0 to 0.5 s, 1 to 1.5 s"
+    assert Where(("input",), "v", (), several, None).times.endswith("5 to 5.5 s, and 3 more")
+    assert Where(("input",), "v", (), (), None).times == ""
 
 
 def effect(known: dict[str, Candidate], *keys: str) -> tuple[Candidate, ...]:

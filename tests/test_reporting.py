@@ -22,10 +22,9 @@ def held(rmse: float) -> Any:
 
 def case(later: bool = True, lost: object = None) -> Any:
     known = {id(BASE): held(4.0), id(BEST): held(2.0)}
-    level = SimpleNamespace(sigma=0.5)
     return SimpleNamespace(
         base=BASE, predicted=lambda h: None if h is lost else known[id(h)],
-        later=SimpleNamespace(levels=({"y": level},), recordings=()) if later else None,
+        later=SimpleNamespace(sigma=lambda output: 0.5, recordings=()) if later else None,
         model=SimpleNamespace(outputs=(SimpleNamespace(name="y", unit="m"),)))
 
 

@@ -64,7 +64,7 @@ def _is_all(part: Part, given: Sequence[Hypothesis]) -> bool:
 def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
     """Explanations with all that they are to be compared with, and what is sure of them."""
     assert case.later is not None
-    noise = [{o: records.sigma(o) for o in case.model.output_names}
+    noise = [{o: records.sigma(o) for o in records.levels[0]}
              for records in (case.records, case.later)]
     search, settings = case.search, case.settings
     search.spent = 0.0  # what is sure has a budget of its own
