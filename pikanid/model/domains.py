@@ -55,14 +55,15 @@ def not_taken(model: Lookup, known: Iterable[str]) -> str:
     >>> not_taken(pk.systems.sloshing(), ())[:58]
     'No effects of the catalogue mechanics were looked for: `do'
     """
+    if model.domain is not None or catalogues_of(model):
+        return ""
     ids = {*known}
     moves = any(e.is_Symbol and e.name in model.state_names for e in model.equations.values())
-    left = [name for name in catalogues() if not catalogues_of(model)
-            and (name == "mechanics") == moves and not ids & {e.key for e in read_effects(name)}]
-    if model.domain is not None or not left:
-        return ""
-    return (f"No effects of the catalogue{'s' * (len(left) > 1)} {listed(left)} were looked for: "
-            "`domain = \"...\"` in the model, or --catalogue, adds them.")
+    left = [name for name in catalogues() if (name == "mechanics") == moves
+            and not ids & {e.key for e in read_effects(name)}]
+    return "" if not left else (
+        f"No effects of the catalogue{'s' * (len(left) > 1)} {listed(left)} were looked for: "
+        "`domain = \"...\"` in the model, or --catalogue, adds them.")
 
 
 def taken(model: Lookup) -> str:

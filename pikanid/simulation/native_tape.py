@@ -65,8 +65,8 @@ def native_field(tape: Tape, active: tuple[int, ...], group: str) -> tuple[np.nd
     """
     names = [f"{kind}_{part}" for part in ("prelude", group) for kind in ("values", "tangents")]
     engine = _linked(tape, ("field", active, group), lambda: "\n".join(
-        _with_helpers([DECLARED, *_of_group(tape, "prelude", active, moving=False),
-                       *_of_group(tape, group, active, moving=False)])))
+        _with_helpers([DECLARED, *(text for part in ("prelude", group) for text in _of_group(
+            tape, part, _live(tape, active, False), len(active)))])))
     return _addresses(engine, names), engine
 
 
@@ -104,7 +104,7 @@ def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:
     live, signed = _live(tape, active, moving), reached(tape, set(_signs(tape)))
     groups = ["prelude", "h", *(["f", "g", "g_rate"] if K else ["f"] if moving else [])]
     parts = [DECLARED, TABLES, Writer(_NOTHING).text(),
-             *(text for group in groups for text in _of_group(tape, group, active, moving)),
+             *(text for group in groups for text in _of_group(tape, group, live, lanes)),
              look("put", tape, 0, False), step("step", tape, 0, live, False),
              look("look_h_only", tape, 0, False, "values_h")]
     if moving:
@@ -124,11 +124,11 @@ def _with_helpers(parts: Sequence[str]) -> Iterator[str]:
     yield from (text for name, text in HELPERS.items() if any(f"@{name}(" in p for p in parts))
 
 
-def _of_group(tape: Tape, group: str, active: tuple[int, ...], moving: bool) -> Iterator[str]:
+def _of_group(tape: Tape, group: str, live: set[int], lanes: int) -> Iterator[str]:
     """The functions that compute a group, and its derivatives if there are any."""
     yield _values(tape, group)
-    if active:
-        yield _tangents(tape, group, f"tangents_{group}", _live(tape, active, moving), len(active))
+    if lanes:
+        yield _tangents(tape, group, f"tangents_{group}", live, lanes)
 
 
 def _signs(tape: Tape) -> range:
