@@ -171,6 +171,15 @@ def test_box_minimum_agrees_with_scipy(size: int, seed: int) -> None:
     assert np.allclose(found, wanted, atol=1e-8)
 
 
+def test_box_minimum_refuses_a_saddle() -> None:
+    """What bounds hold does not count, what becomes free does."""
+    saddle = np.array([[1.0, 2.0], [2.0, 1.0]])
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        box_minimum(saddle, np.array([-1.0, -1.0]), -np.ones(2), np.ones(2))
+    held = box_minimum(saddle, np.array([-1.0, 0.0]), np.array([-2.0, 0.5]), np.array([2.0, 0.5]))
+    np.testing.assert_allclose(held, [0.0, 0.5], atol=1e-15)
+
+
 def test_band_is_as_narrow_as_the_splines() -> None:
     for intervals in (20, 200):
         rec = pk.simulate(pk.systems.sloshing_2d(), pk.excitation.two_pulse(), sigma=1e-3, seed=0)

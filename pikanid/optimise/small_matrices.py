@@ -39,6 +39,19 @@ def scaled_factor(matrix: np.ndarray, which: np.ndarray, root: np.ndarray,
 
 
 @_compiled
+def solve_factored(factor: np.ndarray, size: int, column: np.ndarray) -> None:
+    """Solve LLᵀx = column in place, L the first rows of a factor, as many as `size`."""
+    for i in range(size):
+        for k in range(i):
+            column[i] -= factor[i, k] * column[k]
+        column[i] /= factor[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            column[i] -= factor[k, i] * column[k]
+        column[i] /= factor[i, i]
+
+
+@_compiled
 def fall(matrix: np.ndarray, slope: np.ndarray, change: np.ndarray) -> float:
     """By how much dᵀMd + 2sᵀd lies below zero at a change d (b,)."""
     total = 0.0
@@ -68,13 +81,7 @@ def free_minimum(matrix: np.ndarray, slope: np.ndarray, theta: np.ndarray, lower
         return np.nan
     for i in range(size):
         change[i] = -slope[i] / root[i]
-        for k in range(i):
-            change[i] -= factor[i, k] * change[k]
-        change[i] /= factor[i, i]
-    for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
-            change[i] -= factor[k, i] * change[k]
-        change[i] /= factor[i, i]
+    solve_factored(factor, size, change)
     for i in range(size):
         change[i] /= root[i]
         if not lower[i] - theta[i] <= change[i] <= upper[i] - theta[i]:
