@@ -63,6 +63,18 @@ def test_scipys_simulator_agrees_with_the_kits(model: pk.Model) -> None:
         assert np.max(np.abs(y - kit)) < 2e-5 * (np.ptp(kit) or 1.0), name
 
 
+def test_a_fast_decay_is_simulated() -> None:
+    """A lag of a millionth of a second: the explicit method alone takes too many steps."""
+    experiment = inputs(MOTOR)
+    quick = effect(MOTOR, inputs={"u": {"lag": "e"}})
+    without, lagging = Plant(MOTOR).outputs({}, experiment), Plant(quick)
+    for lag in (1e-6, 1e-5):
+        found = lagging.outputs({"e": lag}, experiment)["omega"]
+        rise = np.gradient(without["omega"], 0.02)
+        assert np.abs(found - without["omega"] + lag * rise).max() < 3 * lag * np.abs(rise).max()
+
+
+
 def test_what_scipys_simulator_does_not_do_is_refused() -> None:
     with pytest.raises(errors.BadModel, match="play"):
         Plant(MOTOR.map_input("u", backlash="0.1"))

@@ -4,6 +4,8 @@ Nothing of the kit's own simulator takes part.  Between two instants at which a 
 sample, a delay begins or ends, or an output is read, the right-hand side is smooth in time, and the
 Dormand-Prince method of order 8 (E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary
 Differential Equations I, 2nd ed., section II.10) goes from one to the next; it restarts there.
+Where that takes very many steps, as a fast decay does, LSODA goes instead (L. Petzold, SIAM Journal
+on Scientific and Statistical Computing 4, 1983), which changes to a method for stiff equations.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from pikanid.recording import Channel, Recording
 from pikanid.validation.concealed.arrays import Array
 
 RELATIVE, ABSOLUTE = 1e-8, 1e-10  # numerical: tolerances; the second one times a state's range
-MOST_STEPS = 2000  # limit: of the method between two instants
+MOST_STEPS = 60  # limit: of the explicit method between two instants; beyond it is stiff
+MOST_STIFF = 20_000  # limit: of LSODA's steps there
 MOST_EVALUATIONS = 3_000_000  # limit: of the right-hand side in one simulation
 LARGEST = 1e12  # limit: of a state; beyond, the model has diverged
 
@@ -163,26 +166,38 @@ class Plant:
 
         # The whole way to the next instant is tried first: a step that SciPy chooses itself is made
         # for the start of an unknown motion, and takes thrice the evaluations here.
-        solver = ode(field).set_integrator(
+        solver = explicit = ode(field).set_integrator(
             "dop853", rtol=RELATIVE, atol=ABSOLUTE, nsteps=MOST_STEPS,
             first_step=float(np.diff(stops, prepend=start).max()))
+        stiff = ode(field).set_integrator(
+            "lsoda", rtol=RELATIVE, atol=ABSOLUTE, nsteps=MOST_STIFF)
         path = np.empty((len(stops), len(x)))
         t = start
         for k, stop in enumerate(stops.tolist()):
             if stop > t:
-                solver.set_initial_value(x, t).set_f_params([s.piece(t) for s in signals])
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)  # said by what is raised here
-                    try:
-                        x = solver.integrate(stop)
-                    except (ArithmeticError, ValueError):  # of functions outside their domain
-                        x = np.full(len(x), np.nan)
-                bad = not solver.successful() or not np.all(np.abs(x) < LARGEST)
-                if bad or evaluations > MOST_EVALUATIONS:
+                pieces = [s.piece(t) for s in signals]
+                before, x = x, _step_to(solver, x, t, stop, pieces)
+                if not solver.successful() and solver is explicit:
+                    solver = stiff
+                    x = _step_to(solver, before, t, stop, pieces)
+                if not np.all(np.abs(x) < LARGEST) or evaluations > MOST_EVALUATIONS:
                     raise errors.SimulationFailed(errors.conceal_diverged())
                 t = stop
             path[k] = x
         return path
+
+
+def _step_to(solver: ode, x: Array, t: float, stop: float,
+             pieces: list[tuple[float, float, float]]) -> Array:
+    """(n,) the state at the next stop; NaN where the solver does not get there."""
+    solver.set_initial_value(x, t).set_f_params(pieces)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # said by what is raised for NaN
+        try:
+            found = solver.integrate(stop)
+        except (ArithmeticError, ValueError):  # of functions outside their domain
+            return np.full(len(x), np.nan)
+    return np.asarray(found) if solver.successful() else np.full(len(x), np.nan)
 
 
 class _Signal:
