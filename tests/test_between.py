@@ -36,15 +36,16 @@ CARTS: dict[str, Any] = {
 
 
 def between(model: pk.Model, reach: float = 1.0) -> dict[str, pk.Effect]:
-    ranges = dict.fromkeys(model.state_names, (-reach, reach))
-    return {e.key: e for e in effects_between(model, coordinates(model), lambda: ranges)}
+    motion = dict.fromkeys(model.state_names, np.linspace(-reach, reach))
+    return {e.key: e for e in effects_between(model, coordinates(model), lambda: motion)}
 
 
 @pytest.mark.parametrize(("key", "force"), [
     ("friction_between", lambda size, d, dv: size * np.sign(dv)),
     ("drag_between", lambda size, d, dv: size * abs(dv) * dv),
     ("spring_between", lambda size, d, dv: size * d**3),
-    ("play_between", lambda size, d, dv: K * (np.sign(d) * max(abs(d) - size, 0.0) - d))])
+    ("play_between", lambda size, d, dv: K * (np.sign(d) * max(abs(d) - size, 0.0) - d)),
+    ("stops_between", lambda size, d, dv: size * np.sign(d) * max(abs(d) - 0.2, 0.0))])
 def test_they_act_on_both_alike(key: str, force: Callable[[float, float, float], float]) -> None:
     """Against the equations of motion: a force f between the carts adds -f/M and f/N."""
     model = pk.Model.from_dict(CARTS).with_values(k=K)
@@ -53,7 +54,7 @@ def test_they_act_on_both_alike(key: str, force: Callable[[float, float, float],
     for _ in range(5):
         x = dict(zip("abvw", rng.normal(size=4), strict=True))
         size = float(rng.uniform(0.1, 0.5))
-        at = {symbol(n): v for n, v in {**model.values, **x, "F": 0.0,
+        at = {symbol(n): v for n, v in {**model.values, **x, "F": 0.0, "stop_a_b": 0.2,
                                         effect.size.name: size}.items()}
         f = force(size, x["a"] - x["b"], x["v"] - x["w"])
         for state, share in (("v", -1 / M), ("w", 1 / N)):
@@ -66,7 +67,8 @@ def test_gears_are_counted() -> None:
     geared = pk.Model.from_dict({**CARTS, "equations": {
         "a": "v", "b": "w", "v": "(F - g*a - c*v - 3*k*(3*a - b))/M", "w": "k*(3*a - b)/N"}})
     found = between(geared)
-    assert [*found] == ["friction_between", "drag_between", "spring_between", "play_between"]
+    assert [*found] == ["friction_between", "drag_between", "spring_between", "play_between",
+                        "stops_between"]
     text = found["friction_between"].add["v"]
     assert "sign" in text and "w" in text and ("3*v" in text or "w/3" in text)
 
@@ -79,7 +81,8 @@ def test_where_nothing_acts_between_there_are_none(name: str) -> None:
 
 def test_the_drive_has_a_shaft() -> None:
     assert [*between(systems.two_mass_drive())] == [
-        "friction_between", "drag_between", "spring_between", "play_between"]
+        "friction_between", "drag_between", "spring_between", "play_between",
+                        "stops_between"]
 
 
 def carts(seed: int, force: Callable[[float, float], float]) -> pk.Recording:
@@ -103,7 +106,8 @@ def carts(seed: int, force: Callable[[float, float], float]) -> pk.Recording:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "force", "parameter", "size"), [
     ("friction_between", lambda d, dv: 0.8 * np.tanh(dv / 0.002), "F_a_b", 0.8),
-    ("play_between", lambda d, dv: -K * np.clip(d, -0.01, 0.01), "gap_a_b", 0.01)])
+    ("play_between", lambda d, dv: -K * np.clip(d, -0.01, 0.01), "gap_a_b", 0.01),
+    ("stops_between", lambda d, dv: 400.0 * (d - np.clip(d, -0.03, 0.03)), "stop_a_b", 0.03)])
 def test_they_are_found(name: str, force: Callable[[float, float], float], parameter: str,
                         size: float) -> None:
     found = pk.diagnose(pk.Model.from_dict(CARTS), carts(1, force), carts(2, force))
@@ -124,12 +128,12 @@ def test_two_ways_of_one_pair_are_told_apart() -> None:
     equations = {"a": "v", "b": "w", "v": "(F - g*a - c*v - k*(a - b) - 2*d*(2*v - w))/M",
                  "w": "(k*(a - b) + d*(2*v - w))/N"}
     model = pk.Model.from_dict({**CARTS, "equations": equations})
-    ranges = dict.fromkeys(model.state_names, (-1.0, 1.0))
-    found = [*effects_between(model, coordinates(model), lambda: ranges)]
-    assert len({(e.key, e.variant) for e in found}) == len(found) == 6
-    assert len({p.name for e in found for p in e.parameters}) == 6
+    motion = dict.fromkeys(model.state_names, np.linspace(-1.0, 1.0))
+    found = [*effects_between(model, coordinates(model), lambda: motion)]
+    assert len({(e.key, e.variant) for e in found}) == len(found) == 7
+    assert len({p.name for e in found for p in e.parameters}) == 8
     recording = carts(5, lambda d, dv: 0.0)
-    own = bound_to([], sites(model, (recording,)), [recording], lambda: ranges)
+    own = bound_to([], sites(model, (recording,)), [recording], lambda: motion)
     assert len(candidates(reserved(sites(model, (recording,)), own), own)) > 60
 
 
@@ -144,7 +148,7 @@ def test_names_of_the_user_stay_the_users() -> None:
     mine = replace(friction, name="mine", variant="")
     recording = carts(5, lambda d, dv: 0.0)
     own = bound_to([mine], sites(model, (recording,)), [recording],
-                   lambda: dict.fromkeys(model.state_names, (-1.0, 1.0)))
+                   lambda: dict.fromkeys(model.state_names, np.linspace(-1.0, 1.0)))
     assert [e.name for e in own if e.key == "friction_between"] == ["mine"]
     assert not {p.name for e in own if e is not mine for p in e.parameters} & {*mine.names}
 

@@ -118,7 +118,7 @@ def effects_of(model: pk.Model, *names: str, **channels: tuple[str, float]) -> l
         {n: unit for n, (unit, _) in channels.items()})
     run = pk.simulate(model, drive, seed=0).with_channels(*(drive[n] for n in channels))
     found = bound_to([e for n in names for e in read_effects(n)], sites(model, (run,)), [run],
-                     lambda: dict.fromkeys(model.state_names, (0.0, 2.0)))
+                     lambda: dict.fromkeys(model.state_names, np.array([0.0, 2.0])))
     return [f"{e.key}[{e.variant}]" for e in found]
 
 
@@ -181,7 +181,7 @@ def test_a_coordinate_that_stays_has_no_pitch(at: float) -> None:
     model = pk.systems.pendulum()
     run = pk.simulate(model, pk.excitation.free_decay(4.0), seed=0)
     found = bound_to(read_effects("mechanics"), sites(model, (run,)), [run],
-                     lambda: dict.fromkeys(model.state_names, (at, at)))
+                     lambda: dict.fromkeys(model.state_names, np.array([at, at])))
     assert [e.key for e in found] == ["gravity"]
 
 

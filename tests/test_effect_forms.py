@@ -157,7 +157,8 @@ def test_units_choose_where_a_form_suits() -> None:
     t = np.linspace(0.0, 1.0, 50)
     run = pk.Recording.from_arrays(t, {"h": t, "T": t}, units={"h": "cm", "T": "K"})
     found = bound_to([form(OVERFLOW, "over"), form({**STORE, "name": "store"}, "store")],
-                     sites(model, (run,)), [run], lambda: around(model).ranges)
+                     sites(model, (run,)), [run],
+                     lambda: {n: np.array(r) for n, r in around(model).ranges.items()})
     # what leaves a level is no temperature; a store of its own suits both
     assert [(e.key, e.variant) for e in found] == [("store", "h"), ("store", "T")]
 

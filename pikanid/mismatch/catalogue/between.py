@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import sympy as sp
 
 from pikanid.formula import units
@@ -17,9 +18,11 @@ from pikanid.formula.expressions import TIME, symbol, to_text
 from pikanid.model import Effect, Model
 from pikanid.model.parts import Parameter
 
-Ranges = Mapping[str, tuple[float, float]]  # lowest and highest value of each state
+Motion = Mapping[str, np.ndarray]  # values (L,) of each state along the recordings
 INF = float("inf")
 PLAY = 0.1  # numerical: share of a swing at which play is looked for first
+STOPS, HARD = 0.7, 3.0  # numerical: the same of stops, and their stiffness in springs there
+NEAREST = 0.05  # limit: share of a swing at which stops are no longer a spring about the rest
 
 
 @dataclass(frozen=True)
@@ -37,18 +40,19 @@ class _Between:
 
 
 def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
-                    ranges: Callable[[], Ranges], taken: Iterable[str] = ()) -> Iterator[Effect]:
-    """Dry friction, drag, play and a cubic spring between coordinates (place, speed); `taken` are
-    names, beside the model's own, that their parameters must not have.
+                    motion: Callable[[], Motion], taken: Iterable[str] = ()) -> Iterator[Effect]:
+    """Dry friction, drag, play, stops and a cubic spring between coordinates (place, speed).
 
-    A spring or a damper must have a parameter of its own, that of no other pair.
+    The motion tells how large each may be; `taken` are names, beside the model's own, that their
+    parameters must not have.  A spring or a damper must have a parameter of its own, that of no
+    other pair.
 
     >>> from pikanid.model import systems
     >>> drive = systems.two_mass_drive()
     >>> pairs = [("phi_m", "omega_m"), ("phi_l", "omega_l")]
-    >>> ranges = lambda: dict.fromkeys(drive.state_names, (-1.0, 1.0))
-    >>> [e.key for e in effects_between(drive, pairs, ranges)]
-    ['friction_between', 'drag_between', 'spring_between', 'play_between']
+    >>> motion = lambda: dict.fromkeys(drive.state_names, np.linspace(-1.0, 1.0))
+    >>> [e.key for e in effects_between(drive, pairs, motion)]
+    ['friction_between', 'drag_between', 'spring_between', 'play_between', 'stops_between']
     """
     speed = dict(coordinates)
     found: dict[_Between, dict[bool, str]] = {}
@@ -57,7 +61,7 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
             one = _between(model, name, coordinates, places)
             if one is not None:
                 found.setdefault(one, {}).setdefault(places, name)
-    seen = ranges() if found else {}
+    seen = motion() if found else {}
     used, pairs = {*model.symbols, *taken}, set[tuple[str, str]]()
     for one, by in found.items():
         x, y, v, w = one.x, one.y, speed[one.x], speed[one.y]
@@ -80,11 +84,11 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
             return name
 
         def law(key: str, words: str, family: str, shape: str, size: Parameter,
-                factor: sp.Expr | None = None, one: _Between = one,
+                *more: Parameter, factor: sp.Expr | None = None, one: _Between = one,
                 variant: str = ",".join(which)) -> Effect:
             factor = symbol(size.name) if factor is None else factor
             return Effect(
-                f"{key}_between", f"{words} between {one.x} and {one.y}", (size,),
+                f"{key}_between", f"{words} between {one.x} and {one.y}", (size, *more),
                 (size.name, 0.0), family=family, variant=variant,
                 add={r: f"{to_text(share * factor)}*{shape}" for r, share in one.shares})
 
@@ -99,6 +103,11 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
         gap = Parameter(named("gap"), PLAY * far, length, (0.0, INF))
         yield law("play", "play", "restoring force", f"clip({place}, -{gap.name}, {gap.name})",
                   gap, factor=-symbol(by[True]))
+        stop = Parameter(named("stop"), STOPS * far, length, (NEAREST * far, far))
+        yield law("stops", "stops", "restoring force",
+                  f"({place} - clip({place}, -{stop.name}, {stop.name}))",
+                  Parameter(named("k_stop"), HARD * push / far,
+                            units.product((force, 1), (length, -1)), (0.0, INF)), stop)
 
 
 def _between(model: Model, name: str, coordinates: Sequence[tuple[str, str]], places: bool
@@ -136,8 +145,8 @@ def _between(model: Model, name: str, coordinates: Sequence[tuple[str, str]], pl
     return _Between(own[used[0]], own[used[1]], ratio, tuple(shares.items()))
 
 
-def _reach(seen: Ranges, one: _Between, model: Model, x: str, y: str) -> float:
-    """How far the difference of two states may swing to either side."""
+def _reach(seen: Motion, one: _Between, model: Model, x: str, y: str) -> float:
+    """The largest difference of two places, or of two speeds."""
     at = {symbol(n): value for n, value in model.values.items()}
-    times = abs(float(sp.S(one.ratio).subs(at)))
-    return ((seen[x][1] - seen[x][0]) + times * (seen[y][1] - seen[y][0])) / 2 or 1.0
+    ratio = float(sp.S(one.ratio).subs(at))
+    return float(np.abs(seen[x] - ratio * seen[y]).max(initial=0.0)) or 1.0

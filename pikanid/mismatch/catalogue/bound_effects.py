@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,25 +11,23 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.formula.expressions import symbol
-from pikanid.mismatch.catalogue.between import effects_between
+from pikanid.mismatch.catalogue.between import Motion, effects_between
 from pikanid.mismatch.catalogue.site import Site, coordinates
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Effect, EffectForm, Model
 from pikanid.model.binding import Surroundings, bound
 from pikanid.recording import Recording
 
-Ranges = Mapping[str, tuple[float, float]]  # lowest and highest value of each state
-
 
 def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
-             recordings: Sequence[Recording], ranges: Callable[[], Ranges]) -> list[Effect]:
+             recordings: Sequence[Recording], motion: Callable[[], Motion]) -> list[Effect]:
     """The effects, with every form bound in each way in which that can be done and units fit.
 
     Args:
         effects: In the names of the sites' model, and forms for any model.
         sites: Of the model.
         recordings: With the model's inputs.
-        ranges: Asked where there are forms.
+        motion: Of every state; asked where there are forms or pairs of coordinates.
 
     Raises:
         BadModel: A form that says something that no effect can.
@@ -38,15 +36,16 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     forms = [e for e in effects if isinstance(e, EffectForm)]
     own = [e for e in effects if isinstance(e, Effect)]
     site, first = sites[0], recordings[0]
-    ranges = functools.cache(ranges)
+    motion = functools.cache(motion)
     names = {n for e in own for n in e.names}
-    between = [e for e in effects_between(site.model, coordinates(site.model), ranges, names)
+    between = [e for e in effects_between(site.model, coordinates(site.model), motion, names)
                if all(e.key != one.key for one in own)]
     if not forms and not between:
         return own
     recorded = [*(i for i in site.model.input_names if i in first), *site.extra]
     around = Surroundings(
-        site.model, tuple(dict.fromkeys(s.v for s in sites)), ranges(),
+        site.model, tuple(dict.fromkeys(s.v for s in sites)),
+        {n: (float(x.min()), float(x.max())) for n, x in motion().items()},
         {n: _range(first, n) for n in site.model.output_names if n in first},
         {n: float(np.abs(first[n].values).max(initial=0.0)) for n in recorded},
         {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
@@ -95,8 +94,8 @@ def reserved(sites: Iterable[Site], effects: Iterable[Effect]) -> tuple[Site, ..
     return tuple(replace(site, taken=taken) for site in sites)
 
 
-def ranges_along(model: Model, records: Records) -> Ranges:
-    """Of each state along the recordings, at the model's guesses.
+def motion_along(model: Model, records: Records) -> Motion:
+    """Along the recordings, at the model's guesses.
 
     Raises:
         SimulationFailed: The model cannot be simulated there.
@@ -104,5 +103,4 @@ def ranges_along(model: Model, records: Records) -> Ranges:
     whitened = Whitened(model, records)
     if not whitened.choose_steps(whitened.problem.guess):
         raise errors.SimulationFailed(errors.too_rough_to_diagnose(model.name))
-    found = whitened.motion(whitened.problem.guess)
-    return {name: (float(x.min()), float(x.max())) for name, x in found.items()}
+    return whitened.motion(whitened.problem.guess)

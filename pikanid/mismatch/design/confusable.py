@@ -15,7 +15,7 @@ from math import inf
 import numpy as np
 
 from pikanid import errors
-from pikanid.mismatch.catalogue.bound_effects import bound_to, ranges_along, reserved
+from pikanid.mismatch.catalogue.bound_effects import bound_to, motion_along, reserved
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
@@ -161,7 +161,7 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
     effects, model = candidates_of(model), model.replace(effects=())
     nothing = recorded(model, one_recording(excitation), sigma, settings)
     found = sites(model, nothing.recordings)
-    given = bound_to(effects, found, nothing.recordings, lambda: ranges_along(model, nothing))
+    given = bound_to(effects, found, nothing.recordings, lambda: motion_along(model, nothing))
     catalogue = tuple(c for c in catalogue_of(reserved(found, given), given)
                       if c.known and c.fits and c.suits() and not c.refines)
     base = fitted(model, (), nothing, [{}], len(catalogue))

@@ -10,7 +10,8 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.figures import COLOURS, DPI, new_figure
-from pikanid.mismatch.catalogue.bound_effects import Ranges, bound_to
+from pikanid.mismatch.catalogue.between import Motion
+from pikanid.mismatch.catalogue.bound_effects import bound_to
 from pikanid.mismatch.catalogue.candidate import Array
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Effect, Model
@@ -84,15 +85,14 @@ def effects_shown(model: Model, excitation: Recording) -> tuple[ShownEffect, ...
     effects, model = candidates_of(model), model.replace(effects=())
     drive = one_recording(excitation)
     nominal = simulate(model, drive)
-    own = bound_to(effects, sites(model, (nominal,)), [nominal], lambda: _ranges(model, nominal))
+    own = bound_to(effects, sites(model, (nominal,)), [nominal], lambda: _motion(model, nominal))
     return tuple(_shown(model, e, drive, nominal) for e in own)
 
 
-def _ranges(model: Model, recording: Recording) -> Ranges:
+def _motion(model: Model, recording: Recording) -> Motion:
     p = np.array([*model.values.values()])
     states = Simulator(model, bind(model, recording)).run(p, states=True).states
-    return dict(zip(model.state_names, zip(states.min(axis=0), states.max(axis=0), strict=True),
-                    strict=True))
+    return dict(zip(model.state_names, states.T, strict=True))
 
 
 def _shown(model: Model, effect: Effect, drive: Recording, nominal: Recording) -> ShownEffect:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pikanid.mismatch.case import Case, note_outliers
-from pikanid.mismatch.catalogue.bound_effects import bound_to, ranges_along, reserved
+from pikanid.mismatch.catalogue.bound_effects import bound_to, motion_along, reserved
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import (
@@ -98,7 +98,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         records = records.with_levels(again.levels)
         held = None if held is None else held.with_levels(again.levels)
     found = sites(nominal, records.recordings)
-    own = bound_to(effects, found, records.recordings, lambda: ranges_along(nominal, records))
+    own = bound_to(effects, found, records.recordings, lambda: motion_along(nominal, records))
     found = reserved(found, own)
     listed = catalogue_of(found, own)
     search = Search(nominal, records, listed, tell,
