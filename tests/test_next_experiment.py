@@ -250,6 +250,16 @@ def test_d_optimal_agrees_with_the_cramer_rao_bound() -> None:
         bounds[int(np.argmax(volumes))].std("d_theta"), rel=1e-4)
 
 
+def test_sigma_is_in_the_models_unit_whatever_the_recordings() -> None:
+    recorded = pk.simulate(systems.sloshing(), excitation.two_pulse())
+    degrees = recorded.with_channels(recorded["theta"].converted("deg"))
+    in_radians, in_degrees = (d_optimal(systems.sloshing(), sigma=SIGMA, candidates=[r]).std
+                              for r in (recorded, degrees))
+    assert in_degrees == pytest.approx(in_radians, rel=1e-9)
+    assert pk.uncertainty.cramer_rao(systems.sloshing(), degrees, SIGMA).std(
+        "l_theta") == pytest.approx(in_radians["l_theta"], rel=1e-3)
+
+
 def test_precision_of_a_blind_experiment_is_zero() -> None:
     assert mean_precision(np.zeros((5, 2))) == 0.0
     assert mean_precision(np.ones((5, 2))) == 0.0

@@ -28,6 +28,17 @@ def test_clean_data_give_the_parameters_back() -> None:
         assert found.ok
 
 
+def test_whole_numbers_are_values_like_others() -> None:
+    """A model whose values are all written without a point."""
+    decay = Model.from_dict({
+        "name": "decay", "states": {"x": {"unit": "m", "initial": 1}},
+        "parameters": {"k": {"guess": 2, "bounds": [0, 10], "unit": "1/s"}, "c": {"value": 3}},
+        "equations": {"x": "-k*x"}, "outputs": {"x": {"unit": "m", "expression": "x"}}})
+    t = np.linspace(0.0, 3.0, 60)
+    seen = Recording.from_arrays(t, {"x": np.exp(-0.7 * t)}, units={"x": "m"})
+    assert pk.NLS().fit(decay, seen).value("k") == pytest.approx(0.7, rel=1e-6)
+
+
 def test_reference_optimum_of_the_study() -> None:
     """N = 501, σ = 0.1°, default_rng(0): an optimum found by other software."""
     found = pk.NLS().fit(START, NOISY)

@@ -128,6 +128,12 @@ def note_warm_up(samples: int) -> str:
             "out (--first, in Python first=).")
 
 
+def note_gap(names: Sequence[str], start: float, stop: float, more: int) -> str:
+    others = f", and in {more} shorter stretch{'es' if more > 1 else ''}" if more else ""
+    return (f"No samples of {listed(names)} between {start:.6g} s and {stop:.6g} s{others}: inputs "
+            "are held or interpolated there.")
+
+
 def note_undated(names: Sequence[str]) -> str:
     return ("Times are taken as they stand, each from the zero of its own file: when "
             f"{listed(names)} began is not known.")

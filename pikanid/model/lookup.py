@@ -74,7 +74,7 @@ class Lookup:
     @property
     def values(self) -> dict[str, float]:
         """Guess or fixed value of every parameter."""
-        return {p.name: p.value for p in self.parameters}
+        return {p.name: float(p.value) for p in self.parameters}
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name (raises `BadModel`, naming the close ones)."""

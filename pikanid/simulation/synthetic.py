@@ -75,12 +75,13 @@ def simulate(model: Model, excitation: Recording, *,
 
 
 def with_outputs(model: Model, recording: Recording, t: np.ndarray | None = None) -> Recording:
-    """The recording with a placeholder for every output of the model that it lacks.
+    """The recording with every output of the model, in the model's unit; what it lacks has a
+    placeholder.
 
     Only the times of a placeholder mean something: t (N,), by default the recording's own.
     """
     times = recording.t if t is None else t
     ramp = np.linspace(0.0, 1.0, len(times))
     return recording.with_channels(*(
-        Channel(o.name, times, ramp, o.unit) for o in model.outputs
-        if o.name not in recording.channels))
+        recording.as_output(o.name, o.unit or None) if o.name in recording.channels
+        else Channel(o.name, times, ramp, o.unit) for o in model.outputs))

@@ -49,12 +49,10 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
 
     minor = asks.minor * gained(fits[frozenset()])
     for e in h.effects:
-        if len(sizes := [p for p in e.parameters if p.free]) == 1:
-            size, error = h.values[sizes[0].name], h.std[sizes[0].name]
-            if below(abs(size - sizes[0].value), asks.sized * error):
-                return (f"the size of {e.name} may be nothing beside the rest ({size:.3g} with a "
-                        f"standard error of {error:.2g})")
-        elif h.symbolic and sizes:
+        if said := no_size(e, h, 1.0, settings):
+            return said
+        sizes = [p for p in e.parameters if p.free]
+        if h.symbolic and len(sizes) > 1:
             size, error = h.values[sizes[0].name], h.std[sizes[0].name]
             if below(abs(size), asks.sized * error):
                 return (f"the recording does not determine {sizes[0].name} of {e.name} ({size:.3g} "
@@ -91,6 +89,26 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
                     for other in _lasting(rest, o, fits.values())):
                 return f"a lasting effect would take up most of what {e.name} does"
     return ""
+
+
+def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: Settings) -> str:
+    """That the size of an effect of one parameter may be nothing; empty where it is not so.
+
+    Args:
+        effect: Of the hypothesis.
+        h: As it was fitted.
+        overdispersion: That divides χ²: standard errors grow with its root.
+        settings: How many of them a size must be from nothing.
+    """
+    sizes = [p for p in effect.parameters if p.free]
+    if len(sizes) != 1:
+        return ""
+    size = h.values[sizes[0].name]
+    error = float(np.sqrt(overdispersion)) * h.std[sizes[0].name]
+    if not below(abs(size - sizes[0].value), settings.verdict.sized * error):
+        return ""
+    return (f"the size of {effect.name} may be nothing beside the rest ({size:.3g} with a "
+            f"standard error of {error:.2g})")
 
 
 def _lasting(rest: frozenset[str], fewer: Hypothesis, fits: Iterable[Hypothesis]

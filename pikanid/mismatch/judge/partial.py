@@ -10,7 +10,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import idle, worth
+from pikanid.mismatch.judge.doubt import idle, no_size, worth
 from pikanid.mismatch.judge.explanations import Explanations, Weighed, dominance
 from pikanid.mismatch.judge.kinds import Kind, holds, kinds_in, members
 from pikanid.mismatch.settings.settings import Settings
@@ -128,8 +128,10 @@ def surely_there(explained: Explanations, scale: float, settings: Settings,
     rule, found, lead = settings.part, explained.weighed, explained.lead
     if lead is None:
         return None
-    examined = [_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again)
-                for kind in kinds_in(lead.hypothesis, rule.dry)]
+    examined = [
+        _with_a_size(_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again),
+                     lead.hypothesis, explained.overdispersion, settings)
+        for kind in kinds_in(lead.hypothesis, rule.dry)]
     present = [p for p in examined if isinstance(p, Present)]
     # that a family is there somewhere says no more where a place of it is sure
     present = [p for p in present if not _elsewhere(p.kind, [o.kind for o in present])]
@@ -152,6 +154,15 @@ def surely_there(explained: Explanations, scale: float, settings: Settings,
 def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:
     """Whether others of the family say in which place."""
     return not kind.place and any(k.place and k.family == kind.family for k in kinds)
+
+
+def _with_a_size(one: Present | Doubtful, h: Hypothesis, overdispersion: float,
+                 settings: Settings) -> Present | Doubtful:
+    """The same; not sure where the remainder leaves open whether there is any of it."""
+    if isinstance(one, Doubtful) or one.instead is not None:
+        return one
+    why = no_size(one.effect, h, overdispersion, settings)
+    return Doubtful(one.kind, one.effect, why) if why else one
 
 
 def _one_of_two(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,

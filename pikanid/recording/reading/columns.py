@@ -10,6 +10,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.formula import units
 from pikanid.recording.channel import LARGEST, Array, Channel
+from pikanid.recording.reading.gaps import note_gaps
 from pikanid.recording.reading.headers import (
     TIME_NAMES,
     Named,
@@ -118,7 +119,8 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
             errors.missing_channel(where, key, [channel.name for channel in made]))
     used = [found for _, found, _ in signals] + bases.clocks()
     others = tuple(found.column.path or found.name for found in available if found not in used)
-    return Result(tuple(made), (*table.notes, *notes), unreadable, bases.began(), others)
+    return Result(tuple(made), (*table.notes, *notes, *note_gaps(made)), unreadable, bases.began(),
+                  others)
 
 
 def _defect(table: Table, where: str, found: Named) -> str:
