@@ -9,22 +9,27 @@ from collections.abc import Mapping
 from typing import Any
 
 # Friction whose load grows with the deflection loses energy with the cube of the amplitude, as
-# quadratic drag does: it is of both kinds.  Liquid has modes beside the one that a pendulum is.
+# quadratic drag does: it is of both kinds, and so is a loss that reaches a limit, which is linear in
+# slow motion and does not depend on the speed in fast one.  Liquid has modes beside the one that a
+# pendulum is.
 FAMILIES: dict[str, tuple[str, ...]] = {
     "dry friction": ("coulomb_friction", "stribeck_friction", "one_way_friction",
                      "hysteresis:bouc_wen", "smooth_friction", "stick_slip_friction",
-                     "position_friction"),
+                     "position_friction", "bounded_loss"),
     "drag": ("quadratic_drag", "power_drag", "amplitude_damping", "boundary_layer",
-             "fluid_memory", "fading_memory", "position_friction"),
+             "fluid_memory", "fading_memory", "position_friction", "bounded_loss"),
     "restoring force": ("cubic_stiffness", "quintic_stiffness", "even_stiffness", "wall_impact",
-                        "hard_stop", "cogging", "cable_drag", "magnet", "asymmetric_spring"),
+                        "hard_stop", "cogging", "cable_drag", "magnet", "asymmetric_spring",
+                        "one_sided_spring"),
     "constant force": ("static_bias", "sensor_offset", "one_way_friction"),
     "timing": ("input_delay", "sensor_delay", "actuator_lag", "sensor_lag", "input_hold",
                "clock_error", "rate_limited_input", "timing_jitter"),
     "gain": ("input_gain", "sensor_gain"),
     "input curve": ("input_saturation", "soft_saturation", "input_dead_zone",
-                    "hysteresis:backlash", "velocity_coupled_drive", "quadratic_input"),
-    "sensor curve": ("sensor_saturation", "sensor_nonlinearity", "eccentric_encoder"),
+                    "hysteresis:backlash", "velocity_coupled_drive", "quadratic_input",
+                    "bilinear_input", "one_way_gain"),
+    "sensor curve": ("sensor_saturation", "sensor_nonlinearity", "eccentric_encoder",
+                     "rippled_sensor"),
     "mode": ("second_mode", "internal_resonance", "potential_flow"),
     "slow change": ("parameter_drift", "sensor_drift", "wobbling_length", "warming_damping"),
     "other axis": ("cross_axis",),
