@@ -12,6 +12,7 @@ import sympy as sp
 from pikanid import errors
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.between import Motion, effects_between
+from pikanid.mismatch.catalogue.input_offset import input_offsets
 from pikanid.mismatch.catalogue.site import Site, coordinates
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Effect, EffectForm, Model
@@ -38,20 +39,21 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     site, first = sites[0], recordings[0]
     motion = functools.cache(motion)
     names = {n for e in own for n in e.names}
-    between = [e for e in effects_between(site.model, coordinates(site.model), motion, names)
-               if all(e.key != one.key for one in own)]
-    if not forms and not between:
-        return own
     recorded = [*(i for i in site.model.input_names if i in first), *site.extra]
+    sizes = {n: float(np.abs(first[n].values).max(initial=0.0)) for n in recorded}
+    derived = [e for e in (*effects_between(site.model, coordinates(site.model), motion, names),
+                           *input_offsets(site.model, sizes, names))
+               if all(e.key != one.key for one in own)]
+    if not forms and not derived:
+        return own
     around = Surroundings(
         site.model, tuple(dict.fromkeys(s.v for s in sites)),
         {n: (float(x.min()), float(x.max())) for n, x in motion().items()},
         {n: _range(first, n) for n in site.model.output_names if n in first},
-        {n: float(np.abs(first[n].values).max(initial=0.0)) for n in recorded},
-        {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
+        sizes, {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
         site.interval)
     extended = {_extended(site.model, e) for e in own}
-    for effect in between:
+    for effect in derived:
         made = _extended(site.model, effect)
         if made is not None and made not in extended:
             own.append(effect)

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 # Friction whose load grows with the deflection loses energy with the cube of the amplitude, as
-# quadratic drag does: it is of both kinds, and so is a loss that reaches a limit, which is linear in
-# slow motion and does not depend on the speed in fast one.  Liquid has modes beside the one that a
-# pendulum is.
+# quadratic drag does: it is of both kinds, and so is a loss that reaches a limit, which is linear
+# in slow motion and does not depend on the speed in fast one.  Liquid has modes beside the one that
+# a pendulum is.
 FAMILIES: dict[str, tuple[str, ...]] = {
     "dry friction": ("coulomb_friction", "stribeck_friction", "one_way_friction",
                      "hysteresis:bouc_wen", "smooth_friction", "stick_slip_friction",
