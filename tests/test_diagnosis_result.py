@@ -54,6 +54,24 @@ def test_where_is_said_in_words_and_as_data() -> None:
     assert "channel undecided" in str(none) and "undecided between" in _where(none)
 
 
+@pytest.mark.parametrize(("count", "said"), [
+    (3, "law 0; or law 1; or law 2, "), (4, "law 2; or law 3, "),
+    (5, "law 2; or one of 2 other explanations, ")])
+def test_a_sentence_has_three_explanations(count: int, said: str) -> None:
+    """All of them stand below it."""
+    given = [explanation(f"law {k}", f"-c*{k}") for k in range(count)]
+    for verdict, end in (("set", "which these recordings"), ("unconfirmed", "not confirmed")):
+        one = diagnosis(cast(Verdict, verdict), *given)
+        assert said + end in one.sentence()
+        assert all(f"law {k}" in str(one) for k in range(count))
+
+
+def test_a_wrong_recording_is_not_blamed_on_the_other() -> None:
+    train = pk.Recording.from_arrays([0.0, 1.0, 2.0], {"force": [0.0, 1.0, 0.0]})
+    with pytest.raises(pk.errors.BadRecording, match="'u_x'"):
+        pk.diagnose(sloshing(), train, pk.simulate(sloshing(), pk.excitation.two_pulse()))
+
+
 def test_long_times_are_in_hours_and_formulas_have_an_equation() -> None:
     law = explanation("a law", "a*exp(-b*T)")
     law = replace(law, effects=(replace(law.effects[0], ids=("symbolic:a*exp(-b*T)",),

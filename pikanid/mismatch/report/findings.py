@@ -22,6 +22,8 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.pieces.time_unit import spans
 
+TOLD = 3  # layout: explanations in the sentence; all of them stand below it
+
 
 @dataclass(frozen=True)
 class NamedEffect:
@@ -249,17 +251,22 @@ class DiagnosisData:
         if self.verdict == "named" or (self.verdict == "set" and len(titles) == 1):
             return head + f"{titles[0]}, confirmed on the held-out recording."
         if self.verdict == "set":
-            return head + "one of " + "; or ".join(titles) + ", which these recordings cannot " \
-                "tell apart."
+            return head + f"one of {_first(titles)}, which these recordings cannot tell apart."
         if self.verdict == "partial" and self.remainder is not None:
             more = ", and something else" if self.remainder.p_value < self.settings.adequate else ""
             sure = sorted(self.present, key=lambda p: bool(p.or_family))
             return head + f"surely {listed([p.title for p in sure])}{more}. " \
                 f"{self.remainder.sentence()}."
         if self.verdict == "unconfirmed":
-            return head + "perhaps " + "; or ".join(titles) + ", not confirmed" + (
+            return head + f"perhaps {_first(titles)}, not confirmed" + (
                 f": {self.doubt}." if self.doubt else " on other data.")
         return head + "nothing in the catalogue explains it."
+
+
+def _first(titles: Sequence[str]) -> str:
+    more = len(titles) - TOLD
+    others = [f"one of {more} other explanations"] if more > 1 else titles[TOLD:]
+    return "; or ".join([*titles[:TOLD], *others])
 
 
 def listed(names: Sequence[str]) -> str:

@@ -141,7 +141,8 @@ class Remainder:
     def lines(self) -> list[str]:
         """Where it is, and what keeps more from being sure."""
         loud = spans(self.time, SHOWN) or "no stretch of it"
-        return [f"Left: half of it below {self.frequency:.3g} Hz; louder than noise at {loud}",
+        slow = f"below {self.frequency:.3g} Hz" if self.frequency else "constant, or nearly so"
+        return [f"Left: half of it {slow}; louder than noise at {loud}",
                 *(f"Not sure: {what}: {why}" for what, why in self.doubtful)]
 
     def to_dict(self) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Effect, Model
 from pikanid.model.domains import candidates_of, taken
 from pikanid.model.rates import in_rates
+from pikanid.problem.problem import bind
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
@@ -55,6 +56,8 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     notes = list(dict.fromkeys(f"Recording '{rec.name}': {note}" for rec in (*train, *(later or ()))
                                for note in rec.notes))
     proves = later is not None
+    for recording in train:
+        bind(model, recording)  # a channel that it lacks is no fault of the held-out one
     if later is not None:
         check_pair(train, later)
         later = beginnings(model, later, "the held-out recording", notes, settings.budget)
