@@ -72,6 +72,12 @@ def test_a_wrong_recording_is_not_blamed_on_the_other() -> None:
         pk.diagnose(sloshing(), train, pk.simulate(sloshing(), pk.excitation.two_pulse()))
 
 
+def test_a_unit_of_another_kind_is_said_with_its_recording() -> None:
+    train = pk.simulate(sloshing(), pk.excitation.two_pulse()).with_unit("u_x", "kg")
+    with pytest.raises(pk.errors.BadUnit, match="channel 'u_x': 'kg' cannot.*--unit u_x=UNIT"):
+        pk.diagnose(sloshing(), train)
+
+
 def test_long_times_are_in_hours_and_formulas_have_an_equation() -> None:
     law = explanation("a law", "a*exp(-b*T)")
     law = replace(law, effects=(replace(law.effects[0], ids=("symbolic:a*exp(-b*T)",),

@@ -70,6 +70,11 @@ def units_differ(source: str, target: str, where: str = "") -> str:
             f"'{target or 'dimensionless'}': they measure different things{hint}.")
 
 
+def unit_of_recording(recording: str, channel: str, detail: str) -> str:
+    return (f"'{short(recording)}', {detail} If the file is wrong, say the right one: --unit "
+            f"{channel}=UNIT (in Python units={{'{channel}': 'UNIT'}}).")
+
+
 def unit_without_size(text: str) -> str:
     return (f"The unit '{short(text)}' is logarithmic, so that no formula can be written in it: "
             "convert the signal first.")

@@ -177,7 +177,10 @@ class Recording(Entering):
         channels_of.check_values(found, self.name, missing_allowed)
         # Where a file states no unit, the model's is meant.
         stated = found if found.unit or not unit else replace(found, unit=unit)
-        return stated.converted(stated.unit if unit is None else unit)
+        try:
+            return stated.converted(stated.unit if unit is None else unit)
+        except errors.BadUnit as bad:
+            raise errors.BadUnit(errors.unit_of_recording(self.name, name, str(bad))) from None
 
     def _with(self, channels: Mapping[str, Channel], *notes: str) -> Self:
         return replace(self, channels=channels, notes=(*self.notes, *notes))
