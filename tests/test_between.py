@@ -82,7 +82,7 @@ def test_where_nothing_acts_between_there_are_none(name: str) -> None:
 def test_the_drive_has_a_shaft() -> None:
     assert [*between(systems.two_mass_drive())] == [
         "friction_between", "drag_between", "spring_between", "play_between",
-                        "stops_between"]
+        "stops_between"]
 
 
 def carts(seed: int, force: Callable[[float, float], float]) -> pk.Recording:

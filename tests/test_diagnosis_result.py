@@ -74,7 +74,7 @@ def test_a_wrong_recording_is_not_blamed_on_the_other() -> None:
 
 def test_a_unit_of_another_kind_is_said_with_its_recording() -> None:
     train = pk.simulate(sloshing(), pk.excitation.two_pulse()).with_unit("u_x", "kg")
-    with pytest.raises(pk.errors.BadUnit, match="channel 'u_x': 'kg' cannot.*--unit u_x=UNIT"):
+    with pytest.raises(pk.errors.BadUnit, match=r"channel 'u_x': 'kg' cannot.*--unit u_x=UNIT"):
         pk.diagnose(sloshing(), train)
 
 

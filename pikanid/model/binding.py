@@ -10,6 +10,7 @@ from typing import Any
 from pikanid import errors
 from pikanid.formula import units
 from pikanid.formula.expressions import parse, symbol, to_text
+from pikanid.formula.names import free_name
 from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm
 from pikanid.model.effect_table import effect_of
@@ -149,10 +150,7 @@ def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,
 
 def _fresh(name: str, key: str, taken: frozenset[str]) -> str:
     """The name, where it is free; else with that of the effect."""
-    name = f"{name}_{key}" if name in taken else name
-    while name in taken:
-        name += "_x"
-    return name
+    return free_name(f"{name}_{key}" if name in taken else name, taken)
 
 
 def _renamed(value: Any, swap: Mapping[str, str]) -> Any:

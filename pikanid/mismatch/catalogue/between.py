@@ -15,6 +15,7 @@ import sympy as sp
 
 from pikanid.formula import units
 from pikanid.formula.expressions import TIME, symbol, to_text
+from pikanid.formula.names import free_name
 from pikanid.model import Effect, Model
 from pikanid.model.parts import Parameter
 
@@ -77,9 +78,7 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
         force = next(units.product((p.unit, 1), (unit, 1)) for p, _, unit in sizes.values())
 
         def named(wanted: str, which: tuple[str, ...] = which) -> str:
-            name = "_".join((wanted, *which))
-            while name in used:
-                name += "_x"
+            name = free_name("_".join((wanted, *which)), used)
             used.add(name)
             return name
 

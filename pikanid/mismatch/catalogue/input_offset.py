@@ -7,9 +7,10 @@ force of any one equation.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from pikanid.formula.expressions import symbol
+from pikanid.formula.names import free_name
 from pikanid.model import Effect, Model
 from pikanid.model.parts import Parameter
 
@@ -35,13 +36,8 @@ def input_offsets(model: Model, sizes: Mapping[str, float], taken: Iterable[str]
     formulas = [*model.equations.values(), *(o.expression for o in model.outputs)]
     for u in (i for i in model.inputs if i.name in sizes):
         if sum(f.has(symbol(u.name)) for f in formulas) > 1:
-            size = Parameter(_free(f"{u.name}_zero", used), SHARE * (sizes[u.name] or 1.0), u.unit)
+            size = Parameter(
+                free_name(f"{u.name}_zero", used), SHARE * (sizes[u.name] or 1.0), u.unit)
             yield Effect("input_offset", f"an offset of {u.name}", (size,), (size.name, 0.0),
                          family="input curve", variant=u.name,
                          inputs={u.name: {"offset": size.name}})
-
-
-def _free(name: str, used: Collection[str]) -> str:
-    while name in used:
-        name += "_x"
-    return name

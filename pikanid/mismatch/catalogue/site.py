@@ -11,6 +11,7 @@ import sympy as sp
 from pikanid import errors
 from pikanid.formula import units
 from pikanid.formula.expressions import TIME, symbol
+from pikanid.formula.names import free_name
 from pikanid.mismatch.catalogue.lever import lever
 from pikanid.model import Model
 from pikanid.model.parts import Formula, Output, Parameter
@@ -156,10 +157,8 @@ class Site:
         """A parameter or state name that neither the model nor an effect of a user uses yet; `of`
         one of several inputs or states.
         """
-        name = wanted + (f"_{of}" if of else "") + self.suffix
-        while name in self.model.symbols or name in self.taken:
-            name += "_x"
-        return name
+        return free_name(wanted + (f"_{of}" if of else "") + self.suffix, self.model.symbols,
+                         self.taken)
 
 
 def coordinates(model: Model) -> list[tuple[str, str]]:

@@ -24,9 +24,12 @@ def note_gaps(channels: Sequence[Channel]) -> tuple[str, ...]:
     bases: dict[bytes, list[Channel]] = {}
     for channel in channels:
         bases.setdefault(channel.time.tobytes(), []).append(channel)
-    return tuple(errors.note_gap([c.name for c in alike], *found, len(more) - 1)
-                 for alike in bases.values() if (more := _gaps(alike[0].time))
-                 for found in more[:1])
+    notes = []
+    for alike in bases.values():
+        if gaps := _gaps(alike[0].time):
+            (start, stop), *shorter = gaps
+            notes.append(errors.note_gap([c.name for c in alike], start, stop, len(shorter)))
+    return tuple(notes)
 
 
 def _gaps(t: Array) -> list[tuple[float, float]]:

@@ -4,8 +4,9 @@ Nothing of the kit's own simulator takes part.  Between two instants at which a 
 sample, a delay begins or ends, or an output is read, the right-hand side is smooth in time, and the
 Dormand-Prince method of order 8 (E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary
 Differential Equations I, 2nd ed., section II.10) goes from one to the next; it restarts there.
-Where that takes very many steps, as a fast decay does, LSODA goes instead (L. Petzold, SIAM Journal
-on Scientific and Statistical Computing 4, 1983), which changes to a method for stiff equations.
+Where that takes very many steps, as a fast decay does, LSODA goes on from there to the end (L.
+Petzold, SIAM Journal on Scientific and Statistical Computing 4, 1983), which changes to a method
+for stiff equations.
 """
 
 from __future__ import annotations
