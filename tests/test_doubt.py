@@ -44,7 +44,8 @@ def doubt(case: Case, ranked: list[Hypothesis], later: Recording) -> tuple[str, 
     other = replace(case, later=held, predictions={})
     predicted = other.predicted(case.base)
     assert predicted is not None
-    return why_not(ranked[0], ranked, other.predicted, 1.0, DEFAULTS), predicted.motion
+    said = why_not(ranked[0], ranked, other.predicted, lambda *asked: 0.0, 1.0, DEFAULTS)
+    return said, predicted.motion
 
 
 def test_another_motion_proves_a_spring(hypotheses: tuple[Case, list[Hypothesis]]) -> None:

@@ -19,8 +19,8 @@ from pikanid.mismatch.judge.kinds import Kind
 from pikanid.mismatch.judge.partial import Doubtful, Part, Present, _examined
 from pikanid.mismatch.report import part as reported_as
 from pikanid.mismatch.report.diagnosis import Diagnosis
-from pikanid.mismatch.report.findings import Where, values_of
-from pikanid.mismatch.report.part import Remainder, Value
+from pikanid.mismatch.report.findings import Where
+from pikanid.mismatch.report.part import Remainder, Value, values_of
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import surely
 from pikanid.mismatch.steps.surely import _without_shares

@@ -99,10 +99,10 @@ def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
 
     ranked = sorted(fits, key=lambda h: h.score())
     # what is asked for ahead of time is done ahead of time, as by several threads
-    answer = settle([h for h in ranked if not h.symbolic], 1.0, adequate, predicted, True, True,
-                    DEFAULTS, lambda jobs: [job() for job in jobs] and None)
-    return with_formulas(answer, ranked, 1.0, adequate, predicted, True, True, DEFAULTS) if (
-        answer.verdict == "unnamed") else answer
+    asked = adequate, predicted, lambda *_: 0.0, True, True, DEFAULTS
+    answer = settle([h for h in ranked if not h.symbolic], 1.0, *asked,
+                    lambda jobs: [job() for job in jobs] and None)
+    return with_formulas(answer, ranked, 1.0, *asked) if answer.verdict == "unnamed" else answer
 
 
 BASE = hypothesis(2000.0)

@@ -6,13 +6,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
-from pikanid.mismatch.search.neighbours import afresh, with_twins
+from pikanid.mismatch.search.neighbours import afresh, led_away, with_twins
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
+from pikanid.mismatch.steps.searching import searched
 
 
 def hypothesis(case: Case, key: str, **start: float) -> Hypothesis:
@@ -60,3 +62,36 @@ def test_twins_begin_as_strong_as_what_they_replace() -> None:
     offset = hypothesis(case, "sensor_offset")
     (_, [start]), = with_twins(offset, case.candidates)
     assert start == offset.point
+
+
+def brushed(seed: int) -> pk.Recording:
+    """A motor whose brushes take a voltage away from a current that nobody sees, rounded where it
+    turns; integrated by SciPy from level to level of its drive.
+    """
+    levels, t = np.random.default_rng(seed).uniform(-6.0, 6.0, 40), np.arange(1000) * 0.005
+    y, state = np.empty(1000), np.zeros(2)
+    for k, u in enumerate(levels):
+        found = solve_ivp(lambda t, x, u=u: [
+            (0.034 * x[1] - 1e-5 * x[0]) / 1.1e-5,
+            (u - x[1] - 0.034 * x[0]) / 1e-3 - 67.0 * np.tanh(x[1] / 0.047)],
+            (0.0, 0.125), state, "LSODA", np.arange(26) * 0.005, rtol=1e-8, atol=1e-8)
+        y[25 * k:25 * k + 25], state = found.y[0][:25], found.y[:, -1]
+    y += 1.6 * np.random.default_rng(seed + 100).standard_normal(1000)
+    return pk.Recording.from_arrays(t, {"u": np.repeat(levels, 25), "omega": y},
+                                    {"u": "V", "omega": "rad/s"})
+
+
+def test_effects_show_where_the_model_was_given_if_what_is_missing_has_led_it_away() -> None:
+    """Constant and inertia of the motor fall together, far from where the friction shows; and how
+    wide its reversal may be is known from the current along the motion, which no output shows.
+    """
+    train, later = brushed(22), brushed(23)
+    case = open_case(pk.systems.dc_motor(), (train,), (later,), None, lambda text: None, DEFAULTS)
+    current = next(s for s in case.sites if s.v == "i")
+    assert not current.shown and 1.0 < current.usual_speed < 12.0
+    about = fitted(case.model, [], case.records, [case.search.guess], 30)
+    assert about is not None and led_away(case.base, about) and not led_away(about, about)
+    ranked = searched(case, lambda text: None)
+    assert ranked[0].key == {"coulomb_friction[rounded]_i"}
+    for name, true in (("c_i", 67.0), ("w_c_i", 0.047), ("k", 0.034), ("J", 1.1e-5)):
+        assert abs(ranked[0].values[name] - true) < 4 * ranked[0].std[name]

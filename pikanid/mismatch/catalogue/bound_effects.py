@@ -96,6 +96,12 @@ def reserved(sites: Iterable[Site], effects: Iterable[Effect]) -> tuple[Site, ..
     return tuple(replace(site, taken=taken) for site in sites)
 
 
+def with_unseen_speeds(sites: Iterable[Site], motion: Callable[[], Motion]) -> tuple[Site, ...]:
+    """The sites, which know how large the states become that no output shows."""
+    return tuple(site if site.shown else replace(
+        site, unseen_speed=float(np.abs(motion()[site.v]).max(initial=0.0))) for site in sites)
+
+
 def motion_along(model: Model, records: Records) -> Motion:
     """Along the recordings, at the model's guesses.
 

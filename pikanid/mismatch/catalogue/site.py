@@ -45,6 +45,7 @@ class Site:
         lever: By names of states, what a force adds to their rates for each that it adds to v';
             empty where it acts on v' alone.
         along: The parameter whose damping acts so.
+        unseen_speed: Largest value of a state that no output shows, along the nominal motion.
     """
 
     model: Model
@@ -64,6 +65,7 @@ class Site:
     taken: frozenset[str] = frozenset()
     lever: Mapping[str, sp.Expr] = field(default_factory=dict, hash=False)
     along: str = ""
+    unseen_speed: float = 0.0
 
     def pushed(self, model: Model, force: Formula) -> Model:
         """A model with a force on the coordinate [force_unit]."""
@@ -93,9 +95,13 @@ class Site:
 
     @property
     def usual_speed(self) -> float:
-        """About the largest value of the rate, or of the state where that is seen; else 0."""
-        shown = self.q or self.output.expression == symbol(self.v)
-        return self.half_range * (self.rate or 1.0) if shown else 0.0
+        """About the largest value of the rate, or of the state; 0 where it is not known."""
+        return self.half_range * (self.rate or 1.0) if self.shown else self.unseen_speed
+
+    @property
+    def shown(self) -> bool:
+        """Whether an output shows how large the motion is."""
+        return bool(self.q) or self.output.expression == symbol(self.v)
 
     def slow_speed(self, wanted: str, share: float = 1.0) -> Parameter:
         """A speed at which a law changes its course, from a share of the usual one on."""

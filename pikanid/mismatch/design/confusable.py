@@ -10,12 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import inf
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.mismatch.catalogue.bound_effects import bound_to, motion_along, reserved
+from pikanid.mismatch.catalogue.bound_effects import (
+    bound_to,
+    motion_along,
+    reserved,
+    with_unseen_speeds,
+)
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
@@ -160,8 +166,9 @@ def confusable(model: Model, excitation: Recording, sigma: Sigma = None, *,
     model, _ = in_rates(a_model(model))
     effects, model = candidates_of(model), model.replace(effects=())
     nothing = recorded(model, one_recording(excitation), sigma, settings)
-    found = sites(model, nothing.recordings)
-    given = bound_to(effects, found, nothing.recordings, lambda: motion_along(model, nothing))
+    motion = cache(lambda: motion_along(model, nothing))
+    found = with_unseen_speeds(sites(model, nothing.recordings), motion)
+    given = bound_to(effects, found, nothing.recordings, motion)
     catalogue = tuple(c for c in catalogue_of(reserved(found, given), given)
                       if c.known and c.fits and c.suits() and not c.refines)
     base = fitted(model, (), nothing, [{}], len(catalogue))

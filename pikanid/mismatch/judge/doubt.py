@@ -13,16 +13,19 @@ from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.settings.settings import Settings
 
 Predict = Callable[[Hypothesis], HeldOut | None]
+# χ² that an effect is worth within the train recordings, from explanations with it and without it
+Again = Callable[[Candidate, Hypothesis, Hypothesis], float]
 
 
-def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale: float,
-            settings: Settings) -> str:
+def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again: Again,
+            scale: float, settings: Settings) -> str:
     """Why a hypothesis is not proved on other data; empty where it is.
 
     Each effect has to be strong.  What is weak can be a facet of anything: laws that no catalogue
     holds leave nothing beside it that a test would find; a minor one beside what explains most can
     be whatever else the rig has that nobody modelled.  The held-out recording has to be one that
-    could have refuted it.  And it has to speak for each of several: one is easily found that takes
+    could have refuted it; a limit that it does not meet has to be met again where the train
+    recordings go on.  And it has to speak for each of several: one is easily found that takes
     up what the others leave, whatever that is.  What happens once, of which it cannot speak, takes
     up anything: there, what lasts must not do most of that as well and predict as well.
 
@@ -30,6 +33,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
         h: To prove.
         ranked: All hypotheses.
         predict: What they make of the held-out recordings.
+        again: What an effect that does not act there is worth within the train recordings.
         scale: That divides χ².
         settings: What counts as a proof.
     """
@@ -68,7 +72,9 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             if below((o.minimum.chi2 - h.minimum.chi2) / scale, asks.shown):
                 return f"the recording itself hardly shows {e.name}"
             power = worth(e, predict(h), predict(o)) / scale
-            if below(power, least_proof):
+            repeated = proof is not None and idle(e, proof) and not below(
+                again(e, h, o) / scale, least_proof)
+            if below(power, least_proof) and not repeated:
                 return (f"the held-out recording could not have refuted {e.name} (it is worth "
                         f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
             gain = gained(o)
@@ -79,7 +85,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
             if below(gain, asked):
                 return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
                         f"{asked:.0f} are asked)")
-            if len(h.effects) > 1 and not e.absent and not speaks(
+            if len(h.effects) > 1 and not (e.absent or repeated) and not speaks(
                     h, o, predict, asks.needed * scale):
                 return f"the held-out recording does not need {e.name}"
             most = asks.once * (o.minimum.chi2 - h.minimum.chi2)

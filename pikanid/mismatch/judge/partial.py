@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,15 +10,12 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import idle, no_size, worth
+from pikanid.mismatch.judge.doubt import Again, idle, no_size, worth
 from pikanid.mismatch.judge.explanations import Explanations, Weighed, dominance
 from pikanid.mismatch.judge.kinds import Kind, holds, kinds_in, members
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import PartSettings
 from pikanid.model.parts import Parameter
-
-# χ² of an effect, from explanations with it and without it
-Again = Callable[[Candidate, Hypothesis, Hypothesis], float]
 
 
 @dataclass(frozen=True)

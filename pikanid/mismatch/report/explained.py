@@ -8,7 +8,8 @@ from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Predict
 from pikanid.mismatch.judge.verdict import Answer, Test, criterion
-from pikanid.mismatch.report.findings import Explanation, NamedEffect, values_of
+from pikanid.mismatch.report.findings import Explanation, NamedEffect
+from pikanid.mismatch.report.part import values_of
 from pikanid.mismatch.settings.settings import Settings
 
 

@@ -9,7 +9,6 @@ from typing import Any, Literal
 import numpy as np
 
 from pikanid.estimate import Estimate
-from pikanid.formula.units import parse
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.patch import Patch
@@ -19,7 +18,6 @@ from pikanid.mismatch.judge.verdict import Verdict
 from pikanid.mismatch.report.part import SHOWN, Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
-from pikanid.model.parts import Parameter
 from pikanid.pieces.time_unit import spans
 
 TOLD = 3  # layout: explanations in the sentence; all of them stand below it
@@ -127,14 +125,16 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """Held-out record: errors of each output by name, p-value, the curves of each by name, and the
-    names of the recordings.
+    """Held-out record: errors of each output by name, p-value, the curves of each by name, the
+    names of the recordings, and those of the effects given first that are not met there: where the
+    train recordings go on they are confirmed.
     """
 
     outputs: Mapping[str, OutputError]
     p_value: float
     curves: Mapping[str, Curves]
     recordings: tuple[str, ...] = ()
+    not_met: tuple[str, ...] = ()
 
     def sensitive(self, settings: Settings) -> bool:
         """Whether the prediction depends on how exactly the parameters are known: after impacts, a
@@ -177,6 +177,8 @@ class Proof:
         found: dict[str, Any] = {
             "rmse_before": self.rmse_before, "rmse_after": self.rmse_after, "noise": self.noise,
             "unit": self.unit, "p_value": self.p_value}
+        if self.not_met:
+            found["not_met"] = list(self.not_met)
         if len(self.outputs) > 1:
             found["outputs"] = {name: {
                 "rmse_before": e.before, "rmse_after": e.after, "noise": e.noise, "unit": e.unit}
@@ -249,7 +251,7 @@ class DiagnosisData:
         head = f"Something is missing in the model (p = {self.p_value:.1g}): "
         titles = list(dict.fromkeys(titles_apart(self.hypotheses)))
         if self.verdict == "named" or (self.verdict == "set" and len(titles) == 1):
-            return head + f"{titles[0]}, confirmed on the held-out recording."
+            return f"{head}{titles[0]}, confirmed {self._confirmed_on}."
         if self.verdict == "set":
             return head + f"one of {_first(titles)}, which these recordings cannot tell apart."
         if self.verdict == "partial" and self.remainder is not None:
@@ -261,6 +263,16 @@ class DiagnosisData:
             return head + f"perhaps {_first(titles)}, not confirmed" + (
                 f": {self.doubt}." if self.doubt else " on other data.")
         return head + "nothing in the catalogue explains it."
+
+    @property
+    def _confirmed_on(self) -> str:
+        met = "on the held-out recording"
+        later = self.held_out.not_met if self.held_out is not None else ()
+        if not later:
+            return met
+        again = "where the recording meets it again: the held-out one does not"
+        return again if len(later) == len(self.hypotheses[0].effects) else (
+            f"{met}, and {listed(later)} {again}")
 
 
 def _first(titles: Sequence[str]) -> str:
@@ -284,10 +296,3 @@ def titles_apart(given: Sequence[Explanation]) -> list[str]:
     titles = [h.title for h in given]
     return [t if titles.count(t) == 1 else f"{t} ({'; '.join(e.expression for e in h.effects)})"
             for t, h in zip(titles, given, strict=True)]
-
-
-def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],
-              std: Mapping[str, float], overdispersion: float = 1.0) -> dict[str, Value]:
-    """Estimates of an effect's parameters, with variances multiplied by the overdispersion."""
-    return {p.name: Value(values[p.name], std[p.name] * overdispersion**0.5, parse(p.unit))
-            for p in parameters if p.name in values}

@@ -21,8 +21,8 @@ from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import acts_in
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.report.findings import Where, values_of
-from pikanid.mismatch.report.part import Value
+from pikanid.mismatch.report.findings import Where
+from pikanid.mismatch.report.part import Value, values_of
 from pikanid.mismatch.settings.settings import Settings
 
 SURE = ("named", "set", "partial")

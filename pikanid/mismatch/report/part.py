@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from pikanid.estimate.rounding import with_unit
+from pikanid.formula.units import parse
+from pikanid.model.parts import Parameter
 from pikanid.pieces.time_unit import spans
 
 SHOWN = 6  # layout: windows of time that are listed
@@ -151,3 +153,10 @@ class Remainder:
         found["time"] = [list(span) for span in self.time]
         found["doubtful"] = [{"family": what, "why": why} for what, why in self.doubtful]
         return found
+
+
+def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],
+              std: Mapping[str, float], overdispersion: float = 1.0) -> dict[str, Value]:
+    """Estimates of an effect's parameters, with variances multiplied by the overdispersion."""
+    return {p.name: Value(values[p.name], std[p.name] * overdispersion**0.5, parse(p.unit))
+            for p in parameters if p.name in values}

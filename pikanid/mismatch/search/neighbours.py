@@ -59,18 +59,32 @@ def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """
     for effect in h.effects:
         for other in candidates:
-            if effect.key not in other.covers:
-                continue
-            rest = [e for e in h.effects if e is not effect and e is not other]
-            size, *more = other.parameters
-            if begun := other.covers[effect.key]:
-                size_there = as_strong(h, effect, other, [begun[p.name] for p in more])
-                starts = [{size.name: size_there, **begun}]
-            else:
-                starts = [{size.name: as_strong(h, effect, other),
-                           **{p.name: p.value for p in more if p.name not in h.point},
-                           more[-1].name: share * more[-1].value} for share in WIDER]
-            yield (*rest, other), [{**h.point, **start} for start in starts]
+            if effect.key in other.covers:
+                yield _wider(h, effect, other, effect.key)
+
+
+def with_cousins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With what contains the same special case as one of its effects does in that one's place: dry
+    friction that is rounded, for a law of free exponent.
+    """
+    for effect in h.effects:
+        for other in candidates:
+            shared = [key for key in other.covers if key in effect.covers]
+            if shared and other.key not in h.key and effect.key not in other.covers:
+                yield _wider(h, effect, other, shared[0])
+
+
+def _wider(h: Hypothesis, effect: Candidate, other: Candidate, special: str) -> Job:
+    """With a law in an effect's place, begun near what is a special case of it."""
+    rest = [e for e in h.effects if e is not effect and e is not other]
+    size, *more = other.parameters
+    if begun := other.covers[special]:
+        starts = [{size.name: as_strong(h, effect, other, [begun[p.name] for p in more]), **begun}]
+    else:
+        starts = [{size.name: as_strong(h, effect, other),
+                   **{p.name: p.value for p in more if p.name not in h.point},
+                   more[-1].name: share * more[-1].value} for share in WIDER]
+    return (*rest, other), [{**h.point, **start} for start in starts]
 
 
 def with_next_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
@@ -87,6 +101,7 @@ def with_next_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[J
 def with_other_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """With what keeps the name of one of its effects away, if that acts instead, in its place."""
     yield from with_wider(h, candidates)
+    yield from with_cousins(h, candidates)
     yield from with_next_form(h, candidates)
 
 
@@ -231,6 +246,14 @@ def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:
     counts = sorted({len(h.effects) for h in several}, reverse=True)
     return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
             for n in counts]
+
+
+def led_away(base: Hypothesis, about: Hypothesis) -> bool:
+    """Whether the nominal model went far from its guess to take up what is missing: to a bound, or
+    along a valley that the recording hardly closes, other than as it is fitted `about` the guess.
+    """
+    return (base.far and base.pinned) or any(
+        abs(about.values[n] - base.values[n]) > base.std[n] for n in base.values)
 
 
 def _rest(h: Hypothesis, effect: Candidate) -> tuple[Candidate, ...]:

@@ -94,13 +94,12 @@ class Search:
                 :budget.leading]], again=True, always=True)
             if self.base() is base:
                 break  # else effects had led out of a minimum that only the nominal model was in
-        if self.base().far and self.base().pinned:
-            # at a bound the model explains as little as it can: effects show about the guess
-            about = fitted(self.nominal, (), self.records, [self.guess], self.choices,
-                           Closest(self._closest_chi2()))
-            self._fit_all([] if about is None else [
-                ((c,), starts) for c, starts in Screen(about, every).singles(budget.singles)],
-                again=True, always=True, reach=self.base().minimum.chi2)
+        # where what is missing has led the nominal model away, effects show about the guess
+        about = fitted(self.nominal, (), self.records, [self.guess], self.choices,
+                       Closest(self._closest_chi2()))
+        if about is not None and neighbours.led_away(self.base(), about):
+            self._fit_all([((c,), starts) for c, starts in Screen(about, every).singles(
+                budget.singles)], again=True, always=True, reach=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
         if not adequate(best := self.ranked()[0]):
@@ -135,7 +134,7 @@ class Search:
         self._simplify()
         if not (best := self.ranked()[0]).known:
             self._exchange(best, anyway=True)
-        if not adequate(self.ranked()[0]):
+        if not (self.ranked()[0].known and adequate(self.ranked()[0])):
             for h in neighbours.leading(self.ranked())[:budget.leading]:
                 self._fit_all([job for job in neighbours.with_wider(h, self.candidates)
                                if all(e.known for e in job[0])], again=True, always=True)

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 from pikanid.mismatch.case import Case, note_outliers
-from pikanid.mismatch.catalogue.bound_effects import bound_to, motion_along, reserved
+from pikanid.mismatch.catalogue.bound_effects import (
+    bound_to,
+    motion_along,
+    reserved,
+    with_unseen_speeds,
+)
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import (
@@ -100,8 +106,9 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         notes += again.notes
         records = records.with_levels(again.levels)
         held = None if held is None else held.with_levels(again.levels)
-    found = sites(nominal, records.recordings)
-    own = bound_to(effects, found, records.recordings, lambda: motion_along(nominal, records))
+    motion = cache(lambda: motion_along(nominal, records))
+    found = with_unseen_speeds(sites(nominal, records.recordings), motion)
+    own = bound_to(effects, found, records.recordings, motion)
     found = reserved(found, own)
     listed = catalogue_of(found, own)
     search = Search(nominal, records, listed, tell,

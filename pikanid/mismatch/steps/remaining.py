@@ -9,9 +9,9 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.judge.partial import Doubtful
 from pikanid.mismatch.judge.partial import Present as Sure
 from pikanid.mismatch.judge.verdict import Answer
-from pikanid.mismatch.report.findings import Proof, values_of
+from pikanid.mismatch.report.findings import Proof
 from pikanid.mismatch.report.locate import loud_windows
-from pikanid.mismatch.report.part import Present, Remainder
+from pikanid.mismatch.report.part import Present, Remainder, values_of
 
 
 def present(answer: Answer) -> tuple[Present, ...]:

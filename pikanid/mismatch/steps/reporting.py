@@ -105,7 +105,7 @@ def _proof(case: Case, answer: Answer, best: Hypothesis) -> Proof | None:
                                    case.later.sigma(o.name) * share, o.unit)
                for o in case.model.outputs}
     return Proof(outputs, after.detection.p_value, _curves(case, before, after),
-                 tuple(r.name for r in case.later.recordings))
+                 tuple(r.name for r in case.later.recordings), _idle(case, answer))
 
 
 def _curves(case: Case, before: HeldOut, after: HeldOut) -> dict[str, Curves]:
@@ -125,7 +125,8 @@ def _measured(model: Model, recording: Recording, output: str) -> np.ndarray:
                 if model.outputs[s.output].name == output)
 
 
-def _idle(case: Case, answer: Answer) -> list[str]:
+def _idle(case: Case, answer: Answer) -> tuple[str, ...]:
     """Names of the effects of the first explanation that do not act in the held-out recordings."""
     seen = case.predicted(answer.given[0]) if answer.given and case.later is not None else None
-    return [] if seen is None else [e.name for e in answer.given[0].effects if idle(e, seen)]
+    return () if seen is None else tuple(
+        e.name for e in answer.given[0].effects if idle(e, seen))

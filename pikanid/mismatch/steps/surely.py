@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 from pikanid.mismatch.beyond.free_channels import sure_channels
 from pikanid.mismatch.case import Case
@@ -69,19 +70,11 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
     search, settings = case.search, case.settings
     search.spent = 0.0  # what is sure has a budget of its own
 
-    tried: dict[tuple[object, ...], float] = {}
-
-    def again(effect: Candidate, one: Hypothesis, other: Hypothesis) -> float:
-        key = effect.key, one.fit, other.fit
-        if key not in tried:
-            tried[key] = worth_within_train(case, effect, one, other)
-        return tried[key]
-
     def weighed() -> tuple[Explanations | None, Part | None]:
         found = explanations(search.ranked(), search.scale(), case.predicted, noise, settings,
                              case.ahead)
         return found, None if found is None else surely_there(
-            found, search.scale(), settings, again)
+            found, search.scale(), settings, partial(worth_within_train, case))
 
     # a search that what happens once has led leaves what lasts half explained
     for _ in range(settings.budget.effects):
