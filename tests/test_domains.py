@@ -125,7 +125,7 @@ def effects_of(model: pk.Model, *names: str, **channels: tuple[str, float]) -> l
 def test_heat_is_lost_to_temperatures_and_only_angles_hang() -> None:
     room = decay("degC").with_values(k=0.5)
     lost = [e for e in effects_of(room, "thermal", outside=("degC", 8.0), sun=("W/m^2", 500.0))
-            if e.startswith("loss_to")]
+            if e.startswith("loss_to[")]
     assert lost == ["loss_to[]"]  # of which it names no column, as there is one only
     assert not any("gravity" in e for e in effects_of(pk.systems.linear_oscillator(), "mechanics"))
     assert any("gravity" in e for e in effects_of(pk.systems.pendulum(), "mechanics"))
@@ -139,6 +139,36 @@ def test_surroundings_may_be_a_fixed_parameter() -> None:
     fixed, free, other = (effects_of(room.with_parameters(p), "thermal") for p in (
         around, replace(around, free=True), replace(around, unit="W")))
     assert {*lost} <= {*fixed} and not {*lost} & {*free, *other}
+
+
+@pytest.mark.parametrize("lost", [4.0, 0.0])
+def test_heat_may_be_lost_to_surroundings_that_nobody_records(lost: float) -> None:
+    """An oven in a room of 12 degC that its model does not know; exact from sample to sample."""
+    oven = pk.Model.from_dict({
+        "name": "oven", "states": {"T": {"unit": "degC", "initial": 20.0}},
+        "inputs": {"P": {"unit": "W", "hold": "zero"}},
+        "parameters": {"C": {"unit": "J/K", "guess": 800.0, "bounds": [10.0, 1e5]}},
+        "equations": {"T": "P/C"}, "outputs": {"T": {"unit": "degC", "expression": "T"}}})
+
+    def run(seed: int) -> pk.Recording:
+        rng = np.random.default_rng(seed)
+        power, warm = np.repeat(rng.uniform(0.0, 500.0, 20), 20), [20.0]
+        for p in power[:-1]:
+            steady = 12.0 + p / (lost or 1.0)
+            warm.append(steady + (warm[-1] - steady) * np.exp(-lost / 1000.0 * 5.0) if lost
+                        else warm[-1] + p / 1000.0 * 5.0)
+        return pk.Recording.from_arrays(
+            np.arange(400) * 5.0, {"P": power, "T": warm + 0.1 * rng.standard_normal(400)},
+            {"P": "W", "T": "degC"})
+
+    dx = pk.diagnose(oven, run(1), run(2))
+    if not lost:
+        assert dx.verdict == "none"
+        return
+    assert dx.verdict == "named" and dx.hypotheses[0].effects[0].ids == ("ambient_loss",)
+    k, around = dx.hypotheses[0].effects[0].parameters.values()
+    assert abs(k.value - 0.004) < 4 * k.std and abs(around.value - 12.0) < 4 * around.std
+    assert abs(dx.model.values["C"] - 1000.0) < 1.0
 
 
 @pytest.mark.parametrize(("unit", "zero"), [("degC", -273.15), ("K", 0.0)])
