@@ -273,7 +273,7 @@ def test_profile_is_ready_to_run(tmp_path: Path) -> None:
     assert again["u_x"].unit == "m/s^2"
     assert np.array_equal(again["u_x"].values, chosen.profile["u_x"].values)
     figure = chosen.plot()
-    assert [a.get_ylabel() for a in figure.axes] == ["u_x [m/s^2]", "theta"]
+    assert [a.get_ylabel() for a in figure.axes] == ["u_x [m/s^2]", "theta [rad]"]
     assert "l_theta" in str(chosen)
     assert chosen.to_dict()["profile"] == chosen.profile.name
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,11 +15,16 @@ from pikanid.commands.simulate import sigmas
 from pikanid.figures import ENDINGS, image_for
 from pikanid.recording.formats import written_endings
 
+if TYPE_CHECKING:
+    from pikanid.model import Model
+
 EXAMPLES = """Examples:
 
   pikanid design sloshing --sigma 0.1deg --out next.csv --limit theta=15deg
 
   pikanid design friction.toml drag.toml --recorded run.csv --sigma 0.1deg --out next.csv
+
+  pikanid design dc_motor --sigma 2rad/s --range u=-6:6V --out next.csv
 
 One model: the profile from which its free parameters are learnt best (D-optimal). Several: the one
 that tells them apart best. A model stands for its values; refit it before."""
@@ -40,17 +45,22 @@ def design(
     candidate: Annotated[list[str], typer.Option(
         metavar="FILE", show_default=False,
         help="profile to choose from; many feasible ones by default")] = [],  # noqa: B006
-    acceleration: Annotated[float, typer.Option(
-        metavar="X", help="largest value of the input, in its unit")] = 1.0,
-    velocity: Annotated[float, typer.Option(
-        metavar="X", help="largest integral of the input; inf if it is no acceleration")] = 0.5,
-    stroke: Annotated[float, typer.Option(
-        metavar="X", help="largest range of the second integral; inf likewise")] = 0.4,
+    span: Annotated[list[str], typer.Option(
+        "--range", metavar="NAME=LOW:HIGH", show_default=False,
+        help="least and largest value of an input that is no acceleration, as u=0:10V; by default "
+             "those recorded")] = [],  # noqa: B006
+    acceleration: Annotated[float | None, typer.Option(
+        metavar="X", help="largest acceleration of the drive; 1 m/s^2 by default")] = None,
+    velocity: Annotated[float | None, typer.Option(
+        metavar="X", help="largest velocity; 0.5 m/s by default")] = None,
+    stroke: Annotated[float | None, typer.Option(
+        metavar="X", help="range of its position; 0.4 m by default")] = None,
     limit: Annotated[list[str], typer.Option(
         metavar="NAME=VALUE", show_default=False,
         help="largest value that an output may reach, as theta=15deg")] = [],  # noqa: B006
     duration: Annotated[float, typer.Option(metavar="S", help="of the profile [s]")] = 20.0,
-    rate: Annotated[float, typer.Option(metavar="HZ", help="its sampling rate")] = 100.0,
+    rate: Annotated[float | None, typer.Option(
+        metavar="HZ", help="its sampling rate; that of --recorded, or 100 Hz, by default")] = None,
     *,
     files: Recorded,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="of random profiles")] = 0,
@@ -70,7 +80,7 @@ def design(
     from pikanid.reporting.console import console
     from pikanid.storage.outputs import together
 
-    if not rate > 0:
+    if rate is not None and not rate > 0:
         raise errors.BadSetting(errors.bad_rate(rate))
     found = {name: systems.find(name) for name in models}
     first = found[models[0]]
@@ -80,12 +90,14 @@ def design(
     # a profile holds inputs alone: nothing to thin
     whole = replace(files, decimate=1)
     offered = [whole.recording(text, *found.values()) for text in candidate] or None
-    noise, drive = sigmas(first, sigma) or None, Bounds(acceleration, velocity, stroke)
-    if len(found) == 1:
-        chosen = d_optimal(first, past, noise, offered, drive, duration, 1 / rate, limits, seed)
-    else:
-        chosen = next_experiment(found, past, noise, offered, drive, duration, 1 / rate, limits,
-                                 seed)
+    given = {k: v for k, v in (("acceleration", acceleration), ("velocity", velocity),
+                               ("stroke", stroke)) if v is not None}
+    asked: dict[str, Any] = {
+        "recorded": past, "sigma": sigmas(first, sigma) or None, "candidates": offered,
+        "bounds": Bounds(**given) if given else None, "duration": duration,
+        "dt": None if rate is None else 1 / rate, "limits": limits, "seed": seed,
+        "ranges": _ranges(first, span)}
+    chosen = d_optimal(first, **asked) if len(found) == 1 else next_experiment(found, **asked)
     made = {out: content(chosen.profile.channels, out)}
     if plot is not None:
         made[plot] = image_for(chosen.plot(), plot)
@@ -94,3 +106,18 @@ def design(
         console().print(f"{chosen}\n{out}: {chosen.profile.stop:g} s, "
                         f"columns {', '.join(chosen.profile.names)}", markup=False, soft_wrap=True)
     return 0
+
+
+def _ranges(model: Model, texts: list[str]) -> dict[str, tuple[float, float]]:
+    """The texts of --range, in the units of the model's inputs."""
+    from pikanid import errors
+
+    found: dict[str, tuple[float, float]] = {}
+    units = {i.name: i.unit for i in model.inputs}
+    for name, text in assignments("--range", texts, "u=0:10V").items():
+        low, colon, high = text.partition(":")
+        if not (colon and low.strip() and high.strip()):
+            raise errors.BadSetting(errors.not_a_range(text, "u=0:10V"))
+        least, most = (quantity(v, units.get(name, ""), f"--range {name}") for v in (low, high))
+        found[name] = least, most
+    return found

@@ -134,7 +134,7 @@ def no_sheet(where: str, sheet: str, known: Iterable[str]) -> str:
 
 def ragged_row(where: str, row: int, cells: int, wanted: int) -> str:
     return (f"'{where}', row {row}: {cells} cell(s) where the header has {wanted}; the file may be "
-            "cut off, or its delimiter be another (delimiter=).")
+            "cut off, or its delimiter be another (in Python delimiter=).")
 
 
 def not_a_number(where: str, row: int, header: str, cell: str) -> str:

@@ -27,6 +27,25 @@ def bad_drive_bound(name: str, given: float) -> str:
     return f"The bound of {name} is {given:g}; give a positive number, inf for none."
 
 
+def range_not_known(name: str, unit: str) -> str:
+    how = f"in {unit}" if unit else "in the model's unit"
+    return (f"How far may the input '{name}' go, {how}? Say it (--range {name}=LOW:HIGH, in Python "
+            f"ranges={{'{name}': (low, high)}}), or give a recording in which it moves "
+            "(--recorded, in Python recorded=).")
+
+
+def no_range(name: str, low: float, high: float) -> str:
+    return f"The input '{name}' cannot go from {low:g} to {high:g}: the second must be larger."
+
+
+def range_of_nothing(name: str, known: Iterable[str]) -> str:
+    return f"A range is given for '{short(name)}', which drives nothing (inputs: {listed(known)})."
+
+
+def not_a_range(text: str, example: str) -> str:
+    return f"{short(text)!r} is no range: give two values with a colon between them, as {example}."
+
+
 def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: float) -> str:
     return (f"No profile fits into {duration:g} s with {quiet:g} s of rest and samples every "
             f"{dt:g} s for a model that rings at {frequency:.3g} Hz: leave two periods of motion, "

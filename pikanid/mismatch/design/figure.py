@@ -14,12 +14,14 @@ if TYPE_CHECKING:
 
 
 def design_figure(profile: Recording,
-                  responses: Mapping[str, Mapping[str, tuple[Array, Array]]]) -> Figure:
+                  responses: Mapping[str, Mapping[str, tuple[Array, Array]]],
+                  units: Mapping[str, str]) -> Figure:
     """Inputs above, the foretold outputs of every hypothesis below.
 
     Args:
         profile: Inputs, ready to run.
         responses: Name of a hypothesis -> its outputs under the profile: name -> (times, values).
+        units: Of the outputs.
     """
     inputs = list(profile.channels.values())
     outputs = list(next(iter(responses.values())))
@@ -33,7 +35,7 @@ def design_figure(profile: Recording,
         for k, (name, response) in enumerate(responses.items()):
             axis.plot(*response[output], color=COLOURS[k % len(COLOURS)],
                       linestyle=DASHES[k % len(DASHES)], linewidth=1.0, label=name)
-        axis.set_ylabel(output)
+        axis.set_ylabel(f"{output} [{units[output]}]" if units[output] else output)
         if len(responses) > 1:
             axis.legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("t [s]")

@@ -25,6 +25,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.design.profiles import Bounds, profiles_for, scaled
+from pikanid.mismatch.design.ranges import Range
 from pikanid.mismatch.design.response import (
     Sigma,
     Watch,
@@ -62,6 +63,7 @@ class NextExperiment:
         responses: Name of a hypothesis -> its outputs under the profile: name -> (times, values).
         std: Foretold standard errors of the parameters, for `parameters`.
         separated: Distance [σ] that tells two hypotheses apart.
+        units: Of the outputs, by name.
     """
 
     profile: Recording
@@ -73,6 +75,7 @@ class NextExperiment:
     responses: Mapping[str, Mapping[str, tuple[Array, Array]]]
     std: Mapping[str, float]
     separated: float
+    units: Mapping[str, str]
 
     @property
     def gain(self) -> float:
@@ -91,7 +94,7 @@ class NextExperiment:
         """The profile, and the outputs that the hypotheses foretell."""
         from pikanid.mismatch.design.figure import design_figure
 
-        return design_figure(self.profile, self.responses)
+        return design_figure(self.profile, self.responses, self.units)
 
     def to_dict(self) -> dict[str, object]:
         """What can go into a report as JSON."""
@@ -107,16 +110,19 @@ class NextExperiment:
                 f"does not tell them apart yet ({self.separated:g} σ are needed)")
             return (f"Next experiment: {name}. The closest two hypotheses are {self.value:.3g} σ "
                     f"apart afterwards ({self.before:.3g} σ now): it {verdict}.")
+        otherwise = ("if the last recording were repeated" if self.before > 0
+                     else "with the median profile")
         bounds = ", ".join(f"{key} ± {std:.2g}" for key, std in self.std.items())
         return (f"Next experiment: {name}. Standard errors of {bounds}; "
-                f"{self.gain:.3g} times smaller on average than otherwise.")
+                f"{self.gain:.3g} times smaller on average than {otherwise}.")
 
 
 def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
                     sigma: Sigma = None, candidates: Sequence[Recording] | None = None,
-                    bounds: Bounds | None = None, duration: float = 20.0, dt: float = 0.01,
-                    limits: Mapping[str, float] | None = None, seed: int = 0, workers: int = 1,
-                    settings: Settings = DEFAULTS) -> NextExperiment:
+                    bounds: Bounds | None = None, duration: float = 20.0,
+                    dt: float | None = None, limits: Mapping[str, float] | None = None,
+                    seed: int = 0, workers: int = 1, settings: Settings = DEFAULTS,
+                    ranges: Mapping[str, Range] | None = None) -> NextExperiment:
     """The feasible profile that best separates hypotheses.
 
     Args:
@@ -125,17 +131,21 @@ def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recordin
         recorded: What was recorded before.
         sigma: Noise of the outputs, if recordings and models do not carry it.
         candidates: Profiles to choose from; by default those of `profiles`.
-        bounds: Of the drive, for the default candidates.
+        bounds: Of the drive, for the default candidates; by default those of a planar motor for
+            inputs that are accelerations.
         duration: Of the default candidates [s].
-        dt: Their sampling interval [s].
+        dt: Their sampling interval [s]; by default that of what was recorded, else 0.01 s.
         limits: Output -> largest |value| that the experiment may reach; profiles are made smaller
             until every hypothesis keeps to it.
         seed: Of the default candidates.
         workers: Threads that simulate hypotheses side by side; the choice does not depend on them.
         settings: When hypotheses are told apart, and how many profiles are judged by refitting.
+        ranges: Input -> its least and largest value in the model's unit, for the default
+            candidates; by default those in `recorded`, where it is no acceleration.
 
     Raises:
-        BadSetting: With fewer than two hypotheses, no σ, or bounds that leave no room.
+        BadSetting: With fewer than two hypotheses, no σ, an input whose range is not known, or
+            bounds that leave no room.
         SimulationFailed: If no candidate can be simulated.
 
     >>> from pikanid.recording import excitation
@@ -170,15 +180,17 @@ def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recordin
 
         return min(watch.of_each(nearest).values())
 
-    offered = (profiles_for(models, bounds, duration, dt, seed) if candidates is None
-               else candidates)
+    offered = (profiles_for(models, bounds, duration, dt, seed, ranges, past)
+               if candidates is None else candidates)
     return _chosen(watch, "separate", worst, refit, known, past, offered, limits, settings)
 
 
 def d_optimal(model: Model, recorded: Sequence[Recording] | Recording = (), sigma: Sigma = None,
               candidates: Sequence[Recording] | None = None, bounds: Bounds | None = None,
-              duration: float = 20.0, dt: float = 0.01, limits: Mapping[str, float] | None = None,
-              seed: int = 0, settings: Settings = DEFAULTS) -> NextExperiment:
+              duration: float = 20.0, dt: float | None = None,
+              limits: Mapping[str, float] | None = None, seed: int = 0,
+              settings: Settings = DEFAULTS, ranges: Mapping[str, Range] | None = None
+              ) -> NextExperiment:
     """The feasible profile from which a model's free parameters are learnt best.
 
     Arguments and errors as for `next_experiment`.
@@ -201,8 +213,8 @@ def d_optimal(model: Model, recorded: Sequence[Recording] | Recording = (), sigm
         every = [*known[model.name], *new[model.name]]
         return mean_precision(joined(every).jacobian) if every else 0.0
 
-    offered = (profiles_for(watch.models, bounds, duration, dt, seed) if candidates is None
-               else candidates)
+    offered = (profiles_for(watch.models, bounds, duration, dt, seed, ranges, past)
+               if candidates is None else candidates)
     return _chosen(watch, "parameters", precision, precision, known, past, offered, limits,
                    settings)
 
@@ -239,7 +251,8 @@ def _chosen(watch: Watch, purpose: Literal["separate", "parameters"], quick: Sco
     return NextExperiment(
         profile, purpose, value, before, repeated,
         tuple((entry[1].name, entry[0]) for entry in finalists),
-        {name: r[0].outputs for name, r in new.items()}, std, settings.separated)
+        {name: r[0].outputs for name, r in new.items()}, std, settings.separated,
+        {o.name: o.unit for model in watch.models.values() for o in model.outputs})
 
 
 def _foretold(model: Model, known: Mapping[str, list[WhitenedResponse]],

@@ -1,20 +1,22 @@
-"""Input profiles that a planar motor can run: bounded acceleration, velocity and stroke.
+"""Input profiles that a rig can run: within acceleration, velocity and stroke of a planar motor, or
+the range of any other input.
 
-Every profile rests at first, is scaled to the bounds and ends at rest.
+Every profile rests at first, in the middle of its range, and ends at rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.design.ranges import Range, ranges_of, within
 from pikanid.mismatch.design.response import natural_frequency
 from pikanid.model import Model
 from pikanid.recording import Recording
-from pikanid.recording.channel import Array, Channel
+from pikanid.recording.channel import Array
 from pikanid.recording.excitation.sampling import grid
 
 # Kinds of profile; times in periods of the model, frequencies in its own.
@@ -32,17 +34,18 @@ FINEST = 0.1  # limit: of a period, that the sampling interval may be
 RESOLVED = 0.05  # numerical: natural periods a sampling interval, at most, that kicks can follow
 REST = (2.0, 0.2)  # limit: [s], and share of a profile, that the drive rests at first
 PERIODS = 10.0  # limit: in a profile, of the frequency that is taken where a model has none
+EVERY = 0.01  # definition: [s] between samples where nothing was recorded before
 DIGITS = 6  # numerical: of a profile's values: a file of decimals is run as it was designed
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the drive can do.
+    """What a drive that is told its acceleration can do.
 
     Attributes:
         acceleration: Largest |u|, in the input's unit.
-        velocity: Largest |∫u dt|; infinite for an input that is no acceleration.
-        stroke: Range of ∫∫u dt², from end to end; infinite likewise.
+        velocity: Largest |∫u dt|.
+        stroke: Range of ∫∫u dt², from end to end.
 
     Raises:
         BadSetting: If one is not positive.
@@ -78,7 +81,7 @@ def motion(u: Array, dt: float) -> tuple[Array, Array]:
 
 def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 20.0,
              dt: float = 0.01, quiet: float = 2.0, channel: str = "u_x", unit: str = "m/s^2",
-             draws: int = 3, seed: int = 0) -> list[Recording]:
+             draws: int = 3, seed: int = 0, limits: Range | None = None) -> list[Recording]:
     """Candidates for an experiment, each at its largest feasible size and at a third of it.
 
     Args:
@@ -91,6 +94,7 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
         unit: Of the input.
         draws: Random versions of each kind.
         seed: Of what is random.
+        limits: Least and largest value of an input that is no acceleration, in place of bounds.
 
     Raises:
         BadSetting: If no time is left after the rest, or the sampling is too coarse for
@@ -108,10 +112,11 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
     rng = np.random.default_rng(seed)
     made = []
     for draw in range(draws):
-        for name, u in _drawn(rng, t, first, frequency, dt):
-            share = HAIR * bounds.share(u, dt)
+        for name, u in _drawn(rng, t, first, frequency, dt, limits is None):
+            share = HAIR * (bounds.share(u, dt) if limits is None else 1.0 / np.abs(u).max())
             for size, word in ((1.0, "full"), (PART, "a third")):
-                values = _rounded(u * share * size)
+                shape = u * share * size
+                values = _rounded(shape if limits is None else within(shape, limits))
                 title = f"{name}, {word if word == 'a third' else 'full size'}"
                 made.append(Recording.from_arrays(
                     t, {channel: values}, {channel: unit}, hold={channel: "zero"},
@@ -120,43 +125,48 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
 
 
 def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: float,
-                 dt: float, seed: int) -> list[Recording]:
-    """Profiles for the first input, and others at the same time for further axes of motion.
+                 dt: float | None, seed: int, ranges: Mapping[str, Range] | None = None,
+                 recorded: Sequence[Recording] = ()) -> list[Recording]:
+    """Profiles for the first input, and others at the same time for all further ones.
 
     Raises:
-        BadSetting: If the models have no input, or as for `profiles`.
+        BadSetting: If the models have no input, the range of one is not known, or as for
+            `profiles`.
     """
     inputs = {i.name: i for model in models.values() for i in model.inputs if i.default is None}
     if not inputs:
         raise errors.BadSetting(errors.nothing_to_drive(", ".join(models)))
+    known = ranges_of(inputs.values(), ranges, recorded, bounds is not None)
+    dt = dt or _interval(inputs, recorded) or EVERY
     first, *others = inputs.values()
     frequency = natural_frequency(next(iter(models.values()))) or PERIODS / duration
     # A hypothesis that rings faster than the profile can follow is driven at the fastest it can.
     frequency = min(frequency, RESOLVED / dt)
-    made = profiles(frequency, bounds, duration, dt, min(REST[0], REST[1] * duration), first.name,
-                    first.unit, seed=seed)
-    channels = []
-    for k, profile in enumerate(made):
-        along = profile
-        for shift, other in enumerate(others, 1):
-            values = made[(k + 2 * shift) % len(made)][first.name].values
-            if other.unit != first.unit:
-                values = np.zeros_like(values)
-            along = along.with_channels(
-                Channel(other.name, profile.t, values, other.unit, hold="zero"))
-        channels.append(along)
-    return channels
+    made = {i.name: profiles(
+        frequency, bounds, duration, dt, min(REST[0], REST[1] * duration), i.name, i.unit,
+        seed=seed, limits=known.get(i.name)) for i in (first, *others)}
+    count = len(made[first.name])
+    return [profile.with_channels(*(
+        made[other.name][(k + 2 * shift) % count][other.name]
+        for shift, other in enumerate(others, 1))) for k, profile in enumerate(made[first.name])]
+
+
+def _interval(inputs: Iterable[str], recorded: Sequence[Recording]) -> float:
+    """Between the samples of what was recorded beside the inputs [s]; 0 where nothing was."""
+    times = [r[n].time for r in recorded for n in r.names if n not in inputs and len(r[n].time) > 1]
+    return float(np.median(np.diff(times[0]))) if times else 0.0
 
 
 def scaled(profile: Recording, factor: float) -> Recording:
-    """A profile with all inputs multiplied by a factor."""
+    """A profile whose inputs go further from where they rest at first, by a factor."""
     return profile.with_channels(*(
-        replace(ch, values=_rounded(ch.values * factor)) for ch in profile.channels.values()))
+        replace(ch, values=_rounded(ch.values[0] + (ch.values - ch.values[0]) * factor))
+        for ch in profile.channels.values()))
 
 
-def _drawn(rng: np.random.Generator, t: Array, first: int, frequency: float,
-           dt: float) -> Iterator[tuple[str, Array]]:
-    """One profile of every kind, of any size."""
+def _drawn(rng: np.random.Generator, t: Array, first: int, frequency: float, dt: float,
+           shuttle: bool) -> Iterator[tuple[str, Array]]:
+    """One profile of every kind, of any size; a shuttle that it accelerates ends at rest."""
     n = len(t) - first
     s = np.linspace(0.0, 1.0, n)
     window = np.sin(0.5 * np.pi * np.clip(np.minimum(s, 1 - s) / FADE, 0, 1)) ** 2
@@ -166,22 +176,25 @@ def _drawn(rng: np.random.Generator, t: Array, first: int, frequency: float,
     def laid(u: Array) -> Array:
         return np.concatenate([np.zeros(first), u])
 
+    def ended(u: Array) -> Array:
+        return _at_rest(u, dt) if shuttle else u
+
     yield "kicks", laid(_kicks(n, frequency, dt, (1.0,), int(rng.integers(2, 5))))
     yield "kicks of three sizes", laid(_kicks(n, frequency, dt, SIZES,
                                               int(rng.integers(1, 4))))
-    yield "pulses", laid(_at_rest(_pulses(rng, n, frequency, dt), dt))
-    yield "binary", laid(_at_rest(_binary(rng, n, frequency, dt), dt))
+    yield "pulses", laid(ended(_pulses(rng, n, frequency, dt)))
+    yield "binary", laid(ended(_binary(rng, n, frequency, dt)))
     ratio = rng.uniform(*RANGE)
     low = frequency / np.sqrt(ratio)
     phase = 2 * np.pi * low * span / np.log(ratio) * (ratio**s - 1)
-    yield "chirp", laid(_at_rest(np.sin(phase + rng.uniform(0, 2 * np.pi)) * window, dt))
+    yield "chirp", laid(ended(np.sin(phase + rng.uniform(0, 2 * np.pi)) * window))
     lines = frequency * np.arange(*LINES)
     phases = rng.uniform(0, 2 * np.pi, len(lines))
     sines = np.cos(2 * np.pi * np.outer(active, lines) + phases).sum(axis=1)
-    yield "multisine", laid(_at_rest(sines * window, dt))
+    yield "multisine", laid(ended(sines * window))
     off = frequency * float(rng.choice(BESIDE))
     swell = np.sin(np.pi * s) ** 2
-    yield "drive beside resonance", laid(_at_rest(np.sin(2 * np.pi * off * active) * swell, dt))
+    yield "drive beside resonance", laid(ended(np.sin(2 * np.pi * off * active) * swell))
 
 
 def _kicks(n: int, frequency: float, dt: float, sizes: tuple[float, ...], pairs: int) -> Array:

@@ -12,6 +12,7 @@ from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.design.next_experiment import NextExperiment, next_experiment
 from pikanid.mismatch.design.profiles import profiles
+from pikanid.mismatch.design.ranges import ranges_of
 from pikanid.mismatch.judge.verdict import Verdict
 from pikanid.mismatch.report.findings import Explanation, titles_apart
 from pikanid.model import Model
@@ -106,7 +107,9 @@ def _best(models: Mapping[str, Model], records: Records, driven: Input, rate: fl
         try:
             offered = profiles(min(rate / (2 * np.pi), settings.budget.profile_rate),
                                duration=settings.budget.profile, channel=driven.name,
-                               unit=driven.unit, draws=1)
+                               unit=driven.unit, draws=1,
+                               limits=ranges_of([driven], None, records.recordings, False
+                                                ).get(driven.name))
             return next_experiment(models, recorded, sigma, offered, workers=workers,
                                    settings=settings)
         except errors.PikanidError:
