@@ -31,15 +31,15 @@ def case_of(rig: pk.Model) -> Case:
     return open_case(MODEL, (train,), (later,), None, lambda text: None, DEFAULTS)
 
 
-def judged(case: Case, key: str) -> Part:
-    """What is left of an effect that seemed to be sure, by its name."""
-    own = next(c for c in case.candidates if c.key == key)
-    (_, starts), = Screen(case.base, [own]).singles(1)
-    case.search.refine([((own,), starts)])
-    h = next(h for h in case.search.ranked() if h.key == {key})
-    sure = Present(kinds_of(own, h, DEFAULTS.part.dry)[0], own, own.ids, {}, 1.0, 1.0, 50.0, 50.0,
-                   0.95)
-    return against_curves(case, Explanations((), 1.0, None), Part((sure,), (), h, 1.0, 0.95),
+def judged(case: Case, *keys: str) -> Part:
+    """What is left of effects that seemed to be sure, by their names."""
+    own = tuple(next(c for c in case.candidates if c.key == key) for key in keys)
+    (_, starts), = Screen(case.base, own[:1]).singles(1)
+    case.search.refine([(own, starts if len(own) == 1 else [case.base.point])])
+    h = next(h for h in case.search.ranked() if h.key == {*keys})
+    sure = tuple(Present(kinds_of(e, h, DEFAULTS.part.dry)[0], e, e.ids, {}, 1.0, 1.0, 50.0, 50.0,
+                         0.95) for e in own)
+    return against_curves(case, Explanations((), 1.0, None), Part(sure, (), h, 1.0, 0.95),
                           [{"theta": SIGMA}] * 2)
 
 
@@ -57,6 +57,22 @@ def test_no_curve_takes_the_place_of_a_mode() -> None:
     rig = mode.applied(MODEL).with_values({"a_2": 20.0, "omega_2": 40.0, "zeta_2": 0.02})
     found = judged(case_of(rig), "second_mode")
     assert [p.names for p in found.present] == [("second_mode",)] and not found.doubtful
+
+
+@pytest.mark.parametrize(("pair", "sure"), [
+    (("coulomb_friction", "input_gain"), {"dry friction"}),
+    (("coulomb_friction", "static_bias"), {"dry friction", "constant force"}),
+    (("cubic_stiffness", "input_gain"), set())])
+def test_what_one_curve_does_by_itself_is_not_several_effects(
+        pair: tuple[str, str], sure: set[str]) -> None:
+    """A drag that fades at high speed: of effects that it is not, none is there; one that it may be
+    stays where it does most of it.
+    """
+    rig = MODEL.with_term("theta_dot", "-4.5*theta_dot*abs(theta_dot)*exp(-abs(theta_dot))")
+    found = judged(case_of(rig), *pair)
+    assert {p.family for p in found.present} == sure
+    assert len(found.doubtful) == 2 - len(sure)
+    assert all("by itself" in d.why for d in found.doubtful)
 
 
 def test_a_limit_keeps_its_name() -> None:

@@ -18,7 +18,8 @@ PIECES = (FINE, 6, 3)  # numerical: with which a curve is tried, one after the o
 
 
 def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], argument: str,
-                    site: Site, near: float = np.inf) -> Hypothesis | None:
+                    site: Site, near: float = np.inf, tried: Sequence[int] = PIECES
+                    ) -> Hypothesis | None:
     """Effects of a hypothesis and a free curve as a force, refitted from where it stands, with
     fewer pieces where that ends in nothing that can be run; None where no curve can be.
 
@@ -29,10 +30,11 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
         argument: State that the curve is a function of.
         site: Coordinate in whose equation it stands.
         near: χ² to come near to: a fit that stays far above is not carried through.
+        tried: Numbers of pieces.
     """
     visited = h.whitened.motion(h.minimum.theta)[argument]
     low, high = float(visited.min()), float(visited.max())
-    return next((found for pieces in PIECES if (found := fitted(
+    return next((found for pieces in tried if (found := fitted(
         nominal, [*effects, FreeCurve(argument, low, high, h.model, pieces).candidate(site)],
         h.whitened.records, [h.point], 1, Closest(near), h.key)) is not None), None)
 

@@ -4,7 +4,9 @@ A family is not sure where a free curve in its place leaves little more, of a st
 its members do not depend on: a magnet is no friction with a memory, and an amplifier that bends is
 no mode.  Where only curves of the deflection do, or only those of inputs, one is there of the
 family and a restoring force, or a curve of the input: a scale error is a spring beside the model's
-own to the letter.
+own to the letter.  Nor is any family of several effects sure where one curve of a state leaves no
+more than all of them do, unless it holds that family, which does most of it alone: they are facets
+of one law.
 
 A name is not sure where a free curve beside it, of what it depends on, leaves far less: then its
 form is another one; nor where another member of its family does as well once a curve of what
@@ -19,12 +21,14 @@ from dataclasses import replace
 import numpy as np
 
 from pikanid.mismatch.beyond.free_curve import (
+    PIECES,
     with_free_curve,
     with_free_input,
     with_free_sensor,
 )
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
@@ -54,8 +58,14 @@ def against_curves(case: Case, explained: Explanations, part: Part,
         return part
     own_left = max(left_over(h, before, noise), rule.floor)
     present, doubtful = [], list(part.doubtful)
+    whole = [*_curves_of_all(case, h, own_left, noise)]
     for p in part.present:
         own = members(p.kind, h, rule.dry)
+        if curve := next((c for c in whole if not (_holds(c, p) and _is_most(
+                case, h, p, own, own_left, noise))), None):
+            doubtful.append(Doubtful(p.kind, p.effect, f"a free curve of {curve[1]} leaves no more "
+                                     "by itself than all that was found together"))
+            continue
         if own:
             rest = [e for e in h.effects if e not in own]
             found = _against(p, h, rule, [
@@ -94,6 +104,40 @@ def _against(p: Present, h: Hypothesis, rule: PartSettings,
         return Doubtful(p.kind, p.effect, "a free curve of what it does not depend on leaves "
                         f"{least:.2g} times as much in its place, {asked:.2g} are asked")
     return replace(p, names=(), instead=Instead(kind, p.effect))
+
+
+def _curves_of_all(case: Case, h: Hypothesis, own_left: float, noise: Sequence[dict[str, float]]
+                   ) -> Iterator[tuple[Site, str]]:
+    """Equations and states of which a free curve, which does not hold every effect of an
+    explanation of several, leaves no more than it does.
+    """
+    if len(h.effects) < 2:
+        return
+    for site in case.sites:
+        for s in site.moving:
+            every = all(e.site.v == site.v and e.argument in ("", s) and e.channel == "dynamics"
+                        for e in h.effects)
+            # of fewer pieces where what was not visited cannot be run
+            curves = (with_free_curve(case.model, h, [], s, site, h.minimum.chi2, [pieces])
+                      for pieces in PIECES)
+            if not every and any(not smaller(own_left, _least(case, [curve], noise, own_left))
+                                 for curve in curves):
+                yield site, s
+
+
+def _holds(curve: tuple[Site, str], p: Present) -> bool:
+    """Whether a family's members are what a curve may be."""
+    site, s = curve
+    return p.effect.site.v == site.v and s in _arguments(p)
+
+
+def _is_most(case: Case, h: Hypothesis, p: Present, own: Sequence[Candidate], own_left: float,
+             noise: Sequence[dict[str, float]]) -> bool:
+    """Whether a family's members alone leave no more than would be asked of another one."""
+    asked = max(case.settings.part.dominance_of(k.family) for k in p.kinds) * own_left
+    alone = fitted(case.model, own, h.whitened.records, [h.point], 1, Closest(h.minimum.chi2),
+                   h.key)
+    return not smaller(asked, _least(case, [alone], noise, asked))
 
 
 def _searched(case: Case, h: Hypothesis) -> Hypothesis | None:
