@@ -115,13 +115,13 @@ def _curves_of_all(case: Case, h: Hypothesis, own_left: float, noise: Sequence[d
         return
     for site in case.sites:
         for s in site.moving:
-            every = all(e.site.v == site.v and e.argument in ("", s) and e.channel == "dynamics"
-                        for e in h.effects)
-            # of fewer pieces where what was not visited cannot be run
-            curves = (with_free_curve(case.model, h, [], s, site, h.minimum.chi2, [pieces])
-                      for pieces in PIECES)
-            if not every and any(not smaller(own_left, _least(case, [curve], noise, own_left))
-                                 for curve in curves):
+            if all(e.site.v == site.v and e.argument in ("", s) and e.channel == "dynamics"
+                   for e in h.effects):
+                continue
+            # of fewer pieces where what the train recordings did not visit cannot be run
+            left = (_least(case, [with_free_curve(case.model, h, [], s, site, h.minimum.chi2, [n])],
+                           noise, own_left) for n in PIECES)
+            if not smaller(own_left, next(filter(np.isfinite, left), np.inf)):
                 yield site, s
 
 
