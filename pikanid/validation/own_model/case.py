@@ -63,7 +63,7 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     alone = [fit.distance for fit in without]
     nominal = bench.fitted(truth, []).distance if len(hidden) > 1 else sum(alone)
     rival: tuple[tuple[str, ...], float] = ((), np.inf)
-    if hidden and all(h.law.known for h in hidden):
+    if hidden:
         rival = bench.nearest(truth, hidden, without, laws, rng)
     distance = min([rival[1], *alone]) if len(hidden) > 1 else rival[1]
     return Case(recordings, {
