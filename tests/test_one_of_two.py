@@ -117,3 +117,16 @@ def test_a_law_is_compared_with_what_contains_it_beside_all_the_rest(case: Case)
     starts = [start for effects, found in jobs for start in found
               if keys(effects) == {"power_drag", "static_bias"}]
     assert any(start.get("n") == 1.8 and "c_n" in start for start in starts)
+
+
+@pytest.mark.parametrize(("known", "channel", "instead"), [
+    (False, "input", "input curve"), (False, "sensor", "sensor curve"), (True, "input", None)])
+def test_a_scale_that_bends_is_one_or_a_curve(known: bool, channel: str, instead: str | None
+                                              ) -> None:
+    scale: Any = effect("input_gain_bent_2", "gain", known=known)
+    scale.channel = channel
+    p = Present(Kind("gain"), scale, scale.ids, {}, 1.0, 1.0, 9.0, 1.0, 0.95)
+    h: Any = SimpleNamespace(effects=(scale,), blurred=frozenset())
+    [found] = surely._without_shares(Part((p,), (), h, 1.0, 0.95), []).present
+    assert found.instead == (instead and Instead(Kind(instead), scale))
+    assert found.names == (() if instead else scale.ids)

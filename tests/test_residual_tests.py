@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import binom, chi2, norm
 
 from pikanid.mismatch.detect.residual_tests import (
+    AT_ONCE,
     BATCH,
     CLEAR,
     Detection,
@@ -193,8 +194,20 @@ def test_past_inputs_span_the_input_at_every_lag_of_a_period() -> None:
     later = np.interp(t - 2.5, t, u, left=u[0])
     later -= later.mean()
     assert np.linalg.norm(later - columns @ (columns.T @ later)) > 0.2 * np.linalg.norm(later)
-    assert past_inputs(t, [(t, u)], 5.0, DetectionSettings(lags=4)).shape[1] <= 4
+    assert past_inputs(t, [(t, u)], 5.0, DetectionSettings(lags=4)).shape[1] <= 4 + AT_ONCE
     assert past_inputs(t, [], 5.0, DEFAULTS.detection).shape == (301, 0)
+
+
+def test_what_a_fast_rig_answers_within_a_few_samples_is_spanned() -> None:
+    """Levels, each held for long, and an answer one sample late, or two, and nothing besides."""
+    rng, t = np.random.default_rng(0), 0.005 * np.arange(1000)
+    u = np.repeat(rng.uniform(-6.0, 6.0, 40), 25)
+    columns = past_inputs(t, [(t, u)], 0.0, DEFAULTS.detection)
+    steps = np.concatenate([[0.0], np.diff(u)])
+    for late in (1, 2, 3):
+        answer = np.concatenate([np.zeros(late), steps[:-late]])
+        rest = answer - columns @ (columns.T @ answer)
+        assert np.linalg.norm(rest) < 0.2 * np.linalg.norm(answer)
 
 
 def test_without_a_natural_rate_inputs_act_over_a_twentieth_of_the_record() -> None:

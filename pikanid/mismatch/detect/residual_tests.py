@@ -29,6 +29,7 @@ SPANNED = 1e-4  # numerical: of a sign's length, that rounding leaves of what pa
 REPEATED = 1e-3  # numerical: of the largest singular value: what is below repeats other columns
 ROOT = 1e-7  # numerical: single precision, in which draws are made
 BELOW_NYQUIST = 0.9  # numerical: share of half the sampling rate up to which a sine is resolved
+AT_ONCE = 4  # numerical: samples within which a fast rig has answered
 NODES, WEIGHTS = roots_hermitenorm(21)  # numerical: means over a normal error of ln power
 WEIGHTS = WEIGHTS / WEIGHTS.sum()
 
@@ -188,7 +189,8 @@ def frequency_bands(t: np.ndarray, rate: float, settings: DetectionSettings) -> 
 
 def past_inputs(t: np.ndarray, inputs: list[tuple[np.ndarray, np.ndarray]], rate: float,
                 settings: DetectionSettings) -> np.ndarray:
-    """Orthonormal columns (N, k): each input (times, values) at lags up to a natural period.
+    """Orthonormal columns (N, k): each input (times, values) at lags up to a natural period, and a
+    few samples ago: a rig that is as fast as its sampling answers there and nowhere else.
 
     Args:
         t: (N,) [s].
@@ -197,8 +199,10 @@ def past_inputs(t: np.ndarray, inputs: list[tuple[np.ndarray, np.ndarray]], rate
         settings: Number and reach of the lags.
     """
     period = 2 * np.pi / rate if rate else (t[-1] - t[0]) / settings.spans
+    lags = np.concatenate([np.linspace(0, period, settings.lags),
+                           float(np.median(np.diff(t))) * np.arange(1, AT_ONCE + 1)])
     columns = [np.interp(t - lag, time, values, left=values[0])
-               for time, values in inputs for lag in np.linspace(0, period, settings.lags)]
+               for time, values in inputs for lag in lags]
     if not columns:
         return np.empty((len(t), 0))
     stacked = np.stack(columns, axis=1)

@@ -13,8 +13,8 @@ from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.explanations import Explanations, explanations, lasting
-from pikanid.mismatch.judge.kinds import kinds_in, members
-from pikanid.mismatch.judge.partial import Doubtful, Part, Present, surely_there
+from pikanid.mismatch.judge.kinds import Kind, kinds_in, members
+from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, surely_there
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.neighbours import (
     Job,
@@ -167,6 +167,15 @@ def _without_shares(part: Part, likely: Sequence[Candidate]) -> Part:
             return f"{walls[p.kind.place]}, whose form is not sure, takes energy out"
         return ""
 
-    return replace(part, present=tuple(p for p in part.present if not why_not(p)), doubtful=(
+    return replace(part, present=tuple(
+        _or_its_curve(p) for p in part.present if not why_not(p)), doubtful=(
         *part.doubtful, *(Doubtful(p.kind, p.effect, why) for p in part.present
                           if (why := why_not(p)))))
+
+
+def _or_its_curve(p: Present) -> Present:
+    """Of a scale that bends, that it is there or a curve: either has a slope."""
+    if p.family != "gain" or p.effect.known or p.instead is not None:
+        return p
+    curve: Family = "input curve" if p.effect.channel == "input" else "sensor curve"
+    return replace(p, names=(), instead=Instead(Kind(curve), p.effect))

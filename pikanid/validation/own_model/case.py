@@ -59,9 +59,10 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
         seen = bench.outputs(acting(hidden, key), experiment)
         spoilt = {n: y + scene.sigma[n] * noisy.standard_normal(len(y)) for n, y in seen.items()}
         recordings[f"{order.name}_{key}.csv"] = _csv(experiment, rig, spoilt)
-    without = [bench.fitted(truth, [h for h in hidden if h is not one]) for one in hidden]
+    without = [bench.fitted(truth, [h for h in hidden if h is not one], sure=True)
+               for one in hidden]
     alone = [fit.distance for fit in without]
-    nominal = bench.fitted(truth, []).distance if len(hidden) > 1 else sum(alone)
+    nominal = bench.fitted(truth, [], sure=True).distance if len(hidden) > 1 else sum(alone)
     rival: tuple[tuple[str, ...], float] = ((), np.inf)
     if hidden:
         rival = bench.nearest(truth, hidden, without, laws, rng)

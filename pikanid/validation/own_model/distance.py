@@ -15,8 +15,10 @@ from pikanid.validation.concealed.arrays import Array
 from pikanid.validation.own_model.plant import Plant
 
 STEP = 1e-5  # numerical: relative, of a finite difference through the simulator
-MOST_FITS = 12  # numerical: evaluations of a refit, each with a Jacobian
-ENOUGH = 1e-3  # numerical: relative, of χ²: a step that changes it by less ends a refit
+MOST_FITS = 12  # numerical: evaluations of a rival's refit, each with a Jacobian
+ENOUGH = 1e-3  # numerical: relative, of χ²: a step that changes it by less ends a rival's refit
+# of a refit without what hides, along valleys that its absence opens
+MOST_SURE, SURE = 60, 1e-5  # numerical: the same
 FAR = 1e6  # numerical: [σ] in place of a residual of a motion that diverges
 
 
@@ -72,7 +74,7 @@ def beyond(change: Array, directions: Array) -> tuple[float, Array]:
 
 
 def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str, float]],
-          free: Sequence[str]) -> Fit:
+          free: Sequence[str], sure: bool = False) -> Fit:
     """The least-squares distance of a model from a truth (rows,) without noise.
 
     Args:
@@ -81,6 +83,7 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
         truth: Whitened.
         starts: Values of all parameters that are not the model's own; the nearest one is taken.
         free: Names of those that are fitted, within their bounds.
+        sure: Whether to go on along a valley, however long.
     """
     plant = Plant(model)
     bounds = {p.name: p.bounds for p in model.parameters}
@@ -108,6 +111,6 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
     inside = np.where(inside == low / scale, inside + 1e-6, inside)
     inside = np.where(inside >= high / scale, high / scale - 1e-6, inside)
     found = least_squares(left, inside, bounds=(low / scale, high / scale),
-                          diff_step=np.full(len(free), STEP), ftol=ENOUGH,
-                          max_nfev=MOST_FITS)
+                          diff_step=np.full(len(free), STEP), ftol=SURE if sure else ENOUGH,
+                          max_nfev=MOST_SURE if sure else MOST_FITS)
     return Fit(float(np.sqrt(2 * found.cost)), at(found.x))

@@ -168,13 +168,13 @@ class Workbench:
         return best
 
     def fitted(self, truth: Array, hidden: Sequence[Hidden],
-               start: Mapping[str, float] = NOWHERE) -> Fit:
+               start: Mapping[str, float] = NOWHERE, sure: bool = False) -> Fit:
         """The model with these laws, all of them refitted to a truth, from their values or from a
-        `start`.
+        `start`; `sure`: along any valley.
         """
         known = self.at(hidden)
         return refit(self.extended(hidden), self.scene, truth, [known, {**known, **start}],
-                     self._free(hidden))
+                     self._free(hidden), sure)
 
     def _free(self, hidden: Sequence[Hidden]) -> list[str]:
         """Names of what is fitted with these laws."""
