@@ -50,7 +50,11 @@ channel, of right answers: of several hypotheses, of the one that is the truth. 
 Wilson's at 95 %. Each round has seeds of its own; what the first one found wrong was looked
 at before the second. Which families a product of input and state and a loss with a limit belong to
 was written down after the second one was answered: two partial answers, each with the hidden
-formula itself, had counted as wrong."""
+formula itself, had counted as wrong. How visible an effect is, and with it what is nameable or
+missed, was found by refits of the nominal model that ended amid valleys: a scale error that an
+inertia takes up can count as strong. Sets made from now on go along them. The sets of the drive
+and of the motor at 5 % in round 2 were answered before answers within a few samples of a step were
+looked for."""
 
 
 def main(folder: str, *names: str) -> None:
