@@ -10,14 +10,17 @@ import pytest
 
 from pikanid.mismatch.steps.reporting import _proof
 
-BASE, BEST = SimpleNamespace(noise=9.0), SimpleNamespace(noise=1.5)
+MET, NOT_MET = (SimpleNamespace(name=n, parameters=[SimpleNamespace(name=f"p_{n}")])
+                for n in ("a drag", "a limit"))
+BASE, BEST = SimpleNamespace(noise=9.0), SimpleNamespace(noise=1.5, effects=(MET, NOT_MET))
 T = np.arange(3.0)
 
 
 def held(rmse: float) -> Any:
     return SimpleNamespace(
         rmse={"y": rmse}, rmse_moved={"y": 0.9 * rmse}, t=T, measured=T + 1, predicted=rmse * T,
-        moved=T - 1, detection=SimpleNamespace(p_value=0.25), residuals=())
+        moved=T - 1, inert=frozenset({"p_a limit"}), detection=SimpleNamespace(p_value=0.25),
+        residuals=())
 
 
 def case(later: bool = True, lost: object = None) -> Any:
@@ -31,9 +34,9 @@ def case(later: bool = True, lost: object = None) -> Any:
 @pytest.mark.parametrize(("verdict", "noise"), [
     ("named", 0.75), ("set", 0.75), ("unconfirmed", 0.5), ("unnamed", 0.5)])
 def test_all_that_a_name_leaves_is_noise(verdict: str, noise: float) -> None:
-    answer: Any = SimpleNamespace(verdict=verdict)
+    answer: Any = SimpleNamespace(verdict=verdict, given=(BEST,))
     proof = _proof(case(), answer, BEST)  # type: ignore[arg-type]  # a stand-in
-    assert proof is not None
+    assert proof is not None and proof.not_met == ("a limit",)
     found = proof.outputs["y"]
     assert (found.before, found.after, found.noise, found.unit) == (4.0, 2.0, noise, "m")
     assert found.moved == pytest.approx(1.8) and proof.p_value == 0.25
