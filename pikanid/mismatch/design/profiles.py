@@ -81,7 +81,7 @@ def motion(u: Array, dt: float) -> tuple[Array, Array]:
 
 def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 20.0,
              dt: float = 0.01, quiet: float = 2.0, channel: str = "u_x", unit: str = "m/s^2",
-             draws: int = 3, seed: int = 0, limits: Range | None = None) -> list[Recording]:
+             draws: int = 3, seed: int = 0, span: Range | None = None) -> list[Recording]:
     """Candidates for an experiment, each at its largest feasible size and at a third of it.
 
     Args:
@@ -94,7 +94,7 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
         unit: Of the input.
         draws: Random versions of each kind.
         seed: Of what is random.
-        limits: Least and largest value of an input that is no acceleration, in place of bounds.
+        span: Least and largest value of an input that is no acceleration, in place of bounds.
 
     Raises:
         BadSetting: If no time is left after the rest, or the sampling is too coarse for
@@ -112,11 +112,11 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
     rng = np.random.default_rng(seed)
     made = []
     for draw in range(draws):
-        for name, u in _drawn(rng, t, first, frequency, dt, limits is None):
-            share = HAIR * (bounds.share(u, dt) if limits is None else 1.0 / np.abs(u).max())
+        for name, u in _drawn(rng, t, first, frequency, dt, span is None):
+            share = HAIR * (bounds.share(u, dt) if span is None else 1.0 / np.abs(u).max())
             for size, word in ((1.0, "full"), (PART, "a third")):
                 shape = u * share * size
-                values = _rounded(shape if limits is None else within(shape, limits))
+                values = _rounded(shape if span is None else within(shape, span))
                 title = f"{name}, {word if word == 'a third' else 'full size'}"
                 made.append(Recording.from_arrays(
                     t, {channel: values}, {channel: unit}, hold={channel: "zero"},
@@ -144,7 +144,7 @@ def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: f
     frequency = min(frequency, RESOLVED / dt)
     made = {i.name: profiles(
         frequency, bounds, duration, dt, min(REST[0], REST[1] * duration), i.name, i.unit,
-        seed=seed, limits=known.get(i.name)) for i in (first, *others)}
+        seed=seed, span=known.get(i.name)) for i in (first, *others)}
     count = len(made[first.name])
     return [profile.with_channels(*(
         made[other.name][(k + 2 * shift) % count][other.name]

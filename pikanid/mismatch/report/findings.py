@@ -126,8 +126,8 @@ class Curves:
 @dataclass(frozen=True, eq=False)
 class Proof:
     """Held-out record: errors of each output by name, p-value, the curves of each by name, the
-    names of the recordings, and those of the effects given first that are not met there: where the
-    train recordings go on they are confirmed.
+    names of the recordings, and those of the effects given first that are not met there: these
+    only the train recordings can confirm, where they go on.
     """
 
     outputs: Mapping[str, OutputError]

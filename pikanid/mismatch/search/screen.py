@@ -95,6 +95,20 @@ def best_level(h: Hypothesis, candidate: Candidate, point: Mapping[str, float]) 
     return Start({**point, **best}, {**point, **best})
 
 
+def _taken(about: Hypothesis, D: np.ndarray) -> np.ndarray:
+    """(n, d) by how much parameters move for signs D (rows, d): as far as these show that, and each
+    within a few times its own size, as a valley's end lies beyond all that is linear.
+    """
+    own = np.abs([(f.guess, v) for f, v in zip(
+        about.whitened.problem.free, about.minimum.theta, strict=True)]).max(axis=1)
+    M = np.vstack([about.movable, np.diag(np.divide(1.0, own, out=np.zeros_like(own),
+                                                    where=own > 0))])
+    norms = np.linalg.norm(M, axis=0)
+    norms[norms < UNSEEN] = np.inf
+    scaled = np.linalg.lstsq(M / norms, np.vstack([D, np.zeros((len(own), D.shape[1]))]), SPANNED)
+    return np.asarray(scaled[0] / norms[:, None])
+
+
 class Screen:
     """What each candidate would take away from a residual, to first order.
 
@@ -115,11 +129,7 @@ class Screen:
         allowed = good & ((self.z > 0) | ~self.found.one_sided)
         self.gain = np.where(allowed, self.z**2, 0.0)
         self.names = [f.label for f in about.whitened.problem.free]
-        norms = np.linalg.norm(about.movable, axis=0)
-        norms[norms < UNSEEN] = np.inf
-        # what the parameters take up of each sign, as far as they are seen and told apart
-        scaled = np.linalg.lstsq(about.movable / norms, self.found.D, SPANNED)[0]
-        self.taken = scaled / norms[:, None]
+        self.taken = _taken(about, self.found.D)
 
     def best(self, candidate: int, count: int = 1) -> list[int]:
         """A candidate's most telling signs, no two neighbours."""
