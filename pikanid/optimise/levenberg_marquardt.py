@@ -17,6 +17,7 @@ from pikanid.approximators import Array
 from pikanid.optimise.box import box_minimum
 
 TRIES = 8  # limit: dampings of one step
+NEAR = 1e-2  # numerical: change of |r| within which a parameter is at its bound
 Evaluate = Callable[[Array], tuple[Array, Array] | None]
 GiveUp = Callable[[int, float, float], bool]  # number of an iteration, |r|² before and after it
 
@@ -59,8 +60,12 @@ class Minimum:
         return float(self.r @ self.r)
 
     def movable(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """(rows, n) the Jacobian, with zeros for parameters that a bound (n,) holds."""
-        return np.where(held(self.theta, self.J.T @ self.r, lower, upper), 0.0, self.J)
+        """(rows, n) the Jacobian, with zeros for parameters that a bound (n,) holds, at it
+        or so close that the way to it hardly changes the residual.
+        """
+        near = NEAR / np.maximum(np.linalg.norm(self.J, axis=0), 1e-300)
+        return np.where(held(self.theta, self.J.T @ self.r, lower + near, upper - near),
+                        0.0, self.J)
 
 
 @dataclass(frozen=True, eq=False)

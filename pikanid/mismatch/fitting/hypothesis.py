@@ -137,17 +137,24 @@ class Hypothesis:
     @property
     def covariance(self) -> np.ndarray:
         """(n, n) of the estimates; infinite variances become very large ones."""
-        J = self.minimum.J
-        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-100)
-        _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
-        inverse = vt.T / np.maximum(s, 1e-9 * (s[0] or 1.0) if len(s) else 1.0) ** 2 @ vt
-        return np.asarray(inverse / np.outer(norms, norms))
+        return _inverse(self.minimum.J)
 
-    @property
-    def std(self) -> dict[str, float]:
-        """Standard errors by name."""
+    @functools.cached_property
+    def orders(self) -> np.ndarray:
+        """(n, n) rows of a normal prior: no parameter of the model leaves its order of magnitude.
+        Along a valley that the recording does not close, what holds to first order ends there.
+        """
         free = self.whitened.problem.free
-        return {f.name: float(v) for f, v in zip(free, np.sqrt(np.diag(self.covariance)),
+        effects = {p.name for e in self.effects for p in e.parameters}
+        sizes = np.array([0.0 if f.name in effects else max(abs(f.guess), abs(v))
+                          for f, v in zip(free, self.minimum.theta, strict=True)])
+        return np.diag(np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0))
+
+    @functools.cached_property
+    def std(self) -> dict[str, float]:
+        """Standard errors by name, where the model's parameters keep their order of magnitude."""
+        variances = np.diag(_inverse(np.vstack([self.minimum.J, self.orders])))
+        return {f.name: float(v) for f, v in zip(self.whitened.problem.free, np.sqrt(variances),
                                                  strict=True)}
 
     def improves_on(self, known: Hypothesis) -> bool:
@@ -159,6 +166,14 @@ class Hypothesis:
     def score(self, scale: float = 1.0) -> float:
         """The criterion: smaller is better; `scale` divides χ² where noise is underestimated."""
         return self.minimum.chi2 / scale + self.penalty
+
+
+def _inverse(J: np.ndarray) -> np.ndarray:
+    """(JᵀJ)⁻¹ (n, n) of J (rows, n), as far as its columns are seen and told apart."""
+    norms = np.maximum(np.linalg.norm(J, axis=0), 1e-100)
+    _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
+    inverse = vt.T / np.maximum(s, 1e-9 * (s[0] or 1.0) if len(s) else 1.0) ** 2 @ vt
+    return np.asarray(inverse / np.outer(norms, norms))
 
 
 def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:

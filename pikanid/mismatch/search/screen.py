@@ -96,17 +96,14 @@ def best_level(h: Hypothesis, candidate: Candidate, point: Mapping[str, float]) 
 
 
 def _taken(about: Hypothesis, D: np.ndarray) -> np.ndarray:
-    """(n, d) by how much parameters move for signs D (rows, d): as far as these show that, and each
-    within a few times its own size, as a valley's end lies beyond all that is linear.
+    """(n, d) by how much parameters move for signs D (rows, d): as far as they are seen and told
+    apart, and the model's within their order of magnitude.
     """
-    own = np.abs([(f.guess, v) for f, v in zip(
-        about.whitened.problem.free, about.minimum.theta, strict=True)]).max(axis=1)
-    M = np.vstack([about.movable, np.diag(np.divide(1.0, own, out=np.zeros_like(own),
-                                                    where=own > 0))])
+    M = np.vstack([about.movable, about.orders])
     norms = np.linalg.norm(M, axis=0)
     norms[norms < UNSEEN] = np.inf
-    scaled = np.linalg.lstsq(M / norms, np.vstack([D, np.zeros((len(own), D.shape[1]))]), SPANNED)
-    return np.asarray(scaled[0] / norms[:, None])
+    wanted = np.vstack([D, np.zeros((len(M) - len(D), D.shape[1]))])
+    return np.asarray(np.linalg.lstsq(M / norms, wanted, SPANNED)[0] / norms[:, None])
 
 
 class Screen:
