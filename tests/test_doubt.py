@@ -55,11 +55,15 @@ def test_another_motion_proves_a_spring(hypotheses: tuple[Case, list[Hypothesis]
 
 def test_a_size_that_may_be_nothing_is_not_sure(
         hypotheses: tuple[Case, list[Hypothesis]], monkeypatch: pytest.MonkeyPatch) -> None:
-    """However much it gains: it stands for something that other parameters nearly do as well."""
+    """However much it gains: it stands for a parameter that a bound holds without it.  Where none
+    is held, the fit without it has said how much it gains, also where that is no parabola.
+    """
     case, ranked = hypotheses
     size = ranked[0].values["k3"]
-    for error, sure in ((size / 4.0, True), (size / 2.0, False)):
+    for error, pinned, sure in ((size / 4.0, True, True), (size / 2.0, True, False),
+                                (size / 2.0, False, True)):
         monkeypatch.setattr(Hypothesis, "std", {"k3": error})
+        monkeypatch.setattr(Hypothesis, "pinned", pinned)
         said, _ = doubt(case, ranked, moved(2))
         assert sure == (said == "") and sure != ("may be nothing" in said)
 

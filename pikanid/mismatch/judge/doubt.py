@@ -25,9 +25,11 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     holds leave nothing beside it that a test would find; a minor one beside what explains most can
     be whatever else the rig has that nobody modelled.  The held-out recording has to be one that
     could have refuted it; a limit that it does not meet has to be met again where the train
-    recordings go on.  And it has to speak for each of several: one is easily found that takes
-    up what the others leave, whatever that is.  What happens once, of which it cannot speak, takes
-    up anything: there, what lasts must not do most of that as well and predict as well.
+    recordings go on.  And it has to speak for each of several: one is easily found that takes up
+    what the others leave, whatever that is.  Where a bound holds a parameter without the effect,
+    the effect may do what that parameter is kept from: its own error has to say that there is any.
+    What happens once, of which it cannot speak, takes up anything: there, what lasts must not do
+    most of that as well and predict as well.
 
     Args:
         h: To prove.
@@ -53,7 +55,8 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
 
     minor = asks.minor * gained(fits[frozenset()])
     for e in h.effects:
-        if said := no_size(e, h, 1.0, settings):
+        rest = h.key - {e.key}
+        if rest in fits and fits[rest].pinned and (said := no_size(e, h, 1.0, settings)):
             return said
         sizes = [p for p in e.parameters if p.free]
         if h.symbolic and len(sizes) > 1:
@@ -61,7 +64,6 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
             if below(abs(size), asks.sized * error):
                 return (f"the recording does not determine {sizes[0].name} of {e.name} ({size:.3g} "
                         f"with a standard error of {error:.2g}): other forms do as well")
-        rest = h.key - {e.key}
         count = max(len(h.effects), len(e.covers) if h.symbolic else 1)
         asked = asks.strong[count - 1] * louder
         # a formula that is the sum of two entries must need both

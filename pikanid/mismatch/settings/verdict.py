@@ -41,7 +41,8 @@ class VerdictSettings:
         once: Share of what an effect that happens once takes away beside others that one that lasts
             may take away in its place.
         sized: Standard errors from nothing that the size of an effect of one parameter must be:
-            what gains much and still may be nothing stands for something else.
+            what gains much and still may be nothing stands for something else, for a parameter
+            that a bound holds without it, or for a part of the remainder.
         worse: Times the nominal held-out RMSE: no proof, whatever errors of parameters forgive.
         linear: Standard deviations that a linearisation holds for: beyond, it is renewed.
         missed: [χ²] that a fit to all recordings may exceed fits to each by, where it is best.
