@@ -141,14 +141,16 @@ class Hypothesis:
 
     @functools.cached_property
     def orders(self) -> np.ndarray:
-        """(n, n) rows of a normal prior: no parameter of the model leaves its order of magnitude.
-        Along a valley that the recording does not close, what holds to first order ends there.
+        """(n, n) rows of a normal prior: no parameter of the model that has a sign leaves its order
+        of magnitude, or the error that it has where all others are known.  Along a valley that the
+        recording does not close, what holds to first order ends there.
         """
-        free = self.whitened.problem.free
         effects = {p.name for e in self.effects for p in e.parameters}
-        sizes = np.array([0.0 if f.name in effects else max(abs(f.guess), abs(v))
-                          for f, v in zip(free, self.minimum.theta, strict=True)])
-        return np.diag(np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0))
+        signed = np.array([f.name not in effects and (f.bounds[0] >= 0 or f.bounds[1] <= 0)
+                           for f in self.whitened.problem.free], bool)
+        sizes = np.abs([self.whitened.problem.guess, self.minimum.theta]).max(axis=0)
+        alone = 1.0 / np.maximum(np.linalg.norm(self.minimum.J, axis=0), 1e-100)
+        return np.diag(np.where(signed, 1.0 / np.maximum(sizes, alone), 0.0))
 
     @functools.cached_property
     def std(self) -> dict[str, float]:

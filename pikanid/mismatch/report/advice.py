@@ -108,8 +108,8 @@ def _best(models: Mapping[str, Model], records: Records, driven: Input, rate: fl
             offered = profiles(min(rate / (2 * np.pi), settings.budget.profile_rate),
                                duration=settings.budget.profile, channel=driven.name,
                                unit=driven.unit, draws=1,
-                               span=ranges_of([driven], None, records.recordings, False
-                                                ).get(driven.name))
+                               span=ranges_of([driven], None, records.recordings, False).get(
+                                   driven.name))
             return next_experiment(models, recorded, sigma, offered, workers=workers,
                                    settings=settings)
         except errors.PikanidError:
