@@ -89,7 +89,7 @@ def test_effects_show_where_the_model_was_given_if_what_is_missing_has_led_it_aw
     case = open_case(pk.systems.dc_motor(), (train,), (later,), None, lambda text: None, DEFAULTS)
     current = next(s for s in case.sites if s.v == "i")
     assert not current.shown and 1.0 < current.usual_speed < 12.0
-    about = fitted(case.model, [], case.records, [case.search.guess], 30)
+    about = fitted(case.model, [], case.records, [case.records.guess], 30)
     assert about is not None and led_away(case.base, about) and not led_away(about, about)
     ranked = searched(case, lambda text: None)
     assert ranked[0].key == {"coulomb_friction[rounded]_i"}

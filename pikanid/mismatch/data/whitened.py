@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,13 +26,14 @@ FINEST, COARSEST = 64, 16  # numerical: steps a sample, at most; of a motion tha
 
 @dataclass(frozen=True)
 class Records:
-    """Recordings as they are judged: without outliers, each output with its noise level, and by
-    which settings.
+    """Recordings as they are judged: without outliers, each output with its noise level, by which
+    settings, and what the nominal model's parameters were given as, which tells their sizes.
     """
 
     recordings: tuple[Recording, ...]
     levels: tuple[dict[str, NoiseModel], ...]
     settings: Settings
+    guess: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def spread(self) -> float:

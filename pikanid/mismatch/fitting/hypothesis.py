@@ -145,10 +145,12 @@ class Hypothesis:
         of magnitude, or the error that it has where all others are known.  Along a valley that the
         recording does not close, what holds to first order ends there.
         """
+        free, given = self.whitened.problem.free, self.whitened.records.guess
         effects = {p.name for e in self.effects for p in e.parameters}
         signed = np.array([f.name not in effects and (f.bounds[0] >= 0 or f.bounds[1] <= 0)
-                           for f in self.whitened.problem.free], bool)
-        sizes = np.abs([self.whitened.problem.guess, self.minimum.theta]).max(axis=0)
+                           for f in free], bool)
+        sizes = np.array([max(abs(given.get(f.name, f.guess)), abs(v))
+                          for f, v in zip(free, self.minimum.theta, strict=True)])
         alone = 1.0 / np.maximum(np.linalg.norm(self.minimum.J, axis=0), 1e-100)
         return np.diag(np.where(signed, 1.0 / np.maximum(sizes, alone), 0.0))
 
@@ -240,6 +242,17 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         if other != found.effects and not beyond(found.minimum.chi2):
             found = _instead(found, other, nominal, closest, limit, beyond) or found
     return found
+
+
+def unfitted(nominal: Model, records: Records, values: Mapping[str, float]) -> Hypothesis | None:
+    """The nominal model at these parameters as they are; None where that cannot be simulated."""
+    whitened = Whitened(nominal, records)
+    theta = place(whitened, values)
+    found = whitened.residual(theta) if whitened.choose_steps(
+        theta, misfit=records.settings.fits.gross) else None
+    if found is None or not all(np.isfinite(part).all() for part in found):
+        return None
+    return Hypothesis((), nominal, whitened, Minimum(theta, *found, False), 0.0)
 
 
 def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, closest: Closest,

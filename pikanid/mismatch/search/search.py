@@ -14,7 +14,7 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below, in_order
 from pikanid.mismatch.fitting.descent import Start
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, unfitted
 from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
 from pikanid.mismatch.search import neighbours
@@ -43,7 +43,6 @@ class Search:
         begun: Where fits have begun.
         failed_searches: Effects that were looked for beyond all hills, and explained nothing.
         screens: What may be added to hypotheses, by their fits and the candidates.
-        guess: Parameters that the nominal model was given with.
         workers: Threads that fit side by side; the results do not depend on their number.
     """
 
@@ -52,7 +51,6 @@ class Search:
     candidates: tuple[Candidate, ...]
     tell: Callable[[str], None] = lambda text: None
     predicts: Callable[[Hypothesis, Hypothesis], bool] = lambda fewer, more: True
-    guess: Mapping[str, float] = field(default_factory=dict)
     fits: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     begun: set[object] = field(default_factory=set)
     failed_searches: set[frozenset[str]] = field(default_factory=set)
@@ -87,7 +85,7 @@ class Search:
         every, budget = [c for c in self.candidates if c.fits and c.suits()], self.settings.budget
         self.tell("single effects")
         for count in range(budget.nominal_again):
-            screen = Screen(base := self.base(), every, self.guess)
+            screen = Screen(base := self.base(), every, self.records.guess)
             self._fit_all([((c,), starts) for c, starts in screen.singles(
                 budget.singles, always=entry if base.far else law)], again=count > 0, always=True)
             self._fit_all([((), [h.point]) for h in neighbours.leading(self.ranked())[
@@ -95,15 +93,16 @@ class Search:
             if self.base() is base:
                 break  # else effects had led out of a minimum that only the nominal model was in
         # where what is missing has led the nominal model away, effects show about the guess
-        about = fitted(self.nominal, (), self.records, [self.guess], self.choices,
+        about = fitted(self.nominal, (), self.records, [self.records.guess], self.choices,
                        Closest(self._closest_chi2()))
-        if about is not None and neighbours.led_away(self.base(), about):
-            self._fit_all([((c,), starts) for c, starts in Screen(about, every).singles(
+        given = unfitted(self.nominal, self.records, self.records.guess)
+        for other in neighbours.other_places(self.base(), about, given):
+            self._fit_all([((c,), starts) for c, starts in Screen(other, every).singles(
                 budget.singles)], again=True, always=True, reach=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
         self._simplify()
         if not adequate(best := self.ranked()[0]):
-            self._fit_all([*neighbours.afresh(best, self.guess)], again=True)
+            self._fit_all([*neighbours.afresh(best, self.records.guess)], again=True)
         if not adequate(self.ranked()[0]):
             self.tell("pairs of effects")
             self._fit_all(screen.pairs(budget.pairs))
@@ -116,7 +115,7 @@ class Search:
         close = settings.verdict.indistinct
         for count in range(1, budget.effects):
             if not adequate(best := self.ranked()[0]):
-                self._fit_all([*neighbours.afresh(best, self.guess)], again=True)
+                self._fit_all([*neighbours.afresh(best, self.records.guess)], again=True)
             if adequate(best := self.ranked()[0]) or self.budget_exhausted:
                 break
             self.tell(f"{count + 1} effects together")

@@ -111,8 +111,8 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     own = bound_to(effects, found, records.recordings, motion)
     found = reserved(found, own)
     listed = catalogue_of(found, own)
-    search = Search(nominal, records, listed, tell,
-                    guess={n: model.parameter(n).value for n in model.free_names})
+    records = replace(records, guess={n: model.parameter(n).value for n in model.free_names})
+    search = Search(nominal, records, listed, tell)
     base = search.base()
     alone = tuple(c for c in listed if c.suits())
     case = Case(nominal, records, held, proves, found, alone, search, base, before, notes, {}, {},
