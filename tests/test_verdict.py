@@ -59,12 +59,12 @@ def rounded(value: float) -> float:
 
 def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothesis:
     """A fit of 1 ± 0.01 that leaves χ², at a price of 14 for each effect; its noise's doubt."""
-    free = [SimpleNamespace(name=n, label=n) for n in (
+    free = [SimpleNamespace(name=n, label=n, guess=1.0, bounds=(-np.inf, np.inf)) for n in (
         "length", "damping", *(p.name for e in effects for p in e.parameters))]
     r = np.full(ROWS, np.sqrt(chi2 / ROWS))
     whitened = cast(Whitened, SimpleNamespace(
-        rows=ROWS, problem=SimpleNamespace(free=free), records=SimpleNamespace(spread=spread),
-        settings=DEFAULTS))
+        rows=ROWS, problem=SimpleNamespace(free=free, lower=-np.inf, upper=np.inf),
+        records=SimpleNamespace(spread=spread, guess={}), settings=DEFAULTS))
     found = Minimum(np.ones(len(free)), r, 100.0 * np.eye(ROWS, len(free)), True)
     return Hypothesis(tuple(effects), sloshing(), whitened, found, 14.0 * len(effects))
 
