@@ -57,6 +57,23 @@ def test_what_the_data_do_not_tell_does_not_move_the_rest() -> None:
     assert found.theta[2] == 0.0 and found.theta[0] + found.theta[1] == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize(("sizes", "found"), [(None, False), (np.array([np.inf, 2.0]), True)])
+def test_a_step_stays_where_a_parameter_has_its_order_of_magnitude(sizes: np.ndarray | None,
+                                                                   found: bool) -> None:
+    """The second parameter hardly shows, and a stiff one cannot be simulated: without its size all
+    steps go there, until hardly any step is left for the first.
+    """
+    def shaft(q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        if not 0.0 < q[1] < 20.0:
+            return None
+        slope = np.array([[1e3 * np.exp(-q[0]), 0.0], [-1e3 * np.exp(-q[0]), 0.0], [0.0, 1e-4]])
+        return np.array([1e3 * (np.exp(-1.0) - np.exp(-q[0])), 1e3 * (np.exp(-q[0])
+                         - np.exp(-1.0)), 1e-4 * q[1] - 10.0]), slope
+
+    end = minimise(shaft, np.array([4.0, 2.0]), np.zeros(2), np.full(2, 1e9), 8, sizes=sizes)
+    assert end is not None and bool(abs(end.theta[0] - 1.0) < 1e-3) is found
+
+
 def test_no_start_and_no_step() -> None:
     box = np.zeros(1), np.ones(1)
     assert minimise(lambda q: None, np.zeros(1), *box) is None
@@ -97,3 +114,25 @@ def test_what_a_bound_holds_takes_nothing_up() -> None:
     assert inside.movable(low, high).tolist() == [[1.0, 0.0], [0.5, 0.0]]
     pulled_off = Minimum(np.array([1.0, 0.0]), r, J, True)  # χ² falls inwards
     assert pulled_off.movable(low, high).tolist() == J.tolist()
+
+
+@pytest.mark.parametrize(("steep", "start"), [(1e2, [4.0, 16.0]), (1e3, [0.0, 0.0]),
+                                              (1e4, [0.0, 0.0])])
+def test_a_step_that_failed_shows_how_a_valley_bends(steep: float, start: list[float]) -> None:
+    calls = 0
+
+    def bent(q: np.ndarray) -> Rows:
+        nonlocal calls
+        calls += 1
+        return Rows(np.array([steep * (q[1] - q[0] ** 2), 1 - q[0]]),
+                    np.array([[-2 * steep * q[0], steep], [-1.0, 0.0]]))
+
+    none, needed, ends = np.full(2, np.inf), [], []
+    for bend in (Rows.bend, None):
+        calls = 0
+        found = descend(bent, np.array(start), -none, none, 300, lambda at: 1e-16, bend=bend)
+        assert found is not None
+        needed.append(calls)
+        ends.append(float(np.abs(found.theta - 1.0).max()))
+    assert ends[0] < 1e-6
+    assert needed[0] < 0.75 * needed[1] or ends[1] > 0.5  # which never gets there

@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 
 import pikanid as pk
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
-from pikanid.mismatch.search.neighbours import afresh, led_away, with_twins
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, near_guess
+from pikanid.mismatch.search.neighbours import afresh, with_twins
+from pikanid.mismatch.search.places import led_away
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.mismatch.steps.searching import searched
@@ -89,7 +90,7 @@ def test_effects_show_where_the_model_was_given_if_what_is_missing_has_led_it_aw
     case = open_case(pk.systems.dc_motor(), (train,), (later,), None, lambda text: None, DEFAULTS)
     current = next(s for s in case.sites if s.v == "i")
     assert not current.shown and 1.0 < current.usual_speed < 12.0
-    about = fitted(case.model, [], case.records, [case.records.guess], 30)
+    about = near_guess(case.model, case.records)
     assert about is not None and led_away(case.base, about) and not led_away(about, about)
     ranked = searched(case, lambda text: None)
     assert ranked[0].key == {"coulomb_friction[rounded]_i"}

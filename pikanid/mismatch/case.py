@@ -123,7 +123,7 @@ class Case:
         if not whitened.choose_steps(h.minimum.theta):
             return False
         found = minimise(whitened.residual, h.minimum.theta, problem.lower, problem.upper,
-                         self.settings.budget.noise_refit)
+                         self.settings.budget.noise_refit, sizes=whitened.sizes)
         return found is not None and residual_tests(
             whitened, found.theta, found.r, found.movable(problem.lower, problem.upper),
             self.candidates, self.rate

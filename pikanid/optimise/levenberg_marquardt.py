@@ -1,7 +1,9 @@
 """Levenberg-Marquardt within bounds, that stops where statistics do: at a hundredth of χ².
 
 A step minimises the damped quadratic model inside the box, so that bounds hold exactly and a
-parameter may be held by two equal ones.
+parameter may be held by two equal ones.  A step that has left a bent valley tells how the residual
+bends, and is taken once more with that (the second-order correction of M. K. Transtrum and
+J. P. Sethna, arXiv:1201.5885, from the step that failed).
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ from pikanid.approximators import Array
 from pikanid.optimise.box import box_minimum
 
 TRIES = 8  # limit: dampings of one step
+FIRST, LEAST, AGAIN = 1e-3, 1e-9, 1e-6  # numerical: damping at first, at least, after a failure
+BENT = 0.1  # numerical: of a step, that a correction to second order may change it by
+UNSEEN = 1e-6  # numerical: change of |r| that a parameter's own size makes, at least
 NEAR = 1e-2  # numerical: change of |r| within which a parameter is at its bound
 Evaluate = Callable[[Array], tuple[Array, Array] | None]
 GiveUp = Callable[[int, float, float], bool]  # number of an iteration, |r|² before and after it
@@ -59,18 +64,21 @@ class Minimum:
         """Sum of squares."""
         return float(self.r @ self.r)
 
-    def movable(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """(rows, n) the Jacobian, with zeros for parameters that a bound (n,) holds, at it
-        or so close that the way to it hardly changes the residual.
+    def pinned(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        """(n,) whether a bound (n,) holds a parameter, at it or so close that the way to it hardly
+        changes the residual.
         """
         near = NEAR / np.maximum(np.linalg.norm(self.J, axis=0), 1e-300)
-        return np.where(held(self.theta, self.J.T @ self.r, lower + near, upper - near),
-                        0.0, self.J)
+        return held(self.theta, self.J.T @ self.r, lower + near, upper - near)
+
+    def movable(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        """(rows, n) the Jacobian, with zeros for parameters that a bound (n,) holds."""
+        return np.where(self.pinned(lower, upper), 0.0, self.J)
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """A residual (rows,) and its Jacobian (rows, n)."""
+    """A residual r (rows,) and its Jacobian J (rows, n)."""
 
     r: Array
     J: Array
@@ -84,13 +92,18 @@ class Rows:
         """JᵀJ (n, n) and Jᵀr (n,)."""
         return self.J.T @ self.J, self.J.T @ self.r
 
+    def bend(self, there: Rows, change: Array) -> Array:
+        """Jᵀ (n,) times what r after a change (n,) of θ has that J does not foretell."""
+        return self.J.T @ (there.r - self.r - self.J @ change)
+
 
 def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit: int = 30,
-             tolerance: float = 0.02, give_up: GiveUp = lambda count, last, cost: False
-             ) -> Minimum | None:
+             tolerance: float = 0.02, give_up: GiveUp = lambda count, last, cost: False,
+             sizes: Array | None = None) -> Minimum | None:
     """Minimise |r(θ)|² within bounds; None where the start cannot be evaluated.
 
-    After each iteration it is asked whether to `give_up`.
+    After each iteration it is asked whether to `give_up`.  No step takes a parameter of known size
+    (n,) far out of its order of magnitude: to change by its size counts as an increase of one.
 
     >>> line = lambda q: (np.array([q[0] - 3.0]), np.ones((1, 1)))
     >>> found = minimise(line, np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -102,7 +115,8 @@ def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit
         return None if at is None else Rows(*at)
 
     found = descend(rows, start, lower, upper, limit, give_up=give_up,
-                    enough=lambda at: worth_a_step(at.cost, len(at.r), tolerance))
+                    enough=lambda at: worth_a_step(at.cost, len(at.r), tolerance), sizes=sizes,
+                    bend=Rows.bend)
     return None if found is None else Minimum(found.theta, found.at.r, found.at.J, found.converged)
 
 
@@ -118,7 +132,8 @@ def worth_a_step(cost: float, rows: int, tolerance: float = 0.02) -> float:
 
 def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, upper: Array,
             limit: int, enough: Callable[[At], float],
-            give_up: GiveUp = lambda count, last, cost: False) -> Descent[At] | None:
+            give_up: GiveUp = lambda count, last, cost: False, sizes: Array | None = None,
+            bend: Callable[[At, At, Array], Array] | None = None) -> Descent[At] | None:
     """Minimise a sum of squares within bounds; None where the start cannot be evaluated.
 
     Args:
@@ -129,40 +144,88 @@ def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, 
         limit: Iterations.
         enough: A decrease that is not worth another step.
         give_up: Asked after each iteration.
+        sizes: (n,) of parameters, infinite where they are not known: a step by as much counts as an
+            increase of one (a proximal term, R. T. Rockafellar, SIAM J. Control Optim. 14, 1976).
+        bend: What the slope (n,) changes by, to second order, as a step (n,) from one place to
+            another one shows.
     """
     theta = np.clip(start, lower, upper)
-    at, damping = evaluate(theta), 1e-3
+    usual = np.full(len(theta), np.inf) if sizes is None else sizes
+    at, damping = evaluate(theta), FIRST
     if at is None or len(theta) == 0:
         return None if at is None else Descent(theta, at, True)
     for count in range(limit):
-        gram, slope = at.normal()
-        norms = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
-        matrix, pull = gram / np.outer(norms, norms), slope / norms
-        low, high = (lower - theta) * norms, (upper - theta) * norms
+        about = _Quadratic(at, theta, lower, upper, usual)
+        if not np.isfinite(about.near).all():
+            break
+        damping, step = about.step(damping)
+        while about.fall(step) < enough(at) and damping > LEAST:
+            damping, step = about.step(max(damping * 0.1, LEAST))  # it may be the damping's doing
         there = None
-        for _ in range(TRIES):
-            try:
-                step = box_minimum(matrix + damping * np.eye(len(theta)), pull, low, high)
-            except LinAlgError:  # alike columns, and hardly any damping
-                damping = max(damping * 8, 1e-4)
-                continue
-            expected = -float(step @ (matrix @ step + 2 * pull))
+        for tried in range(TRIES):
+            expected = about.fall(step)
             if expected < enough(at):
-                return Descent(theta, at, True)
-            # at a wall exactly, not up to rounding
-            new = np.where(step <= low, lower, np.where(step >= high, upper, theta + step / norms))
+                return Descent(theta, at, tried == 0)
+            new = about.moved(step)
             there = evaluate(new)
+            if there is not None and there.cost >= at.cost and bend is not None:
+                other = about.corrected(step, damping, bend(at, there, new - theta))
+                if other is not None:
+                    new = about.moved(other)
+                    there = evaluate(new)
             if there is not None and there.cost < at.cost:
                 break
-            damping, there = max(damping * 8, 1e-4), None
+            there = None
+            damping, step = about.step(max(damping * 8, AGAIN))
         if there is None:
             return Descent(theta, at, False)
         before, gain = at.cost, at.cost - there.cost
-        damping = max(damping * (0.1 if gain > 0.5 * expected else 1.0), 1e-9)
+        damping = max(damping * (0.1 if gain > 0.5 * expected else 1.0), LEAST)
         theta, at = new, there
         if give_up(count + 1, before, at.cost):
             return Descent(theta, at, False)
     return Descent(theta, at, False)
+
+
+class _Quadratic:
+    """|r|² about a θ (n,) within bounds, to second order, in units of what shows of a parameter."""
+
+    def __init__(self, at: Linearised, theta: Array, lower: Array, upper: Array, usual: Array):
+        gram, slope = at.normal()
+        self.theta, self.lower, self.upper = theta, lower, upper
+        self.norms = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
+        self.matrix, self.slope = gram / np.outer(self.norms, self.norms), slope / self.norms
+        self.low, self.high = (lower - theta) * self.norms, (upper - theta) * self.norms
+        sizes = np.maximum(usual, np.abs(theta)) * self.norms
+        self.near = self.matrix + np.diag(np.maximum(sizes, UNSEEN) ** -2.0)
+
+    def step(self, damping: float) -> tuple[float, Array]:
+        """The damped step (n,), and the damping that it needed."""
+        while True:
+            try:
+                return damping, self._lowest(damping, self.slope)
+            except LinAlgError:  # alike columns, and hardly any damping
+                damping = max(damping * 8, AGAIN)
+
+    def corrected(self, step: Array, damping: float, bend: Array) -> Array | None:
+        """The step with what the slope changes by on its way; None where that is much of it."""
+        if not np.isfinite(bend).all():
+            return None
+        other = self._lowest(damping, self.slope + bend / self.norms)
+        small = np.linalg.norm(other - step) <= BENT * np.linalg.norm(step)
+        return other if small else None
+
+    def fall(self, step: Array) -> float:
+        """By how much a step lowers |r|², if nothing bends."""
+        return -float(step @ (self.matrix @ step + 2 * self.slope))
+
+    def moved(self, step: Array) -> Array:
+        """θ after a step: at a wall exactly, not up to rounding."""
+        inside = np.where(step >= self.high, self.upper, self.theta + step / self.norms)
+        return np.asarray(np.where(step <= self.low, self.lower, inside))
+
+    def _lowest(self, damping: float, slope: Array) -> Array:
+        return box_minimum(self.near + damping * np.eye(len(slope)), slope, self.low, self.high)
 
 
 def held(theta: Array, slope: Array, lower: Array, upper: Array) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -182,6 +183,15 @@ class Whitened:
         self.work += self.cost
         return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
                 for r, s in enumerate(self.simulators)]
+
+    @functools.cached_property
+    def sizes(self) -> np.ndarray:
+        """(n_free,) of the model's parameters that keep their sign, as they were given; infinite
+        for others, and where none was given.
+        """
+        given = [abs(self.records.guess.get(f.name, 0.0)) * (f.bounds[0] >= 0 or f.bounds[1] <= 0)
+                 for f in self.problem.free]
+        return np.array([size or np.inf for size in given])
 
     def motion(self, theta: np.ndarray) -> dict[str, np.ndarray]:
         """States (L,) by name, the recordings' one after the other."""

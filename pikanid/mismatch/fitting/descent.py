@@ -63,7 +63,8 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
         if guess is None:
             continue
         found = minimise(whitened.residual, guess, problem.lower, problem.upper,
-                         budget.several_starts if len(starts) > 1 else limit, give_up=give_up)
+                         budget.several_starts if len(starts) > 1 else limit, give_up=give_up,
+                         sizes=whitened.sizes)
         if found is not None and (best is None or found.chi2 < best.chi2):
             best = found
     if best is None:
@@ -75,7 +76,7 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
                                     lambda chi2: min(coarse / rows, misfit(chi2))):
             return None
         best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        give_up=give_up)
+                        give_up=give_up, sizes=whitened.sizes)
     return renewed(whitened, best, closest, limit, beyond)
 
 
@@ -103,7 +104,7 @@ def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: i
                     whitened.steps, before, strict=True)):
             break
         best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        give_up=impatient(beyond, whitened.settings))
+                        give_up=impatient(beyond, whitened.settings), sizes=whitened.sizes)
     return best
 
 
@@ -141,14 +142,15 @@ def basin_hopping(whitened: Whitened, best: Minimum, effect: Candidate, limit: i
                 theta[more[0]] += later
             found.append(minimise(whitened.residual, theta, problem.lower, problem.upper,
                                   settings.budget.several_starts,
-                                  give_up=impatient(partial(lt, best.chi2), settings)))
+                                  give_up=impatient(partial(lt, best.chi2), settings),
+                                  sizes=whitened.sizes))
         lower = min((m for m in found if m is not None), key=lambda m: m.chi2, default=best)
         if lower.chi2 > best.chi2 - settings.fits.lower_hill:
             break
         best = lower
         if not best.converged:
             best = minimise(whitened.residual, best.theta, problem.lower, problem.upper,
-                            limit) or best
+                            limit, sizes=whitened.sizes) or best
     return best
 
 

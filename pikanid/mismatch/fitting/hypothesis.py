@@ -21,12 +21,12 @@ from pikanid.mismatch.fitting.descent import (
     place,
     renewed,
 )
-from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
+from pikanid.mismatch.fitting.progressive_horizon import besides, hits, lost, progressive_horizon
 from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
-from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
+from pikanid.optimise.levenberg_marquardt import Minimum, minimise, worth_a_step
 
-NEAR = 1e-6  # numerical: of a parameter, by which an estimate at its bound may be off it
+GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,9 @@ class Hypothesis:
 
     @property
     def pinned(self) -> bool:
-        """Whether an estimate lies at a bound."""
-        problem, theta = self.whitened.problem, self.minimum.theta
-        near = NEAR * np.maximum(np.abs(theta), 1e-12)
-        return bool(np.any((theta - problem.lower < near) | (problem.upper - theta < near)))
+        """Whether a bound holds a parameter."""
+        problem = self.whitened.problem
+        return bool(np.any(self.minimum.pinned(problem.lower, problem.upper)))
 
     @functools.cached_property
     def movable(self) -> np.ndarray:
@@ -141,18 +140,13 @@ class Hypothesis:
 
     @functools.cached_property
     def orders(self) -> np.ndarray:
-        """(n, n) rows of a normal prior: no parameter of the model that has a sign leaves its order
-        of magnitude, or the error that it has where all others are known.  Along a valley that the
-        recording does not close, what holds to first order ends there.
+        """(n, n) rows of a normal prior: no parameter of known size leaves its order of magnitude,
+        or the error that it has where all others are known.  Along a valley that the recording does
+        not close, what holds to first order ends there.
         """
-        free, given = self.whitened.problem.free, self.whitened.records.guess
-        effects = {p.name for e in self.effects for p in e.parameters}
-        signed = np.array([f.name not in effects and (f.bounds[0] >= 0 or f.bounds[1] <= 0)
-                           for f in free], bool)
-        sizes = np.array([max(abs(given.get(f.name, f.guess)), abs(v))
-                          for f, v in zip(free, self.minimum.theta, strict=True)])
+        sizes = np.maximum(self.whitened.sizes, np.abs(self.minimum.theta))
         alone = 1.0 / np.maximum(np.linalg.norm(self.minimum.J, axis=0), 1e-100)
-        return np.diag(np.where(signed, 1.0 / np.maximum(sizes, alone), 0.0))
+        return np.diag(1.0 / np.maximum(sizes, alone))
 
     @functools.cached_property
     def std(self) -> dict[str, float]:
@@ -242,6 +236,21 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         if other != found.effects and not beyond(found.minimum.chi2):
             found = _instead(found, other, nominal, closest, limit, beyond) or found
     return found
+
+
+def near_guess(nominal: Model, records: Records) -> Hypothesis | None:
+    """The nominal model where a recording has it if the guess is right to about a tenth: along a
+    valley that the recording hardly closes it stays there.  None where that cannot be simulated.
+    """
+    whitened = Whitened(nominal, records)
+    theta, problem = place(whitened, records.guess), whitened.problem
+    rows = np.diag(1.0 / (GIVEN * whitened.sizes))
+    near = besides(whitened, lambda at: (rows @ (at - theta), rows))
+    found = minimise(near, theta, problem.lower, problem.upper, records.settings.budget.iterations,
+                     sizes=whitened.sizes) if whitened.choose_steps(
+                         theta, misfit=records.settings.fits.gross) else None
+    return None if found is None else unfitted(
+        nominal, records, {f.label: v for f, v in zip(problem.free, found.theta, strict=True)})
 
 
 def unfitted(nominal: Model, records: Records, values: Mapping[str, float]) -> Hypothesis | None:

@@ -87,7 +87,8 @@ def _fitted(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray, kno
 
     def explained(start: np.ndarray, limit: int = settings.budget.iterations) -> bool:
         nonlocal found
-        other = minimise(besides(part, known), start, problem.lower, problem.upper, limit)
+        other = minimise(besides(part, known), start, problem.lower, problem.upper, limit,
+                         sizes=part.sizes)
         found = min((m for m in (found, other) if m), key=lambda m: m.chi2, default=None)
         return found is not None and not rough(
             found.chi2 / level, part.rows, effects, settings)

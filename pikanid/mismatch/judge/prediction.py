@@ -111,7 +111,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         guess = min(guess, begun, key=whitened.chi2)
         first = minimise(whitened.residual, guess, np.where(own, whitened.problem.lower, guess),
                          np.where(own, whitened.problem.upper, guess),
-                         records.settings.budget.beginnings)
+                         records.settings.budget.beginnings, sizes=whitened.sizes)
         if first is not None:
             guess = first.theta
     found, prior = _moved(hypothesis, whitened, guess, shared, prior)
@@ -149,7 +149,7 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
 
     def suited(before: Prior, begin: np.ndarray) -> Minimum | None:
         return minimise(besides(whitened, functools.partial(known, before)), begin, problem.lower,
-                        problem.upper, settings.budget.held_out)
+                        problem.upper, settings.budget.held_out, sizes=whitened.sizes)
 
     found = suited(prior, guess)
     suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects, settings)

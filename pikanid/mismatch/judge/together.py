@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
@@ -37,9 +38,9 @@ def fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, lef
         return None
     first = hypothesis.whitened
     count = len(first.records.recordings)
-    whitened = Whitened(hypothesis.model, Records(
-        first.records.recordings + later.records.recordings,
-        first.records.levels + later.records.levels, first.settings))
+    whitened = Whitened(hypothesis.model, replace(
+        first.records, recordings=first.records.recordings + later.records.recordings,
+        levels=first.records.levels + later.records.levels))
     whitened.step_as(first, later)
     own = {(f.name, f.recording): v for f, v in zip(
         first.problem.free, hypothesis.minimum.theta, strict=True)}
@@ -48,7 +49,7 @@ def fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, lef
     problem = whitened.problem
     start = np.array([own[f.name, f.recording] for f in problem.free])
     found = minimise(whitened.residual, start, problem.lower, problem.upper,
-                     first.settings.budget.held_out)
+                     first.settings.budget.held_out, sizes=whitened.sizes)
     if found is None:
         return None
     if found.chi2 > hypothesis.minimum.chi2 + left + first.settings.verdict.missed:
@@ -87,6 +88,6 @@ def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> 
             theta = min(beside, key=whitened.chi2)
             if whitened.choose_steps(theta):
                 other = minimise(whitened.residual, theta, problem.lower, problem.upper,
-                                 whitened.settings.budget.held_out)
+                                 whitened.settings.budget.held_out, sizes=whitened.sizes)
                 found = min(found, other or found, key=lambda m: m.chi2)
     return found

@@ -248,25 +248,6 @@ def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:
             for n in counts]
 
 
-def other_places(base: Hypothesis, about: Hypothesis | None, given: Hypothesis | None
-                 ) -> Iterator[Hypothesis]:
-    """Where effects are looked for besides, if what is missing has led the nominal model away: the
-    fit `about` its guess, and where that is far off as well, the guess as it was `given`.
-    """
-    if about is not None and led_away(base, about):
-        yield about
-        if given is not None and about.far:
-            yield given
-
-
-def led_away(base: Hypothesis, about: Hypothesis) -> bool:
-    """Whether the nominal model went far from its guess to take up what is missing: to a bound, or
-    along a valley that the recording hardly closes, other than as it is fitted `about` the guess.
-    """
-    return (base.far and base.pinned) or any(
-        abs(about.values[n] - base.values[n]) > base.std[n] for n in base.values)
-
-
 def _rest(h: Hypothesis, effect: Candidate) -> tuple[Candidate, ...]:
     return tuple(e for e in h.effects if e is not effect)
 

@@ -14,10 +14,10 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below, in_order
 from pikanid.mismatch.fitting.descent import Start
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, unfitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, near_guess
 from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
-from pikanid.mismatch.search import neighbours
+from pikanid.mismatch.search import neighbours, places
 from pikanid.mismatch.search.neighbours import Job
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, kept, law, nothing
@@ -93,10 +93,8 @@ class Search:
             if self.base() is base:
                 break  # else effects had led out of a minimum that only the nominal model was in
         # where what is missing has led the nominal model away, effects show about the guess
-        about = fitted(self.nominal, (), self.records, [self.records.guess], self.choices,
-                       Closest(self._closest_chi2()))
-        given = unfitted(self.nominal, self.records, self.records.guess)
-        for other in neighbours.other_places(self.base(), about, given):
+        about = near_guess(self.nominal, self.records)
+        for other in places.other_places(self.base(), about):
             self._fit_all([((c,), starts) for c, starts in Screen(other, every).singles(
                 budget.singles)], again=True, always=True, reach=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
@@ -199,8 +197,8 @@ class Search:
         """Fit neighbours of hypotheses on from where these stand; whether that found anything."""
         before = {h.fit for h in self.fits.values()}
         for h in hypotheses[:self.settings.budget.asked_again]:
-            self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates)),
-                        h.key)
+            self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates),
+                         *places.elsewhere(h, self.candidates)), h.key)
             self._exchange(h, anyway=True)
         return {h.fit for h in self.fits.values()} != before
 

@@ -59,10 +59,18 @@ class Workbench:
         return sensitivities(self.plant, self.scene, self.values, self.model.free_names, self.clean)
 
     def extended(self, hidden: Sequence[Hidden]) -> Model:
-        """The model with laws, at their guesses."""
+        """The model with laws, at their guesses.
+
+        Raises:
+            SimulationFailed: If they cannot be put together: a scale error of a temperature in degC
+                and a law that needs it in K.
+        """
         model = self.model
         for one in hidden:
-            model = model.with_effect(one.law.effect, self.model)
+            try:
+                model = model.with_effect(one.law.effect, self.model)
+            except (errors.BadModel, errors.BadUnit) as failure:
+                raise errors.SimulationFailed(str(failure)) from None
         return model
 
     def at(self, hidden: Sequence[Hidden]) -> dict[str, float]:
@@ -148,8 +156,8 @@ class Workbench:
             directions = sensitivities(plant, self.scene, fit.values, free, there)
             for rival in rivals:
                 size, start = rival.law.size.name, {**rival.values, **fit.values}
-                seen = Plant(self.extended([*beside, rival]))
                 try:
+                    seen = Plant(self.extended([*beside, rival]))
                     moved = self.scene.whitened(seen.outputs(start, self.scene.experiment)) - there
                 except errors.SimulationFailed:
                     continue
