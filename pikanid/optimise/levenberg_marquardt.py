@@ -187,6 +187,14 @@ def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, 
     return Descent(theta, at, False)
 
 
+def promised(at: Linearised, theta: Array, lower: Array, upper: Array) -> float:
+    """By how much |r|² falls, to second order, with the step within the bounds (n,) that is best
+    from θ (n,).
+    """
+    about = _Quadratic(at, theta, lower, upper, np.full(len(theta), np.inf))
+    return about.fall(about.step(LEAST)[1])
+
+
 class _Quadratic:
     """|r|² about a θ (n,) within bounds, to second order, in units of what shows of a parameter."""
 

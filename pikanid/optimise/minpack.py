@@ -1,19 +1,22 @@
-"""Bounded nonlinear least squares to the last digit: MINPACK inside the bounds, TRF at them.
+"""Bounded nonlinear least squares to the last digit: MINPACK, and what holds parameters at bounds.
 
-MINPACK knows no bounds: a step outside them is refused, and only a start that ends beside a bound
-is finished by SciPy's "trf".  It stands beside `levenberg_marquardt` for its speed: a start of NLS
-takes 1.8 ms with this one, in 15 simulations, and 3.8 ms with the other, in 20
-(`benchmarks/test_bench_least_squares.py`).  The other
-stands beside this one for diagnoses: this one can neither hold a parameter nor give up what is out
-of reach, and two of the simulated rigs took 6.4 s and 5.9 s with it instead of 4.5 s and 4.6 s.
+MINPACK knows no bounds: a step outside them is refused, and only a start that ends there
+is finished by `levenberg_marquardt`.  It stands beside that one for its speed: a start of NLS takes
+1.8 ms with this one, in 15 simulations, and 3.8 ms with the other, in 20
+(`benchmarks/test_bench_least_squares.py`).  The other stands beside this one for diagnoses: this
+one can neither hold a parameter nor give up what is out of reach, and two of the simulated rigs
+took 6.4 s and 5.9 s with it instead of 4.5 s and 4.6 s.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from pikanid.optimise.levenberg_marquardt import descend, promised
 
 Vector = Callable[[np.ndarray], np.ndarray]
 
@@ -61,41 +64,57 @@ def minimise(residual: Vector, jacobian: Vector, start: np.ndarray, lower: np.nd
                 told = descent.linearise(r, jacobian(descent.theta))
         reached = Optimum(
             descent.theta, descent.cost, told == CONVERGED, descent.evaluations)
-    return inside(reached, residual, jacobian, theta, lower, upper, tolerance, limit)
+    return inside(reached, residual, jacobian, theta, lower, upper, tolerance, limit, enough)
 
 
 def inside(reached: Optimum, residual: Vector, jacobian: Vector, start: np.ndarray,
-           lower: np.ndarray, upper: np.ndarray, tolerance: float, limit: int) -> Optimum:
-    """What MINPACK has `reached` from `start`, or what "trf" makes of it beside a bound or where it
-    did not converge; the rest as for `minimise`.
+           lower: np.ndarray, upper: np.ndarray, tolerance: float, limit: int, enough: float
+           ) -> Optimum:
+    """What MINPACK has `reached` from `start`, or what `levenberg_marquardt` makes of it where a
+    step within the bounds promises more: MINPACK takes a bound for the end of its way.  The rest as
+    for `minimise`.
     """
-    theta, best = reached.theta, reached.cost
-    evaluations, converged = reached.evaluations, reached.converged
-    # plain numbers: for a few parameters NumPy's overhead is all there is
-    if not converged or any(min(q - low, high - q) < max(1e-3 * abs(q), 1e-15) for q, low, high
-                            in zip(theta.tolist(), lower.tolist(), upper.tolist(), strict=True)):
-        from scipy.optimize import least_squares
+    theta, evaluations = reached.theta, 0
 
-        scale = np.where(start != 0, np.abs(start), 1.0)
+    def at(q: np.ndarray) -> _Lazy | None:
+        nonlocal evaluations
+        if evaluations >= limit:
+            return None
+        evaluations += 1
+        r = residual(q)
+        return _Lazy(r, q, jacobian) if np.isfinite(r).all() else None
 
-        def boxed(z: np.ndarray) -> np.ndarray:
-            return residual(np.clip(z * scale, lower, upper))
-
-        def slopes(z: np.ndarray) -> np.ndarray:
-            return jacobian(z * scale) * scale
-
-        found = least_squares(
-            boxed, _strictly_inside(theta, lower, upper) / scale, slopes,
-            bounds=(lower / scale, upper / scale), x_scale="jac", ftol=tolerance, xtol=tolerance,
-            gtol=1e-12, max_nfev=limit)
-        evaluations += found.nfev
-        if found.cost <= best:
-            theta, best = np.clip(found.x * scale, lower, upper), float(found.cost)
-            converged = found.status > 0
-    return Optimum(theta, best, converged, evaluations)
+    here, share = at(theta), max(tolerance, enough)
+    if here is None or (more := promised(here, theta, lower, upper)) < share * here.cost:
+        return reached
+    first = residual(start)
+    least = tolerance**2 * float(first @ first)  # of what is exact, no share is worth a step
+    if more < least:
+        return reached
+    found = descend(at, theta, lower, upper, limit, lambda now: share * now.cost + least,
+                    bend=_Lazy.bend)
+    if found is None or 0.5 * found.at.cost > (1.0 - tolerance) * reached.cost:
+        return replace(reached, evaluations=reached.evaluations + evaluations)
+    return Optimum(found.theta, 0.5 * found.at.cost, found.converged,
+                   reached.evaluations + evaluations)
 
 
-def _strictly_inside(theta: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """TRF must start off its bounds."""
-    gap = 1e-8 * np.where(np.isfinite(upper - lower), upper - lower, 1.0)
-    return np.clip(theta, lower + gap, upper - gap)
+class _Lazy:
+    """A residual r (rows,) at θ (n,), linearised once a step begins there."""
+
+    def __init__(self, r: np.ndarray, theta: np.ndarray, jacobian: Vector):
+        self.r, self.cost = r, float(r @ r)
+        self._theta, self._jacobian = theta.copy(), jacobian
+
+    @functools.cached_property
+    def J(self) -> np.ndarray:
+        """(rows, n)."""
+        return self._jacobian(self._theta)
+
+    def normal(self) -> tuple[np.ndarray, np.ndarray]:
+        """JᵀJ (n, n) and Jᵀr (n,)."""
+        return self.J.T @ self.J, self.J.T @ self.r
+
+    def bend(self, there: _Lazy, change: np.ndarray) -> np.ndarray:
+        """Jᵀ (n,) times what r after a change (n,) of θ has that J does not foretell."""
+        return self.J.T @ (there.r - self.r - self.J @ change)

@@ -24,7 +24,7 @@ def fit_shooting(shooting: Shooting, start: np.ndarray, tolerance: float = 1e-9,
         return minimise(
             shooting.residual, shooting.jacobian, theta, lower, upper, tolerance, limit, enough)
     return inside(reached, shooting.residual, shooting.jacobian, theta, lower, upper, tolerance,
-                  limit)
+                  limit, enough)
 
 
 def _compiled(shooting: Shooting, theta: np.ndarray, lower: np.ndarray, upper: np.ndarray,

@@ -2,8 +2,8 @@
 
     p̂ = argmin Σ_i |(y_i - h(x(t_i; p)))/σ_i|²   subject to   x' = f(x, u; p)
 
-Jacobians are exact (forward sensitivities); the optimiser is MINPACK's Levenberg-Marquardt inside
-the bounds and SciPy's "trf" at them (`pikanid.optimise.minpack`).
+Jacobians are exact (forward sensitivities); the optimiser is Levenberg-Marquardt: MINPACK's inside
+the bounds, one that holds parameters there at them (`pikanid.optimise.minpack`).
 """
 
 from __future__ import annotations
