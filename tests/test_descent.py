@@ -59,7 +59,7 @@ def test_a_fit_that_comes_far_closer_than_all_before_is_simulated_finely() -> No
 def test_settings_say_how_much_closer_that_is(monkeypatch: pytest.MonkeyPatch) -> None:
     truth = pk.systems.sloshing().with_term("theta_dot", "-3000.0*max(theta - 0.15, 0)")
     case = opened(truth, pk.excitation.two_pulse(), 0.002)
-    begin = {"l_theta": 0.045, "d_theta": 0.15}
+    begin = case.base.point
 
     def chosen(share: float) -> int:
         """How often steps are chosen."""

@@ -144,9 +144,9 @@ def test_settings_bound_the_fits_to_held_out_recordings(monkeypatch: pytest.Monk
     limits: list[int] = []
 
     def watched(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np.ndarray,
-                limit: int) -> Minimum | None:
+                limit: int, sizes: np.ndarray) -> Minimum | None:
         limits.append(limit)
-        return minimise(evaluate, start, lower, upper, limit)
+        return minimise(evaluate, start, lower, upper, limit, sizes=sizes)
 
     for module in (prediction, together):
         monkeypatch.setattr(module, "minimise", watched)

@@ -49,15 +49,16 @@ def test_kinked_terms_away_from_their_kinks(name: str) -> None:
     term, count = TERMS[name], 40
     model = slosh(term)
     field, bare, p = VectorField(model), VectorField(systems.sloshing()), values(model)
-    t, x = RNG.uniform(0, 2, count), RNG.normal(0, 0.5, (count, 2))
-    u = np.column_stack([RNG.normal(0, 1, count), np.zeros(count)])
+    rng = np.random.default_rng(1)
+    t, x = rng.uniform(0, 2, count), rng.normal(0, 0.5, (count, 2))
+    u = np.column_stack([rng.normal(0, 1, count), np.zeros(count)])
     guards = term.guards(model.values)
     signs = np.array([[np.sign(g(t[i], x[i], u[i])) for g in guards] for i in range(count)])
     expected = bare.rhs(t, x, u, p[:4])[:, 1] + [
         term.force(t[i], x[i], u[i], signs[i], model.values) for i in range(count)]
     np.testing.assert_allclose(field.rhs(t, x, u, p)[:, 1], expected, rtol=1e-12, atol=1e-12)
     fx, fp = field.rhs_jacobians(t, x, u, p)
-    far = np.all([[abs(g(t[i], x[i], u[i])) > 1e-2 for g in guards] for i in range(count)], axis=1)
+    far = np.all([[abs(g(t[i], x[i], u[i])) > 5e-2 for g in guards] for i in range(count)], axis=1)
     assert far.sum() > count / 2
     for j in range(2):
         step = np.eye(2)[j]
