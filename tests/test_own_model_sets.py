@@ -12,6 +12,7 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.cli import main
 from pikanid.model import Effect
+from pikanid.model.effects_file import read_effects
 from pikanid.model.parts import Parameter
 from pikanid.validation.concealed.score import judge
 from pikanid.validation.own_model.case import Order, acting, make
@@ -128,6 +129,35 @@ def test_a_temperature_in_degc_has_neither_power_nor_sign() -> None:
     hidden = {one.id for one in rig.laws(house.values)}
     assert "static_bias" in hidden
     assert not hidden & {"coulomb_friction", "quadratic_drag", "power_drag"}
+
+
+def test_what_another_laws_own_parameters_take_up_is_not_seen() -> None:
+    """A constant source beside a loss to surroundings that nobody records: they may be colder."""
+    house = pk.systems.thermal_rc()
+    driven = inputs(house, dt=1800.0)
+    rig = Rig(house, driven, driven, 0.01, tuple(read_effects("thermal")))
+    values = {n: house.values[n] for n in house.free_names}
+    bench = Workbench(rig.nominal, values, rig.scene(values))
+    loss, source = (law(rig, key) for key in ("ambient_loss", "static_bias"))
+    surroundings = loss.effect.parameters[1].name
+    lost = Hidden(loss, {loss.size.name: 3e-7, surroundings: 15.0})
+    hidden = [lost, Hidden(source, {source.size.name: -3e-5})]
+    truth = bench.seen(hidden)
+    assert bench.fitted(truth, [], sure=True).distance > 5.0
+    found = bench.fitted(truth, [lost], sure=True)
+    assert found.distance < 1.0 and found.values[surroundings] < 0.0
+
+
+def test_laws_that_cannot_be_put_together_are_no_pair() -> None:
+    """A scale error of a temperature in degC, and what needs that in K."""
+    house = pk.systems.thermal_rc()
+    rig = Rig(house, inputs(house), inputs(house, seed=1), 0.01, tuple(read_effects("thermal")))
+    values = {n: house.values[n] for n in house.free_names}
+    bench = Workbench(rig.nominal, values, rig.scene(values))
+    both = [Hidden(law(rig, key), {}) for key in ("radiation", "input_gain")]
+    assert [bench.extended([one]) for one in both]
+    with pytest.raises(errors.SimulationFailed, match="degC"):
+        bench.extended(both)
 
 
 def test_what_cannot_be_seen_is_not_hidden(motor_rig: Rig) -> None:

@@ -187,7 +187,7 @@ class Workbench:
     def _free(self, hidden: Sequence[Hidden]) -> list[str]:
         """Names of what is fitted with these laws."""
         return [*self.model.free_names,
-                *(p.name for h in hidden for p in (h.law.size, *h.law.shapes))]
+                *(p.name for h in hidden for p in h.law.effect.parameters if p.free)]
 
 
 def _same(a: Law, b: Law) -> bool:
