@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
+from operator import lt
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
+from pikanid.mismatch.fitting.descent import impatient
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.optimise.levenberg_marquardt import Minimum, minimise
 
@@ -88,6 +91,7 @@ def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> 
             theta = min(beside, key=whitened.chi2)
             if whitened.choose_steps(theta):
                 other = minimise(whitened.residual, theta, problem.lower, problem.upper,
-                                 whitened.settings.budget.held_out, sizes=whitened.sizes)
+                                 whitened.settings.budget.held_out, sizes=whitened.sizes,
+                                 give_up=impatient(partial(lt, found.chi2), whitened.settings))
                 found = min(found, other or found, key=lambda m: m.chi2)
     return found
