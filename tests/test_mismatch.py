@@ -226,11 +226,14 @@ def test_a_motion_begins_where_its_data_begin() -> None:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_friction_and_a_damping_that_grows_are_found_in_the_real_pendulum(
         recordings_folder: object) -> None:
-    # the recording holds more than any catalogue; which law of each it is cannot be told
+    # the recording holds more than any catalogue; which law of each it is cannot be told, nor, from
+    # a swing that decays once, a drag from a damping that falls with time
     import diagnosis_real
 
     (row,) = diagnosis_real.single_pendulum()
-    assert (row.verdict, row.hypotheses) == ("partial", ("surely dry friction and drag",))
+    (said,) = row.hypotheses
+    assert row.verdict == "partial" and said.startswith("surely ") and "or dry" not in said
+    assert "dry friction" in said and "drag" in said
     assert row.after < 0.5 * row.before
 
 
