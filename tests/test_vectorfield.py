@@ -58,11 +58,11 @@ def test_kinked_terms_away_from_their_kinks(name: str) -> None:
         term.force(t[i], x[i], u[i], signs[i], model.values) for i in range(count)]
     np.testing.assert_allclose(field.rhs(t, x, u, p)[:, 1], expected, rtol=1e-12, atol=1e-12)
     fx, fp = field.rhs_jacobians(t, x, u, p)
-    far = np.all([[abs(g(t[i], x[i], u[i])) > 5e-2 for g in guards] for i in range(count)], axis=1)
+    far = np.all([[abs(g(t[i], x[i], u[i])) > 1e-2 for g in guards] for i in range(count)], axis=1)
     assert far.sum() > count / 2
     for j in range(2):
         step = np.eye(2)[j]
-        slope = oracle.derivative(lambda h: field.rhs(t, x + h * step, u, p), 0.0, 1e-3)  # noqa: B023
+        slope = oracle.derivative(lambda h: field.rhs(t, x + h * step, u, p), 0.0, 1e-4)  # noqa: B023
         np.testing.assert_allclose(fx[far, :, j], slope[far], rtol=1e-6, atol=1e-6)
     for j in range(4, len(p)):
         step = np.eye(len(p))[j]

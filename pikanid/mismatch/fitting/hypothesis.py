@@ -249,8 +249,11 @@ def near_guess(nominal: Model, records: Records) -> Hypothesis | None:
     found = minimise(near, theta, problem.lower, problem.upper, records.settings.budget.iterations,
                      sizes=whitened.sizes) if whitened.choose_steps(
                          theta, misfit=records.settings.fits.gross) else None
-    return None if found is None else unfitted(
-        nominal, records, {f.label: v for f, v in zip(problem.free, found.theta, strict=True)})
+    if found is None:
+        return None
+    seen = len(found.r) - len(rows)
+    return Hypothesis((), nominal, whitened, Minimum(
+        found.theta, found.r[:seen], found.J[:seen], False), 0.0)
 
 
 def unfitted(nominal: Model, records: Records, values: Mapping[str, float]) -> Hypothesis | None:
@@ -259,9 +262,7 @@ def unfitted(nominal: Model, records: Records, values: Mapping[str, float]) -> H
     theta = place(whitened, values)
     found = whitened.residual(theta) if whitened.choose_steps(
         theta, misfit=records.settings.fits.gross) else None
-    if found is None or not all(np.isfinite(part).all() for part in found):
-        return None
-    return Hypothesis((), nominal, whitened, Minimum(theta, *found, False), 0.0)
+    return found and Hypothesis((), nominal, whitened, Minimum(theta, *found, False), 0.0)
 
 
 def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, closest: Closest,
