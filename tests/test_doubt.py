@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
 from pikanid.mismatch.judge.doubt import why_not
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
+from pikanid.model.effects_file import from_table
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
 
@@ -53,19 +55,32 @@ def test_another_motion_proves_a_spring(hypotheses: tuple[Case, list[Hypothesis]
     assert said == "" and motion > 1e5
 
 
-def test_a_size_that_may_be_nothing_is_not_sure(
-        hypotheses: tuple[Case, list[Hypothesis]], monkeypatch: pytest.MonkeyPatch) -> None:
-    """However much it gains: it stands for a parameter that a bound holds without it.  Where none
-    is held, the fit without it has said how much it gains, also where that is no parabola.
-    """
-    case, ranked = hypotheses
-    size = ranked[0].values["k3"]
-    for error, pinned, sure in ((size / 4.0, True, True), (size / 2.0, True, False),
-                                (size / 2.0, False, True)):
-        monkeypatch.setattr(Hypothesis, "std", {"k3": error})
-        monkeypatch.setattr(Hypothesis, "pinned", pinned)
-        said, _ = doubt(case, ranked, moved(2))
-        assert sure == (said == "") and sure != ("may be nothing" in said)
+def test_what_a_parameter_would_do_past_its_bound_is_no_effect() -> None:
+    """A push beside a damping that its bound keeps from pushing; a spring beside the same."""
+    push, = from_table({"push": {
+        "parameters": {"q": {"unit": "1/s", "guess": 0.1, "bounds": [0, 9]}},
+        "add": {"x_dot": "q*x_dot"}, "null": {"q": 0}}}, "test")
+    nominal = pk.systems.linear_oscillator().with_candidates(push)
+
+    def judged(pushed: float, k3: float, key: str, guess: Mapping[str, float]) -> str:
+        truth = nominal.with_term("x_dot", "pushed*x_dot - k3*x**3", [
+            pk.Parameter("pushed", pushed), pk.Parameter("k3", k3)])
+        train, later = (pk.simulate(truth, blows(seed), sigma=SIGMA, seed=seed) for seed in (1, 2))
+        case = open_case(nominal, (train,), (later,), None, lambda text: None, DEFAULTS)
+        effect = next(c for c in case.candidates if c.key == key)
+        found = fitted(case.model, [effect], case.records, [guess], 30)
+        assert found is not None and case.base.values["zeta"] < 1e-6
+        return why_not(found, [found, case.base], case.predicted, lambda *asked: 0.0, 1.0, DEFAULTS)
+
+    said = judged(0.8, 0.0, "push", {"q": 0.1})
+    assert said == "a parameter past its bound would explain as much as push does"
+    assert judged(0.63, 10.0, "cubic_stiffness", {"k3": 1.0}) == ""
+
+
+def blows(seed: int) -> Recording:
+    rng = np.random.default_rng(seed)
+    t = np.arange(400) * 0.02
+    return Recording.from_arrays(t, {"u": np.repeat(rng.normal(0, 6, 20), 20)}, {"u": "N"})
 
 
 def test_a_formula_that_is_not_determined_is_no_name(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import condensed, lines, residual_tests
 from pikanid.mismatch.detect.tangent import CELLS, Tangent, directions
 from pikanid.mismatch.diagnose import diagnose
+from pikanid.mismatch.fitting.decisions import BAND
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.search.screen import best_level
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -52,7 +54,8 @@ def told(train: Recording, later: Recording | None) -> Diagnosis | None:
     assert page(dx, "odd").endswith("</html>\n") and str(dx)
     assert strict_json.text(dx.to_dict())
     chances = [h.probability for h in dx.hypotheses]
-    assert chances == sorted(chances, reverse=True)
+    # what differs by rounding stands in the order of names
+    assert all(b < a * (1 + BAND) for a, b in pairwise(chances))
     return dx
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.loosened import loosened
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.settings.settings import Settings
 
@@ -27,9 +28,9 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     could have refuted it; a limit that it does not meet has to be met again where the train
     recordings go on.  And it has to speak for each of several: one is easily found that takes up
     what the others leave, whatever that is.  Where a bound holds a parameter without the effect,
-    the effect may do what that parameter is kept from: its own error has to say that there is any.
-    What happens once, of which it cannot speak, takes up anything: there, what lasts must not do
-    most of that as well and predict as well.
+    it must do what that parameter would not do past the bound.  What happens once, of which it
+    cannot speak, takes up anything: there, what lasts must not do most of that as well and predict
+    as well.
 
     Args:
         h: To prove.
@@ -56,8 +57,6 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     minor = asks.minor * gained(fits[frozenset()])
     for e in h.effects:
         rest = h.key - {e.key}
-        if rest in fits and fits[rest].pinned and (said := no_size(e, h, 1.0, settings)):
-            return said
         sizes = [p for p in e.parameters if p.free]
         if h.symbolic and len(sizes) > 1:
             size, error = h.values[sizes[0].name], h.std[sizes[0].name]
@@ -96,6 +95,9 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                     and not speaks(h, other, predict, asks.needed * scale)
                     for other in _lasting(rest, o, fits.values())):
                 return f"a lasting effect would take up most of what {e.name} does"
+        certain = h.minimum.chi2 + asks.sized**2 * scale
+        if rest in fits and below(loosened(fits[rest]), certain):
+            return f"a parameter past its bound would explain as much as {e.name} does"
     return ""
 
 

@@ -40,9 +40,10 @@ class VerdictSettings:
         needed: [criterion] that each of several effects must gain on held-out recordings.
         once: Share of what an effect that happens once takes away beside others that one that lasts
             may take away in its place.
-        sized: Standard errors from nothing that the size of an effect of one parameter must be:
-            what gains much and still may be nothing stands for something else, for a parameter
-            that a bound holds without it, or for a part of the remainder.
+        sized: Standard errors from nothing that the size of an effect of one parameter must be
+            where something is left: what gains much and still may be nothing stands for a part of
+            that.  And, as a root of χ², how much more it must explain than a parameter would that a
+            bound holds without it.
         worse: Times the nominal held-out RMSE: no proof, whatever errors of parameters forgive.
         linear: Standard deviations that a linearisation holds for: beyond, it is renewed.
         missed: [χ²] that a fit to all recordings may exceed fits to each by, where it is best.
