@@ -50,6 +50,17 @@ def test_an_amplifier_that_bends_is_no_mode() -> None:
     assert not p.names and p.instead and p.instead.kind == Kind("input curve")
 
 
+def test_an_amplifier_that_pushes_harder_one_way_is_no_constant_force() -> None:
+    """Its mean is one, and a curve of the input has it, too, without any force at rest; what pushes
+    at rest is none of that curve's.
+    """
+    [p] = judged(case_of(MODEL.map_input("u_x", function="u_x + 0.2*abs(u_x)")),
+                 "static_bias").present
+    assert not p.names and p.instead and p.instead.kind == Kind("input curve")
+    tilted = MODEL.with_term("theta_dot", "10 - 5*tanh(theta_dot)")
+    assert [p.names for p in judged(case_of(tilted), "static_bias").present] == [("static_bias",)]
+
+
 def test_no_curve_takes_the_place_of_a_mode() -> None:
     """Of a state or of the input: a mode is neither."""
     case = case_of(MODEL)
@@ -61,7 +72,7 @@ def test_no_curve_takes_the_place_of_a_mode() -> None:
 
 @pytest.mark.parametrize(("pair", "sure"), [
     (("coulomb_friction", "input_gain"), {"dry friction"}),
-    (("coulomb_friction", "static_bias"), {"dry friction", "constant force"}),
+    (("coulomb_friction", "static_bias"), {"dry friction"}),
     (("cubic_stiffness", "input_gain"), set())])
 def test_what_one_curve_does_by_itself_is_not_several_effects(
         pair: tuple[str, str], sure: set[str]) -> None:
@@ -72,7 +83,9 @@ def test_what_one_curve_does_by_itself_is_not_several_effects(
     found = judged(case_of(rig), *pair)
     assert {p.family for p in found.present} == sure
     assert len(found.doubtful) == 2 - len(sure)
-    assert all("by itself" in d.why for d in found.doubtful)
+    # of the curve that a drag is, a constant force is a share that need not be there beside it
+    assert all("in its place" in d.why if d.kind.family == "constant force" else
+               "by itself" in d.why for d in found.doubtful)
 
 
 def test_a_limit_keeps_its_name() -> None:
@@ -104,14 +117,15 @@ def sure_of(family: str, instead: str = "") -> Any:
 @pytest.mark.parametrize(("families", "tried"), [
     (("restoring force", ""), ["v", "u"]), (("restoring force", "gain"), ["v"]),
     (("gain", "dry friction"), ["q"]), (("dry friction", "restoring force"), ["u"]),
-    (("mode", "constant force"), []), (("mode", "timing"), ["q", "v", "u"])])
+    (("mode", "constant force"), ["q", "v", "u"]), (("mode", "timing"), ["q", "v", "u"])])
 def test_no_curve_stands_for_either_of_two_families(
         monkeypatch: pytest.MonkeyPatch, families: tuple[str, str], tried: list[str]) -> None:
     """Of what one of them depends on it would be that one."""
     for name in ("with_free_curve", "with_free_input"):
-        monkeypatch.setattr(curves, name, lambda *args: args[3])
+        monkeypatch.setattr(curves, name, lambda *args, argument, **kept: argument)
     h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
-    assert [fit for _, fit in curves._in_its_place(MODEL, h, sure_of(*families), [])] == tried
+    found = curves._in_its_place(MODEL, h, sure_of(*families), [])
+    assert [fit for _, fit, _ in found] == tried
 
 
 SPRING, CURVE = Kind("restoring force", "v"), Kind("input curve")

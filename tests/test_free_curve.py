@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+import sympy as sp
 
 import pikanid as pk
 from pikanid.mismatch.beyond.free_curve import (
@@ -10,6 +12,7 @@ from pikanid.mismatch.beyond.free_curve import (
     with_free_input,
     with_free_sensor,
 )
+from pikanid.mismatch.beyond.patch import FreeCurve
 from pikanid.mismatch.catalogue.channels import sensor_nonlinearity
 from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.whitened import Records
@@ -74,3 +77,24 @@ def test_a_curve_of_an_input_explains_how_it_saturates_softly() -> None:
 def test_an_input_at_rest_has_no_curve() -> None:
     base, site = base_of("0")
     assert with_free_input(base.model, base, (), "u_z", site) is None
+
+
+@pytest.mark.parametrize("zero_at_zero", [True, False])
+def test_a_curve_that_is_zero_at_zero_holds_no_constant(zero_at_zero: bool) -> None:
+    curve = FreeCurve("theta", -0.2, 0.5, pk.systems.sloshing(), 6, zero_at_zero=zero_at_zero)
+    seen = curve.matrix(np.linspace(-0.2, 0.5, 8))
+    weights = np.random.default_rng(1).standard_normal(len(curve.names))
+    value = sp.lambdify(["theta", *curve.names], sp.sympify(curve.formula.replace("max", "Max")))
+    assert value(0.0, *weights) == pytest.approx(0.0 if zero_at_zero else curve.matrix(
+        np.zeros(1))[0] @ weights, abs=1e-12)
+    assert value(0.3, *weights) == pytest.approx((seen @ weights)[5])
+    constant = np.linalg.lstsq(seen, np.ones(8), rcond=None)[0]
+    assert np.allclose(seen @ constant, 1.0) != zero_at_zero
+
+
+def test_a_constant_force_is_no_curve_that_is_zero_at_zero() -> None:
+    base, site = base_of("10")
+    held, free = (with_free_curve(base.model, base, (), "theta", site, zero_at_zero=zero)
+                  for zero in (True, False))
+    assert held is not None and free is not None
+    assert free.minimum.chi2 < 0.3 * held.minimum.chi2

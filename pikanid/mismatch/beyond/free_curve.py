@@ -18,7 +18,8 @@ PIECES = (FINE, 6, 3)  # numerical: with which a curve is tried, one after the o
 
 
 def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], argument: str,
-                    site: Site, near: float = np.inf, tried: Sequence[int] = PIECES
+                    site: Site, near: float = np.inf, tried: Sequence[int] = PIECES,
+                    zero_at_zero: bool = False, start: Hypothesis | None = None
                     ) -> Hypothesis | None:
     """Effects of a hypothesis and a free curve as a force, refitted from where it stands, with
     fewer pieces where that ends in nothing that can be run; None where no curve can be.
@@ -31,22 +32,29 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
         site: Coordinate in whose equation it stands.
         near: χ² to come near to: a fit that stays far above is not carried through.
         tried: Numbers of pieces.
+        zero_at_zero: Whether the curve holds no constant; none can be that was never near zero.
+        start: Where to begin instead: a fit with such a curve.
     """
     visited = h.whitened.motion(h.minimum.theta)[argument]
     low, high = float(visited.min()), float(visited.max())
-    return next((found for pieces in tried if (found := fitted(
-        nominal, [*effects, FreeCurve(argument, low, high, h.model, pieces).candidate(site)],
-        h.whitened.records, [h.point], 1, Closest(near), h.key)) is not None), None)
+    if zero_at_zero and not low < 0 < high:
+        return None
+    curves = (FreeCurve(argument, low, high, h.model, pieces, zero_at_zero=zero_at_zero)
+              for pieces in tried)
+    return next((found for curve in curves if (found := fitted(
+        nominal, [*effects, curve.candidate(site)], h.whitened.records, [(start or h).point], 1,
+        Closest(near), h.key)) is not None), None)
 
 
-def with_free_input(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
-                    site: Site, near: float = np.inf) -> Hypothesis | None:
+def with_free_input(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], argument: str,
+                    site: Site, near: float = np.inf, zero_at_zero: bool = False,
+                    start: Hypothesis | None = None) -> Hypothesis | None:
     """The same with a free curve of an input in what acts; None where that never changes."""
     problem = h.whitened.problem
-    at = nominal.input_names.index(name)
+    at = nominal.input_names.index(argument)
     visited = np.concatenate([e.held[at].values for e in problem.experiments])
-    return _beside(nominal, h, effects, name, visited, nominal.input(name).unit,
-                   FreeCurve.of_input, site, near)
+    return _beside(nominal, h, effects, argument, visited, nominal.input(argument).unit,
+                   FreeCurve.of_input, site, near, zero_at_zero, start)
 
 
 def with_free_sensor(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
@@ -61,10 +69,11 @@ def with_free_sensor(nominal: Model, h: Hypothesis, effects: Sequence[Candidate]
 
 def _beside(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
             visited: np.ndarray, unit: str, curve_of: Callable[[FreeCurve, Site], Candidate],
-            site: Site, near: float) -> Hypothesis | None:
+            site: Site, near: float, zero_at_zero: bool = False, start: Hypothesis | None = None
+            ) -> Hypothesis | None:
     low, high = float(visited.min()), float(visited.max())
-    if low == high:
+    if low == high or (zero_at_zero and not low < 0 < high):
         return None
-    curve = FreeCurve(name, low, high, h.model, FINE, unit)
-    return fitted(nominal, [*effects, curve_of(curve, site)], h.whitened.records, [h.point], 1,
-                  Closest(near), h.key)
+    curve = FreeCurve(name, low, high, h.model, FINE, unit, zero_at_zero)
+    return fitted(nominal, [*effects, curve_of(curve, site)], h.whitened.records,
+                  [(start or h).point], 1, Closest(near), h.key)

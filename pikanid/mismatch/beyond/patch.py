@@ -134,18 +134,20 @@ class FreeCurve:
     """Cubic splines of a state, an input or an output as truncated powers, of the argument scaled
     to ±1.
 
-    Without the straight line, which belongs to the free parameters.
+    Without the straight line, which belongs to the free parameters.  One that is `zero_at_zero` of
+    its argument holds no constant: a spring at rest, a damper that stands, an input that is off.
     """
 
     def __init__(self, argument: str, low: float, high: float, model: Model,
-                 intervals: int = INTERVALS, unit: str | None = None):
+                 intervals: int = INTERVALS, unit: str | None = None, zero_at_zero: bool = False):
         self.argument = argument
         self.low, self.high = low, high
         self.inner = np.linspace(-1.0, 1.0, intervals + 1)[1:-1]
         self.name = "delta"
         while any(taken.startswith(self.name) for taken in model.symbols):
             self.name += "_x"
-        self.names = [f"{self.name}_{k}" for k in range(3 + len(self.inner))]
+        self.zero_at_zero = zero_at_zero
+        self.names = [f"{self.name}_{k}" for k in range(3 - zero_at_zero + len(self.inner))]
         self.difference = Difference.of(
             argument, model.state(argument).unit if unit is None else unit, f"{self.name}_zero")
 
@@ -154,9 +156,15 @@ class FreeCurve:
 
     def matrix(self, x: np.ndarray) -> np.ndarray:
         """(N, n) at arguments (N,)."""
-        z = self._scaled(x)
+        columns = self._powers(self._scaled(x))
+        return (columns - self._at_zero())[:, 1:] if self.zero_at_zero else columns
+
+    def _powers(self, z: np.ndarray) -> np.ndarray:
         return np.column_stack([np.ones(len(z)), z**2, z**3, *(
             np.maximum(z - k, 0.0) ** 3 for k in self.inner)])
+
+    def _at_zero(self) -> np.ndarray:
+        return self._powers(self._scaled(np.zeros(1)))[0]
 
     def candidate(self, site: Site) -> Candidate:
         """The edge as a force whose coefficients are estimated."""
@@ -177,8 +185,12 @@ class FreeCurve:
     def _shapes(self) -> list[str]:
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         z = f"(({self.difference.text} - ({middle!r}))/{half!r})"
-        return ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
-                                            for k in map(float, self.inner))]
+        shapes = ["1", f"{z}**2", f"{z}**3", *(f"max({z} - ({k!r}), 0)**3"
+                                              for k in map(float, self.inner))]
+        if not self.zero_at_zero:
+            return shapes
+        return [f"({shape} - ({value!r}))"
+                for shape, value in zip(shapes, self._at_zero().tolist(), strict=True)][1:]
 
     @property
     def formula(self) -> str:
@@ -190,7 +202,7 @@ class FreeCurve:
         # z is a number, but carries the unit of what it is made from
         constant = self.difference.distance if unit == self.difference.unit else unit
         own = [constant, *(units.product((unit or "1", 1), (self.difference.unit or "1", -power))
-                           for power in (2, *(3 for _ in self.names[2:])))]
+                           for power in (2, *(3 for _ in (0, *self.inner))))][self.zero_at_zero:]
         return Candidate(("patch",), "a KAN edge", self.formula, channel, site,
                          tuple(Parameter(n, 0.0, unit)
                                for n, unit in zip(self.names, own, strict=True)),

@@ -4,9 +4,10 @@ A family is not sure where a free curve in its place leaves little more, of a st
 its members do not depend on: a magnet is no friction with a memory, and an amplifier that bends is
 no mode.  Where only curves of the deflection do, or only those of inputs, one is there of the
 family and a restoring force, or a curve of the input: a scale error is a spring beside the model's
-own to the letter.  Nor is any family of several effects sure where one curve of a state leaves no
-more than all of them do, unless it holds that family, which does most of it alone: they are facets
-of one law.
+own to the letter.  A constant force is not sure where a curve that is zero at zero leaves as much
+without it as beside it: the mean of a curve is no force at rest.  Nor is any family of several
+effects sure where one curve of a state leaves no more than all of them do, unless it holds that
+family, which does most of it alone: they are facets of one law.
 
 A name is not sure where a free curve beside it, of what it depends on, leaves far less: then its
 form is another one; nor where another member of its family does as well once a curve of what
@@ -15,8 +16,9 @@ neither depends on stands beside either.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -69,8 +71,8 @@ def against_curves(case: Case, explained: Explanations, part: Part,
         if own:
             rest = [e for e in h.effects if e not in own]
             found = _against(p, h, rule, [
-                (kind, _least(case, [fit], noise, p.dominance * own_left) / own_left)
-                for kind, fit in _in_its_place(case.model, h, p, rest)])
+                (kind, _kappa(case, fit, beside, noise, own_left, p.dominance))
+                for kind, fit, beside in _in_its_place(case.model, h, p, rest)])
             if isinstance(found, Doubtful):
                 doubtful.append(found)
                 continue
@@ -174,23 +176,42 @@ def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | 
             for s in site.moving if s not in _arguments(p))
 
 
-def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate],
-                  ) -> Iterator[tuple[Kind | None, Hypothesis | None]]:
+def _kappa(case: Case, instead: Hypothesis | None, beside: Hypothesis | None,
+           noise: Sequence[dict[str, float]], own_left: float, most: float) -> float:
+    """How many times more is left with a curve instead of a family than with the family, or with
+    both of them; more than `most` is not told apart.
+    """
+    if beside is not None:
+        both = _least(case, [beside], noise, own_left)
+        own_left = max(min(own_left, both), case.settings.part.floor)
+    return _least(case, [instead], noise, most * own_left) / own_left
+
+
+def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate]
+                  ) -> Iterator[tuple[Kind | None, Hypothesis | None, Hypothesis | None]]:
     """Free curves beside the `rest` of the effects, of what a family's members do not depend on,
     each with the family that it is of; of a rate it would be of two.
+
+    Other curves hold a constant force.  One that takes its place is zero where its argument is, and
+    is compared with the same beside that force.
     """
-    site, near = p.effect.site, h.minimum.chi2
-    families = {k.family for k in p.kinds}
-    if "constant force" in families:
-        return  # a curve holds a constant, too
+    site, families = p.effect.site, {k.family for k in p.kinds}
+    constant = "constant force" in families
+
+    def tried(curve: Callable[..., Hypothesis | None], argument: str
+              ) -> tuple[Hypothesis | None, Hypothesis | None]:
+        with_it = partial(curve, nominal, h, argument=argument, site=site, near=h.minimum.chi2,
+                          zero_at_zero=constant)
+        beside = with_it(effects=h.effects) if constant else None
+        return with_it(effects=rest, start=beside), beside
+
     for s in site.moving:
         if s not in _arguments(p):
             yield (Kind("restoring force", site.v) if s == site.q else None,
-                   with_free_curve(nominal, h, rest, s, site, near))
+                   *tried(with_free_curve, s))
     # a curve of a channel has a slope
     if not families & {"gain", "input curve"}:
-        yield from ((Kind("input curve"), with_free_input(nominal, h, rest, u, site, near))
-                    for u in site.inputs)
+        yield from ((Kind("input curve"), *tried(with_free_input, u)) for u in site.inputs)
 
 
 def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
