@@ -96,7 +96,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                     for other in _lasting(rest, o, fits.values())):
                 return f"a lasting effect would take up most of what {e.name} does"
         certain = h.minimum.chi2 + asks.sized**2 * scale
-        if rest in fits and below(loosened(fits[rest]), certain):
+        if rest in fits and fits[rest].pinned and below(loosened(fits[rest]), certain):
             return f"a parameter past its bound would explain as much as {e.name} does"
     return ""
 
