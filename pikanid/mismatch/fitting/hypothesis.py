@@ -133,11 +133,6 @@ class Hypothesis:
         return {**self.values, **given,
                 **{f.label: given.get(f.name, float(v)) for f, v in both}}
 
-    @property
-    def covariance(self) -> np.ndarray:
-        """(n, n) of the estimates; infinite variances become very large ones."""
-        return _inverse(self.minimum.J)
-
     @functools.cached_property
     def orders(self) -> np.ndarray:
         """(n, n) rows of a normal prior: no parameter of known size leaves its order of magnitude,
@@ -149,11 +144,17 @@ class Hypothesis:
         return np.diag(1.0 / np.maximum(sizes, alone))
 
     @functools.cached_property
+    def covariance(self) -> np.ndarray:
+        """(n, n) of the estimates, where the model's parameters keep their order of magnitude;
+        infinite variances become very large ones.
+        """
+        return _inverse(np.vstack([self.minimum.J, self.orders]))
+
+    @functools.cached_property
     def std(self) -> dict[str, float]:
-        """Standard errors by name, where the model's parameters keep their order of magnitude."""
-        variances = np.diag(_inverse(np.vstack([self.minimum.J, self.orders])))
-        return {f.name: float(v) for f, v in zip(self.whitened.problem.free, np.sqrt(variances),
-                                                 strict=True)}
+        """Standard errors by name."""
+        return {f.name: float(v) for f, v in zip(self.whitened.problem.free, np.sqrt(np.diag(
+            self.covariance)), strict=True)}
 
     def improves_on(self, known: Hypothesis) -> bool:
         """Whether it is closer than another fit of the same effects, by more than fits stop at."""
