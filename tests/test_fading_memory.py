@@ -12,6 +12,9 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import Effect, NewState
 from pikanid.model.parts import Parameter
 
@@ -59,3 +62,45 @@ def test_an_unknown_memory_is_given_no_name(k: float) -> None:
     assert answer.mismatch and answer.verdict not in ("named", "partial")
     assert answer.verdict != "set" or all(
         i.startswith("symbolic:") for h in answer.hypotheses for e in h.effects for i in e.ids)
+
+
+def rolling() -> pk.Model:
+    """A cart that nothing holds."""
+    return pk.Model.from_dict({
+        "name": "cart", "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}},
+        "inputs": {"F": {"unit": "N"}},
+        "parameters": {"m": {"unit": "kg", "guess": 1.2, "bounds": [0.01, 100.0]},
+                       "b": {"unit": "N*s/m", "guess": 0.4, "bounds": [0.0, 100.0]}},
+        "equations": {"x": "v", "v": "(F - b*v)/m"},
+        "outputs": {"x": {"unit": "m", "expression": "x"}}})
+
+
+def rolled(seed: int) -> pk.Recording:
+    """v' = F - v/2 + (w - v)/2, w' = 4 (v - w), at rest at first, by DOP853."""
+    rng = np.random.default_rng(seed)
+    F, x = np.repeat(rng.uniform(-2.0, 2.0, 20), 30), np.zeros((600, 3))
+    for i in range(599):
+        x[i + 1] = solve_ivp(lambda _, y, push=F[i]: [
+            y[1], push - 0.5 * y[1] + 0.5 * (y[2] - y[1]), 4.0 * (y[1] - y[2])], (0, 0.02), x[i],
+            "DOP853", rtol=1e-9, atol=1e-11).y[:, -1]
+    return pk.Recording.from_arrays(
+        0.02 * np.arange(600), {"F": F, "x": x[:, 0] + rng.normal(0, 0.003, 600)},
+        {"F": "N", "x": "m"}, {"x": 0.003}, {"F": "zero"})
+
+
+def test_a_rate_remembers_where_nothing_swings() -> None:
+    model, run = rolling(), rolled(1)
+    case = open_case(model, (run,), None, None, lambda text: None, DEFAULTS)
+    [law] = [c for c in case.candidates if c.ids == ("fading_memory",)]
+    found = fitted(model, [law], case.records, [{**case.base.point, "k_wake": 0.1}], 1)
+    assert found is not None and case.base.minimum.chi2 > 2 * found.whitened.rows
+    assert found.minimum.chi2 == pytest.approx(found.whitened.rows, rel=0.15)
+    assert found.values["k_wake"] == pytest.approx(0.5, abs=4 * found.std["k_wake"])
+    swinging = candidates(sites(pk.systems.sloshing(), (pk.excitation.two_pulse(),)))
+    assert not any("wake" in p.name for c in swinging for p in c.parameters)
+
+
+@pytest.mark.slow
+def test_an_unknown_memory_of_a_rate_is_given_no_name() -> None:
+    answer = pk.diagnose(rolling(), rolled(1), rolled(2))
+    assert answer.mismatch and answer.verdict in ("unnamed", "unconfirmed")

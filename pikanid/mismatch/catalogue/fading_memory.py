@@ -16,8 +16,10 @@ MEMORIES = (0.01, 0.03, 0.1, 0.3)  # numerical: of a recording, how long a state
 
 
 def fading_memory(site: Site) -> list[Candidate]:
-    """k (w - x), w' = r (x - w): of a state x that is no other one's rate."""
-    if site.q:
+    """k (w - x), w' = r (x - w): of a state x, or of a rate in whose equation nothing swings; there
+    it is the form next to a boundary layer.
+    """
+    if site.q and site.rate:
         return []
     span, x, w = site.span[1] - site.span[0], site.v, site.name("wake")
     k = Parameter(site.name("k_wake"), 0.0, "1/s")
