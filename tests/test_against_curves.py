@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from weighing import effect
 
@@ -120,12 +121,21 @@ def sure_of(family: str, instead: str = "") -> Any:
     (("mode", "constant force"), ["q", "v", "u"]), (("mode", "timing"), ["q", "v", "u"])])
 def test_no_curve_stands_for_either_of_two_families(
         monkeypatch: pytest.MonkeyPatch, families: tuple[str, str], tried: list[str]) -> None:
-    """Of what one of them depends on it would be that one."""
+    """Of what one of them depends on it would be that one; those for a constant force are zero at
+    zero, and stand beside it as well.
+    """
+    asked: list[str] = []
     for name in ("with_free_curve", "with_free_input"):
-        monkeypatch.setattr(curves, name, lambda *args, argument, **kept: argument)
+        monkeypatch.setattr(curves, name, lambda *args: asked.append(args[3]))
+    for name in ("state_curve", "input_curve"):
+        monkeypatch.setattr(curves, name, lambda h, name, site, zero_at_zero: asked.append(
+            name * zero_at_zero))
+    monkeypatch.setattr(curves, "with_and_instead", lambda *args: (None, None))
     h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
-    found = curves._in_its_place(MODEL, h, sure_of(*families), [])
-    assert [fit for _, fit, _ in found] == tried
+    case: Any = SimpleNamespace(model=MODEL)
+    assert all(kappa == np.inf for _, kappa in curves._in_its_place(
+        case, h, sure_of(*families), [], 1.0, []))
+    assert asked == tried
 
 
 SPRING, CURVE = Kind("restoring force", "v"), Kind("input curve")

@@ -11,6 +11,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.loosened import loosened
 from pikanid.mismatch.judge.doubt import why_not
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
@@ -55,26 +56,52 @@ def test_another_motion_proves_a_spring(hypotheses: tuple[Case, list[Hypothesis]
     assert said == "" and motion > 1e5
 
 
-def test_what_a_parameter_would_do_past_its_bound_is_no_effect() -> None:
-    """A push beside a damping that its bound keeps from pushing; a spring beside the same."""
+@pytest.mark.parametrize("guess", [0.05, 0.01, 0.0])
+def test_what_a_parameter_would_do_past_its_bound_is_no_effect(guess: float) -> None:
+    """A push beside a damping that its bound keeps from pushing, whatever its guess; a spring
+    beside the same.
+    """
     push, = from_table({"push": {
         "parameters": {"q": {"unit": "1/s", "guess": 0.1, "bounds": [0, 9]}},
         "add": {"x_dot": "q*x_dot"}, "null": {"q": 0}}}, "test")
     nominal = pk.systems.linear_oscillator().with_candidates(push)
+    asked = nominal.with_values({"zeta": guess})
 
-    def judged(pushed: float, k3: float, key: str, guess: Mapping[str, float]) -> str:
+    def judged(pushed: float, k3: float, key: str, start: Mapping[str, float]) -> str:
         truth = nominal.with_term("x_dot", "pushed*x_dot - k3*x**3", [
             pk.Parameter("pushed", pushed), pk.Parameter("k3", k3)])
         train, later = (pk.simulate(truth, blows(seed), sigma=SIGMA, seed=seed) for seed in (1, 2))
-        case = open_case(nominal, (train,), (later,), None, lambda text: None, DEFAULTS)
+        case = open_case(asked, (train,), (later,), None, lambda text: None, DEFAULTS)
         effect = next(c for c in case.candidates if c.key == key)
-        found = fitted(case.model, [effect], case.records, [guess], 30)
+        found = fitted(case.model, [effect], case.records, [start], 30)
         assert found is not None and case.base.values["zeta"] < 1e-6
         return why_not(found, [found, case.base], case.predicted, lambda *asked: 0.0, 1.0, DEFAULTS)
 
     said = judged(0.8, 0.0, "push", {"q": 0.1})
     assert said == "a parameter past its bound would explain as much as push does"
     assert judged(0.63, 10.0, "cubic_stiffness", {"k3": 1.0}) == ""
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_each_recording_s_own_parameter_passes_its_own_bound(order: int) -> None:
+    """Below the lower one in one recording, beyond the upper one in the other."""
+    usual = pk.systems.linear_oscillator()
+    nominal = usual.replace(parameters=tuple(
+        replace(p, scope="recording", bounds=(0.0, 0.8)) if p.name == "zeta" else p
+        for p in usual.parameters))
+    free = usual.replace(parameters=tuple(
+        replace(p, bounds=(-2.0, 2.0)) if p.name == "zeta" else p for p in usual.parameters))
+    runs = tuple(pk.simulate(free.with_values({"zeta": zeta}), blows(k), sigma=SIGMA, seed=k)
+                 for k, zeta in enumerate((-0.02, 0.9)))
+    base = open_case(nominal, runs[::order], None, None, lambda text: None, DEFAULTS).base
+    past = loosened(base, base)
+    assert past is not None and base.minimum.chi2 > 2 * base.whitened.rows
+    assert past == pytest.approx(base.whitened.rows, rel=0.15)
+
+
+def test_what_no_bound_holds_is_not_loosened(hypotheses: tuple[Case, list[Hypothesis]]) -> None:
+    _, (spring, base) = hypotheses
+    assert not base.pinned and loosened(base, spring) is None
 
 
 def blows(seed: int) -> Recording:

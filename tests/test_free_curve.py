@@ -8,6 +8,8 @@ import sympy as sp
 
 import pikanid as pk
 from pikanid.mismatch.beyond.free_curve import (
+    _curve,
+    state_curve,
     with_free_curve,
     with_free_input,
     with_free_sensor,
@@ -94,7 +96,17 @@ def test_a_curve_that_is_zero_at_zero_holds_no_constant(zero_at_zero: bool) -> N
 
 def test_a_constant_force_is_no_curve_that_is_zero_at_zero() -> None:
     base, site = base_of("10")
-    held, free = (with_free_curve(base.model, base, (), "theta", site, zero_at_zero=zero)
-                  for zero in (True, False))
+    held, free = (fitted(base.model, [curve], base.whitened.records, [base.point], 1)
+                  for zero in (True, False)
+                  if (curve := state_curve(base, "theta", site, zero_at_zero=zero)))
     assert held is not None and free is not None
     assert free.minimum.chi2 < 0.3 * held.minimum.chi2
+
+
+@pytest.mark.parametrize(("unit", "low", "high", "there"), [
+    ("V", -1.0, 2.0, True), ("V", 0.0, 2.0, True), ("V", 0.5, 2.0, False), ("V", 0.0, 0.0, False),
+    ("degC", -1.0, 2.0, False), ("K", 0.0, 2.0, True)])
+def test_where_a_curve_can_be_zero_at_zero(unit: str, low: float, high: float, there: bool) -> None:
+    base, _ = base_of("0")
+    found = _curve(base, "theta", np.linspace(low, high, 9), unit, 3, True)
+    assert (found is not None) == there

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from pikanid.formula import units
 from pikanid.mismatch.beyond.patch import FreeCurve
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
@@ -18,8 +19,7 @@ PIECES = (FINE, 6, 3)  # numerical: with which a curve is tried, one after the o
 
 
 def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], argument: str,
-                    site: Site, near: float = np.inf, tried: Sequence[int] = PIECES,
-                    zero_at_zero: bool = False, start: Hypothesis | None = None
+                    site: Site, near: float = np.inf, tried: Sequence[int] = PIECES
                     ) -> Hypothesis | None:
     """Effects of a hypothesis and a free curve as a force, refitted from where it stands, with
     fewer pieces where that ends in nothing that can be run; None where no curve can be.
@@ -32,29 +32,16 @@ def with_free_curve(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
         site: Coordinate in whose equation it stands.
         near: χ² to come near to: a fit that stays far above is not carried through.
         tried: Numbers of pieces.
-        zero_at_zero: Whether the curve holds no constant; none can be that was never near zero.
-        start: Where to begin instead: a fit with such a curve.
     """
-    visited = h.whitened.motion(h.minimum.theta)[argument]
-    low, high = float(visited.min()), float(visited.max())
-    if zero_at_zero and not low < 0 < high:
-        return None
-    curves = (FreeCurve(argument, low, high, h.model, pieces, zero_at_zero=zero_at_zero)
-              for pieces in tried)
-    return next((found for curve in curves if (found := fitted(
-        nominal, [*effects, curve.candidate(site)], h.whitened.records, [(start or h).point], 1,
-        Closest(near), h.key)) is not None), None)
+    curves = (state_curve(h, argument, site, pieces) for pieces in tried)
+    return next((found for curve in curves
+                 if (found := _refitted(nominal, h, effects, curve, near)) is not None), None)
 
 
-def with_free_input(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], argument: str,
-                    site: Site, near: float = np.inf, zero_at_zero: bool = False,
-                    start: Hypothesis | None = None) -> Hypothesis | None:
+def with_free_input(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
+                    site: Site, near: float = np.inf) -> Hypothesis | None:
     """The same with a free curve of an input in what acts; None where that never changes."""
-    problem = h.whitened.problem
-    at = nominal.input_names.index(argument)
-    visited = np.concatenate([e.held[at].values for e in problem.experiments])
-    return _beside(nominal, h, effects, argument, visited, nominal.input(argument).unit,
-                   FreeCurve.of_input, site, near, zero_at_zero, start)
+    return _refitted(nominal, h, effects, input_curve(h, name, site), near)
 
 
 def with_free_sensor(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
@@ -63,17 +50,51 @@ def with_free_sensor(nominal: Model, h: Hypothesis, effects: Sequence[Candidate]
     problem, output = h.whitened.problem, site.output
     visited = np.concatenate([s.y for e in problem.experiments for s in e.samples
                               if problem.model.outputs[s.output].name == output.name])
-    return _beside(nominal, h, effects, output.name, visited, output.unit, FreeCurve.of_sensor,
-                   site, near)
+    curve = _curve(h, output.name, visited, output.unit, FINE, False)
+    return _refitted(nominal, h, effects, curve.of_sensor(site) if curve else None, near)
 
 
-def _beside(nominal: Model, h: Hypothesis, effects: Sequence[Candidate], name: str,
-            visited: np.ndarray, unit: str, curve_of: Callable[[FreeCurve, Site], Candidate],
-            site: Site, near: float, zero_at_zero: bool = False, start: Hypothesis | None = None
-            ) -> Hypothesis | None:
+def with_and_instead(nominal: Model, h: Hypothesis, rest: Sequence[Candidate],
+                     curve: Candidate | None, near: float
+                     ) -> tuple[Hypothesis | None, Hypothesis | None]:
+    """A hypothesis with a curve beside all its effects, and, from there, beside the rest of them:
+    without its constant force a drive spins far off.
+    """
+    both = _refitted(nominal, h, h.effects, curve, near)
+    return both, None if both is None else _refitted(nominal, both, rest, curve, near)
+
+
+def state_curve(h: Hypothesis, name: str, site: Site, pieces: int = FINE,
+                zero_at_zero: bool = False) -> Candidate | None:
+    """A free curve of a state over a hypothesis' motion as a force; None where there can be none.
+    """
+    curve = _curve(h, name, h.whitened.motion(h.minimum.theta)[name], h.model.state(name).unit,
+                   pieces, zero_at_zero)
+    return curve.candidate(site) if curve else None
+
+
+def input_curve(h: Hypothesis, name: str, site: Site, zero_at_zero: bool = False
+                ) -> Candidate | None:
+    """The same of an input in what acts."""
+    at = h.model.input_names.index(name)
+    visited = np.concatenate([e.held[at].values for e in h.whitened.problem.experiments])
+    curve = _curve(h, name, visited, h.model.input(name).unit, FINE, zero_at_zero)
+    return curve.of_input(site) if curve else None
+
+
+def _curve(h: Hypothesis, name: str, visited: np.ndarray, unit: str, pieces: int,
+           zero_at_zero: bool) -> FreeCurve | None:
+    """None of what never changes, or, where it has to be zero at zero, was never there or has no
+    zero but by convention, as degrees Celsius.
+    """
     low, high = float(visited.min()), float(visited.max())
-    if low == high or (zero_at_zero and not low < 0 < high):
+    if low == high or (zero_at_zero and not (
+            low <= 0 <= high and not (unit and units.begins_elsewhere(unit)))):
         return None
-    curve = FreeCurve(name, low, high, h.model, FINE, unit, zero_at_zero)
-    return fitted(nominal, [*effects, curve_of(curve, site)], h.whitened.records,
-                  [(start or h).point], 1, Closest(near), h.key)
+    return FreeCurve(name, low, high, h.model, pieces, unit, zero_at_zero)
+
+
+def _refitted(nominal: Model, h: Hypothesis, effects: Sequence[Candidate],
+              curve: Candidate | None, near: float) -> Hypothesis | None:
+    return None if curve is None else fitted(
+        nominal, [*effects, curve], h.whitened.records, [h.point], 1, Closest(near), h.key)

@@ -16,8 +16,9 @@ MEMORIES = (0.01, 0.03, 0.1, 0.3)  # numerical: of a recording, how long a state
 
 
 def fading_memory(site: Site) -> list[Candidate]:
-    """k (w - x), w' = r (x - w): of a state x, or of a rate in whose equation nothing swings; there
-    it is the form next to a boundary layer.
+    """k (w - x), w' = r (x - w): of a state x that is no other one's rate, or of a rate without a
+    restoring force at the guesses.  With one it is a boundary layer's next form
+    (`neighbouring_forms`).
     """
     if site.q and site.rate:
         return []

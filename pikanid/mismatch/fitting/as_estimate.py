@@ -16,7 +16,9 @@ from pikanid.storage.version import __version__
 
 
 def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
-    """The estimate of the extended model; covariance with the noise's colour."""
+    """The estimate of the extended model, with the hypothesis' covariance: along what the recording
+    does not tell, standard errors end where parameters leave the order of magnitude of the guess.
+    """
     whitened = h.whitened
     problem = whitened.problem
     fits, trajectories = [], []

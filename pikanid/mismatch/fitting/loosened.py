@@ -1,33 +1,44 @@
-"""What a model would explain if its parameters' bounds did not hold it."""
+"""What a model would explain if the bounds of its parameters did not hold them."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.fitting.closest import Closest
-from pikanid.mismatch.fitting.descent import descended
+from pikanid.mismatch.fitting.descent import place
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.optimise.levenberg_marquardt import minimise
 
 
-def loosened(h: Hypothesis) -> float:
-    """χ² where parameters that a bound holds may pass it by their order of magnitude.
+def loosened(h: Hypothesis, near: Hypothesis) -> float | None:
+    """χ² where the model's parameters that a bound holds may pass it; None where it holds none.
 
-    Only parameters of known size may: how far past its bounds another one would have to go, nothing
-    tells.
+    What effects bring with them keeps its bounds: past them, an exponent or a width means nothing.
+
+    Args:
+        h: A fit.
+        near: Another one, with more effects: the values that it has for the rest are a second
+            place to begin.
     """
-    problem, theta = h.whitened.problem, h.minimum.theta
-    sizes = np.maximum(h.whitened.sizes, np.abs(theta))
-    held = h.minimum.pinned(problem.lower, problem.upper) & np.isfinite(sizes)
-    room = {f.name: float(size)
-            for f, size, is_held in zip(problem.free, sizes, held, strict=True) if is_held}
-    if not room:
-        return h.minimum.chi2
-    whitened = Whitened(h.model.with_parameters(*(
-        replace(p, bounds=(p.bounds[0] - room[p.name], p.bounds[1] + room[p.name]))
-        for p in h.model.parameters if p.name in room)), h.whitened.records)
-    found = descended(whitened, [h.point], Closest(), whitened.settings.budget.iterations,
-                      beyond=lambda size: False)
-    return h.minimum.chi2 if found is None else found.chi2
+    whitened = Whitened(h.model, h.whitened.records)
+    problem, rows, fit = whitened.problem, max(whitened.rows, 1), h.minimum
+    held = fit.pinned(problem.lower, problem.upper) & np.array(
+        [f.name in whitened.records.guess for f in problem.free])
+    if not held.any():
+        return None
+    upwards = fit.J.T @ fit.r < 0
+    lower = np.where(held & ~upwards, -np.inf, problem.lower)
+    upper = np.where(held & upwards, np.inf, problem.upper)
+    found = [fit.chi2]
+    for start in (h, near):
+        theta, misfit = place(whitened, start.point), start.minimum.chi2 / rows
+        for _ in range(2):  # the second time with steps for what the first one leaves
+            if not whitened.choose_steps(theta, misfit=max(misfit, 1.0)):
+                break
+            one = minimise(whitened.residual, theta, lower, upper,
+                           whitened.settings.budget.iterations, sizes=whitened.sizes)
+            if one is None:
+                break
+            theta, misfit = one.theta, one.chi2 / rows
+            found.append(one.chi2)
+    return min(found)

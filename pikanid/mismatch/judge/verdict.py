@@ -21,7 +21,7 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import VerdictSettings
 
 Test = Callable[[Hypothesis], Detection]
-
+NO_ENTRY = "the catalogue has no entry for it: other laws may do the same"
 
 Verdict = Literal["none", "named", "set", "partial", "unconfirmed", "unnamed"]
 
@@ -126,7 +126,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     outside = [h for h in given if not h.known]
     known = [h for h in given if h.known]
     if not known:
-        rest = tuple(h for h in near if h not in given) + tuple(given)
+        reasons |= {h.key: NO_ENTRY for h in given}
+        rest = tuple(given) + tuple(h for h in near if h not in given)
         most = _largest_part(base, tried, scale, predict, settings) if not given else ()
         if most:
             merged, twins = merged_twins(list(most), tried, asks)

@@ -12,8 +12,6 @@ from pikanid.mismatch.report.findings import Explanation, NamedEffect
 from pikanid.mismatch.report.part import values_of
 from pikanid.mismatch.settings.settings import Settings
 
-NO_ENTRY = "the catalogue has no entry for it: other laws may do the same"
-
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
                  settings: Settings, overdispersion: float = 1.0
@@ -55,9 +53,8 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
 
     given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
     best = answer.given[0].score(scale) if answer.given else pool[0].score(scale)
-    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or (
-        NO_ENTRY if not answer.given and not h.known else _behind(h.score(scale) - best)))
-        for h in answer.others)
+    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(h.score(scale) - best))
+                   for h in answer.others)
     return given, others
 
 

@@ -16,14 +16,16 @@ neither depends on stands beside either.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from pikanid.mismatch.beyond.free_curve import (
     PIECES,
+    input_curve,
+    state_curve,
+    with_and_instead,
     with_free_curve,
     with_free_input,
     with_free_sensor,
@@ -70,9 +72,7 @@ def against_curves(case: Case, explained: Explanations, part: Part,
             continue
         if own:
             rest = [e for e in h.effects if e not in own]
-            found = _against(p, h, rule, [
-                (kind, _kappa(case, fit, beside, noise, own_left, p.dominance))
-                for kind, fit, beside in _in_its_place(case.model, h, p, rest)])
+            found = _against(p, h, rule, [*_in_its_place(case, h, p, rest, own_left, noise)])
             if isinstance(found, Doubtful):
                 doubtful.append(found)
                 continue
@@ -176,42 +176,36 @@ def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | 
             for s in site.moving if s not in _arguments(p))
 
 
-def _kappa(case: Case, instead: Hypothesis | None, beside: Hypothesis | None,
-           noise: Sequence[dict[str, float]], own_left: float, most: float) -> float:
-    """How many times more is left with a curve instead of a family than with the family, or with
-    both of them; more than `most` is not told apart.
-    """
-    if beside is not None:
-        both = _least(case, [beside], noise, own_left)
-        own_left = max(min(own_left, both), case.settings.part.floor)
-    return _least(case, [instead], noise, most * own_left) / own_left
-
-
-def _in_its_place(nominal: Model, h: Hypothesis, p: Present, rest: Sequence[Candidate]
-                  ) -> Iterator[tuple[Kind | None, Hypothesis | None, Hypothesis | None]]:
-    """Free curves beside the `rest` of the effects, of what a family's members do not depend on,
-    each with the family that it is of; of a rate it would be of two.
+def _in_its_place(case: Case, h: Hypothesis, p: Present, rest: Sequence[Candidate], own_left: float,
+                  noise: Sequence[dict[str, float]]) -> Iterator[tuple[Kind | None, float]]:
+    """Of free curves beside the `rest` of the effects, of what a family's members do not depend on:
+    the family that each is of, of a rate it would be of two, and how many times as much is left.
 
     Other curves hold a constant force.  One that takes its place is zero where its argument is, and
     is compared with the same beside that force.
     """
-    site, families = p.effect.site, {k.family for k in p.kinds}
-    constant = "constant force" in families
-
-    def tried(curve: Callable[..., Hypothesis | None], argument: str
-              ) -> tuple[Hypothesis | None, Hypothesis | None]:
-        with_it = partial(curve, nominal, h, argument=argument, site=site, near=h.minimum.chi2,
-                          zero_at_zero=constant)
-        beside = with_it(effects=h.effects) if constant else None
-        return with_it(effects=rest, start=beside), beside
-
-    for s in site.moving:
-        if s not in _arguments(p):
-            yield (Kind("restoring force", site.v) if s == site.q else None,
-                   *tried(with_free_curve, s))
+    nominal, site, near = case.model, p.effect.site, h.minimum.chi2
+    families = {k.family for k in p.kinds}
+    states = [s for s in site.moving if s not in _arguments(p)]
     # a curve of a channel has a slope
-    if not families & {"gain", "input curve"}:
-        yield from ((Kind("input curve"), *tried(with_free_input, u)) for u in site.inputs)
+    inputs = [] if families & {"gain", "input curve"} else site.inputs
+
+    def times_as_much(instead: Hypothesis | None, both: Hypothesis | None = None) -> float:
+        left = own_left if both is None else max(
+            min(own_left, _least(case, [both], noise, own_left)), case.settings.part.floor)
+        return _least(case, [instead], noise, p.dominance * left) / left
+
+    for name in (*states, *inputs):
+        kind = (Kind("input curve") if name in inputs else
+                Kind("restoring force", site.v) if name == site.q else None)
+        if "constant force" in families:
+            curve = (input_curve(h, name, site, zero_at_zero=True) if name in inputs else
+                     state_curve(h, name, site, zero_at_zero=True))
+            both, instead = with_and_instead(nominal, h, rest, curve, near)
+            yield kind, times_as_much(instead, both)
+        else:
+            curve_of = with_free_input if name in inputs else with_free_curve
+            yield kind, times_as_much(curve_of(nominal, h, rest, name, site, near))
 
 
 def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:
