@@ -131,9 +131,11 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     residuals = tuple(_residuals(whitened, gaps))
     sized = np.concatenate([g / sigma for g, sigma in zip(gaps, whitened.sigma, strict=True)])
     return HeldOut(_rmse(residuals), float(np.sqrt(np.mean(sized**2))), tests, together, chi2,
-                   chi2 + room(found.J, shared, fit), samples.t, samples.y, predicted, moved,
-                   _rmse(_residuals(whitened, closer)), residuals, found.r[: whitened.rows],
-                   _inert(whitened, found, nominal), _motion(whitened, gaps))
+                   chi2 + room(found.J, shared, fit, functools.partial(
+                       elsewhere, prior, hypothesis, found.theta[shared])),
+                   samples.t, samples.y, predicted, moved, _rmse(_residuals(whitened, closer)),
+                   residuals, found.r[: whitened.rows], _inert(whitened, found, nominal),
+                   _motion(whitened, gaps))
 
 
 def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared: list[int],

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+
+NARROW = 2.0  # numerical: 2 ln of times, on average, that parameters become narrower at most
 
 
 @dataclass(frozen=True)
@@ -83,17 +85,37 @@ def _linearised(theta: np.ndarray, J: np.ndarray, r: np.ndarray, inside: tuple[i
     return Prior(root, theta[shared], z, float(left @ left - z @ z) - least, theta, follow, inside)
 
 
-def room(J: np.ndarray, shared: Sequence[int], fit: Prior) -> float:
+def room(J: np.ndarray, shared: Sequence[int], fit: Prior,
+         there: Callable[[], Prior | None] = lambda: None) -> float:
     """What the parameters' uncertainty costs of the probability density of a recording.
 
     Shared ones: the logarithm of how much narrower the recording makes what a fit has left of them.
     Others know nothing before, and cost what the recording tells of them beyond one of its rows.
+    Where they become very much narrower, that may be the place's doing: a mass that has all but
+    vanished shows thousands of times as much of any change when it is twice as large.  What the fit
+    has left there is narrower, too.
+
+    Args:
+        J: Jacobian of the recording, and below it of what is known before (rows + n, p).
+        shared: Places (n,) of the parameters that both have.
+        fit: What a fit says, at its estimates.
+        there: What it says where J was taken.
     """
     own = [k for k in range(J.shape[1]) if k not in shared]
-    q, _ = np.linalg.qr(J[:, own])
-    known = J[:, shared] - q @ (q.T @ J[:, shared])
-    # far from the estimates a law may tell nothing: no recording makes that uncertainty wider
-    return max(_volume(known) - _volume(fit.root), 0.0) + len(own) * float(np.log(len(J)))
+
+    def narrower(whole: np.ndarray, before: Prior) -> float:
+        q, _ = np.linalg.qr(whole[:, own])
+        left = whole[:, shared] - q @ (q.T @ whole[:, shared])
+        # far from the estimates a law may tell nothing: no recording makes that uncertainty wider
+        return max(_volume(left) - _volume(before.root), 0.0)
+
+    cost = narrower(J, fit)
+    if cost > NARROW * len(shared) and (other := there()) is not None:
+        both = J.copy()
+        both[len(J) - len(shared):] = 0.0
+        both[len(J) - len(shared):, shared] = other.root
+        cost = min(cost, narrower(both, other))
+    return cost + len(own) * float(np.log(len(J)))
 
 
 def _volume(J: np.ndarray) -> float:

@@ -43,6 +43,16 @@ def afresh(h: Hypothesis, guess: Mapping[str, float]) -> Iterator[Job]:
                 yield h.effects, starts
 
 
+def from_its_place(h: Hypothesis, rivals: Iterable[Hypothesis], base: Hypothesis) -> Iterator[Job]:
+    """Rivals once more, from where a hypothesis has the parameters of the model (`base`): what a
+    valley has led elsewhere would be dismissed for where it went, not for what it is.
+    """
+    theirs = {n: v for n, v in h.point.items() if n in base.point}
+    for rival in rivals:
+        if rival.effects and rival.key != h.key:
+            yield rival.effects, [{**rival.point, **theirs}]
+
+
 def with_simpler(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """With a law that one of its effects contains in that one's place."""
     for effect in h.effects:

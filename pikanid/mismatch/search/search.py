@@ -198,7 +198,8 @@ class Search:
         before = {h.fit for h in self.fits.values()}
         for h in hypotheses[:self.settings.budget.asked_again]:
             self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates),
-                         *places.elsewhere(h, self.candidates)), h.key)
+                         *places.elsewhere(h, self.candidates),
+                         *neighbours.from_its_place(h, self._contenders(), self.base())), h.key)
             self._exchange(h, anyway=True)
         return {h.fit for h in self.fits.values()} != before
 
