@@ -50,6 +50,24 @@ def test_a_law_that_tells_nothing_far_from_its_estimates_gains_nothing_there() -
     assert room(J, [0], prior(np.array([[3.0]]))) == 0.0
 
 
+def test_what_shows_more_elsewhere_was_known_better_there_as_well() -> None:
+    """Where all of a parameter shows a million times as much, a fit would have known it as much
+    better; of what is hardly narrower nobody asks.
+    """
+    later, root = np.random.default_rng(3).standard_normal((40, 2)), np.diag([6.0, 7.0])
+    usual = np.vstack([later, root])
+    scales = np.array([1e6, 1.0])
+    moved = np.vstack([later * scales, root])
+    assert room(moved, [0, 1], prior(root)) > 20
+    assert room(moved, [0, 1], prior(root), lambda: prior(root * scales)) == pytest.approx(
+        room(usual, [0, 1], prior(root)), rel=1e-9)
+
+    def asked() -> Prior:
+        raise AssertionError
+
+    assert 0 < room(usual, [0, 1], prior(root), asked) < 2
+
+
 def opened(size: float) -> Case:
     """The nominal pendulum, on two recordings of one with a spring that stiffens."""
     model = pk.systems.sloshing()

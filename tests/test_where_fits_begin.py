@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, near_guess
-from pikanid.mismatch.search.neighbours import afresh, with_twins
+from pikanid.mismatch.search.neighbours import afresh, from_its_place, with_twins
 from pikanid.mismatch.search.places import led_away
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
@@ -48,6 +48,13 @@ def test_an_explanation_begins_again_at_the_guess() -> None:
     assert effects == h.effects and isinstance(start, Mapping)
     assert [start[label] for label in labels] == [4.0, 4.0] and start["a"] == 0.1
     assert start["bias"] == h.values["bias"]
+    rival = hypothesis(case, "input_gain")
+    assert rival.key != h.key
+    [(effects, [start])] = from_its_place(h, [h, case.base, rival], case.base)
+    assert effects == rival.effects and isinstance(start, Mapping)
+    own = rival.effects[0].parameters[0].name
+    assert start[own] == rival.values[own] and start["a"] == h.values["a"]
+    assert [start[label] for label in labels] == [h.point[label] for label in labels]
 
 
 def test_twins_begin_as_strong_as_what_they_replace() -> None:
