@@ -28,10 +28,10 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     could have refuted it; a limit that it does not meet has to be met again where the train
     recordings go on.  And it has to speak for each of several: one is easily found that takes up
     what the others leave, whatever that is.  Where a bound holds a parameter without the effect,
-    it must do what that parameter would not do past the bound; its own error has to say that there
-    is any where that is another effect's, which means nothing there.  What happens once, of which
-    it cannot speak, takes up anything: there, what lasts must not do most of that as well and
-    predict as well.
+    one that has a size must do what that parameter would not do past the bound (a reversed sign is
+    what a gain would do there); its own error has to say that there is any where that is another
+    effect's, which means nothing there.  What happens once, of which it cannot speak, takes up
+    anything: there, what lasts must not do most of that as well and predict as well.
 
     Args:
         h: To prove.
@@ -96,7 +96,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                     and not speaks(h, other, predict, asks.needed * scale)
                     for other in _lasting(rest, o, fits.values())):
                 return f"a lasting effect would take up most of what {e.name} does"
-        if rest in fits and fits[rest].pinned:
+        if sizes and rest in fits and fits[rest].pinned:
             past = loosened(fits[rest], h)
             if past is None and (said := no_size(e, h, 1.0, settings)):
                 return said
