@@ -16,11 +16,11 @@ MEMORIES = (0.01, 0.03, 0.1, 0.3)  # numerical: of a recording, how long a state
 
 
 def fading_memory(site: Site) -> list[Candidate]:
-    """k (w - x), w' = r (x - w): of a state x that is no other one's rate, or of a rate without a
-    restoring force at the guesses.  With one it is a boundary layer's next form
-    (`neighbouring_forms`).
+    """k (w - x), w' = r (x - w): of a state x that is no other one's rate, or of a rate that the
+    model resists, without a restoring force at the guesses.  With one it is a boundary layer's next
+    form (`neighbouring_forms`); without any resistance it would stand for that.
     """
-    if site.q and site.rate:
+    if site.q and (site.rate or not site.resisted):
         return []
     span, x, w = site.span[1] - site.span[0], site.v, site.name("wake")
     k = Parameter(site.name("k_wake"), 0.0, "1/s")
