@@ -104,6 +104,23 @@ def test_what_no_bound_holds_is_not_loosened(hypotheses: tuple[Case, list[Hypoth
     assert not base.pinned and loosened(base, spring) is None
 
 
+def test_a_size_that_may_be_nothing_is_not_sure(
+        hypotheses: tuple[Case, list[Hypothesis]], monkeypatch: pytest.MonkeyPatch) -> None:
+    """However much it gains: it stands for another effect's parameter that a bound holds without
+    it.  Where none is held, the fit without it has said how much it gains, also where that is no
+    parabola.
+    """
+    case, ranked = hypotheses
+    monkeypatch.setattr("pikanid.mismatch.judge.doubt.loosened", lambda *asked: None)
+    size = ranked[0].values["k3"]
+    for error, pinned, sure in ((size / 4.0, True, True), (size / 2.0, True, False),
+                                (size / 2.0, False, True)):
+        monkeypatch.setattr(Hypothesis, "std", {"k3": error})
+        monkeypatch.setattr(Hypothesis, "pinned", pinned)
+        said, _ = doubt(case, ranked, moved(2))
+        assert sure == (said == "") and sure != ("may be nothing" in said)
+
+
 def blows(seed: int) -> Recording:
     rng = np.random.default_rng(seed)
     t = np.arange(400) * 0.02
