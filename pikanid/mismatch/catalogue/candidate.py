@@ -116,6 +116,8 @@ class Candidate:
         powers: Of the states, where it is a product of powers.
         next_to: Key of the entry whose form is the next one to its own.
         starts: Where fits in its place begin, from its values and the motion (L,) by state.
+        signs: How it would show in that one's place, where what that one leaves unexplained says
+            where fits begin.
         shape_of: Ids of an entry whose law it is in a contact too brief for its course to show.
         brief: Whether values of its parameters make a contact so brief.
         limit: What it cannot be told from where it is narrow.
@@ -158,6 +160,7 @@ class Candidate:
     powers: Powers | None = None
     next_to: str = ""
     starts: Begin | None = None
+    signs: Callable[[View], Sequence[TangentDirection]] | None = None
     shape_of: tuple[str, ...] = ()
     brief: Callable[[Mapping[str, float]], bool] | None = None
     limit: Limit | None = None

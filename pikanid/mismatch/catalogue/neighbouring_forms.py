@@ -7,8 +7,8 @@ state, that of a free exponent with a loss that saturates; an elastic wall with 
 rises with the square, as that of a cable that tightens;
 a boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially; a
 steady drift with a parameter that settles; a loop of hysteresis with a spring that gives way
-without a memory; a scale error of input or sensor with curves that bend as well, and a cubic one
-with other powers.
+without a memory; another initial state with a force that goes on swinging; a scale error of input
+or sensor with curves that bend as well, and a cubic one with other powers.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Begin, Candidate, Family, Powers
 from pikanid.mismatch.catalogue.forces import INF, changing, wall_force
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.swinging_force import swinging_force
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, State
 
@@ -47,6 +48,8 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
         return [_settling(entry)]
     if entry.ids == ("hysteresis",) and entry.channel == "dynamics" and entry.site.rate:
         return [_yielding(entry)]
+    if entry.ids == ("initial_state",):
+        return [swinging_force(entry)]
     if entry.ids == ("input_gain",):
         return [_bent(entry, entry.variant or entry.site.inputs[0], n) for n in BENT]
     if entry.ids == ("sensor_gain",) and entry.site.rate:

@@ -163,6 +163,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         doubt = "a law outside the catalogue explains it better"
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
+    if proves and len(merged) > asks.crowd:
+        doubt = doubt or f"where {len(merged)} explanations do, a law that nobody has listed may"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]
@@ -266,6 +268,10 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
              for h in likely if predict(h)]
     if any(below(asks.same_law, abs(d)) and below(d, asks.indistinct) for d in apart):
         doubt = "another law outside the catalogue explains it about as well"
+        return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
+    if sum(h.symbolic for h in given) > 1:
+        # forms that nobody has tried would do as well
+        doubt = "these recordings do not tell which form it has"
         return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
     return replace(found, given=given, verdict="named" if found.verdict == "set" and len(given) == 1
                    else found.verdict)

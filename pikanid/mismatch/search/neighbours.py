@@ -6,6 +6,7 @@ Each comes with the starts of its fit, on from where the hypothesis stands.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from pikanid.mismatch.catalogue.candidate import CURVES, Candidate
 from pikanid.mismatch.detect.tangent import directions
@@ -108,11 +109,25 @@ def with_next_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[J
                 {**h.point, **start} for start in other.starts(h.values, states)]
 
 
-def with_other_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+def with_next_sign(h: Hypothesis, candidates: Sequence[Candidate],
+                   fits: Mapping[frozenset[str], Hypothesis]) -> Iterator[Job]:
+    """The same of laws that show where their fits begin in what is left without the effect."""
+    for effect in h.effects:
+        near = [replace(c, directions=c.signs) for c in candidates
+                if c.next_to == effect.key and c.signs is not None]
+        without = fits.get(h.key - {effect.key})
+        if near and without is not None:
+            for other, starts in Screen(without, near).singles(len(near)):
+                yield (*_rest(h, effect), other), starts
+
+
+def with_other_form(h: Hypothesis, candidates: Sequence[Candidate],
+                    fits: Mapping[frozenset[str], Hypothesis]) -> Iterator[Job]:
     """With what keeps the name of one of its effects away, if that acts instead, in its place."""
     yield from with_wider(h, candidates)
     yield from with_cousins(h, candidates)
     yield from with_next_form(h, candidates)
+    yield from with_next_sign(h, candidates, fits)
 
 
 def with_parts(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:

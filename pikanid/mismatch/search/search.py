@@ -154,7 +154,7 @@ class Search:
         # even without budget, no name without the laws that keep wrong ones away, of parts as well
         parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
         for h in (*parts, *self._contenders()):
-            for job in neighbours.with_other_form(h, self.candidates):
+            for job in neighbours.with_other_form(h, self.candidates, self.fits):
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
 
