@@ -21,6 +21,9 @@ def test_a_set_of_many_is_not_confirmed() -> None:
     # of those that are one law under several names, one counts
     twins = [replace(e, twin="scale") for e in names[-2:]]
     assert answered([*fits[:-2], *(hypothesis(1001.0, e) for e in twins)]).verdict == "set"
+    # nor does what adds to one of them
+    more = hypothesis(989.0, names[0], effect("more"))
+    assert answered([*fits[:-1], more]).verdict == "set"
 
 
 def test_a_formula_whose_form_is_not_told_is_not_confirmed() -> None:

@@ -163,8 +163,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         doubt = "a law outside the catalogue explains it better"
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
-    if proves and len(merged) > asks.crowd:
-        doubt = doubt or f"where {len(merged)} explanations do, a law that nobody has listed may"
+    apart = sum(not any(o.key < h.key for o in merged) for h in merged)
+    if proves and apart > asks.crowd:
+        doubt = doubt or f"where {apart} explanations do, a law that nobody has listed may"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]

@@ -24,8 +24,9 @@ class VerdictSettings:
             odds of e² to 1 that a law is one that has a name.
         unforeseen: Prior probability that what explains everything is a law that neither the
             catalogue nor what keeps its names away holds.
-        crowd: Explanations that recordings may leave and still confirm as a set.  The more of a
-            catalogue they leave, the more they would leave of laws that are in none.
+        crowd: Explanations, none of which holds another one, that recordings may leave and still
+            confirm as a set.  The more of a catalogue they leave, the more they would leave of laws
+            that are in none.
         improvement: Ratio of held-out misfits from which on downwards a prediction is better.
         worth: Share of the nominal held-out misfit that an effect must take away where a part
             remains.
