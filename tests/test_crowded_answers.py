@@ -13,11 +13,14 @@ from pikanid.mismatch.settings.settings import DEFAULTS
 def test_a_set_of_many_is_not_confirmed() -> None:
     most = DEFAULTS.verdict.crowd
     names = [effect(f"e{k}") for k in range(most + 1)]
-    fits = [BASE, *(hypothesis(1000.0 + 0.1 * k, e) for k, e in enumerate(names))]
+    weak = hypothesis(1100.0)
+    fits = [weak, *(hypothesis(1000.0 + 0.1 * k, e) for k, e in enumerate(names))]
     few, many = answered(fits[:-1]), answered(fits)
     assert (few.verdict, len(few.given)) == ("set", most)
     assert (many.verdict, len(many.given)) == ("unconfirmed", most + 1)
     assert f"where {most + 1} explanations do" in many.doubt
+    # few laws do what is strong
+    assert answered([BASE, *fits[1:]]).verdict == "set"
     # of those that are one law under several names, one counts
     twins = [replace(e, twin="scale") for e in names[-2:]]
     assert answered([*fits[:-2], *(hypothesis(1001.0, e) for e in twins)]).verdict == "set"

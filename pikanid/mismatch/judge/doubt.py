@@ -50,12 +50,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     spread = min(h.whitened.records.spread, settings.noise.order_only)
     louder = float(np.exp(settings.louder * spread))
 
-    def gained(over: Hypothesis) -> float:
-        a, b = predict(h), predict(over)
-        later = 0.0 if a is None or b is None else max(b.deviance - a.deviance, 0.0)
-        return (over.minimum.chi2 - h.minimum.chi2 + later) / scale
-
-    minor = asks.minor * gained(fits[frozenset()])
+    minor = asks.minor * gained(h, fits[frozenset()], predict, scale)
     for e in h.effects:
         rest = h.key - {e.key}
         sizes = [p for p in e.parameters if p.free]
@@ -79,7 +74,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
             if below(power, least_proof) and not repeated:
                 return (f"the held-out recording could not have refuted {e.name} (it is worth "
                         f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
-            gain = gained(o)
+            gain = gained(h, o, predict, scale)
             if below(gain, minor) and below(gain, asks.minor_strong):
                 return (f"{e.name} explains so little beside the rest that it may stand for "
                         f"anything of its size (it lowers chi-squared by {gain:.0f} of "
@@ -103,6 +98,13 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
             if past is not None and below(past, h.minimum.chi2 + asks.sized**2 * scale):
                 return f"a parameter past its bound would explain as much as {e.name} does"
     return ""
+
+
+def gained(h: Hypothesis, over: Hypothesis, predict: Predict, scale: float) -> float:
+    """χ² in all recordings that a hypothesis takes away from what another one leaves."""
+    a, b = predict(h), predict(over)
+    later = 0.0 if a is None or b is None else max(b.deviance - a.deviance, 0.0)
+    return (over.minimum.chi2 - h.minimum.chi2 + later) / scale
 
 
 def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: Settings) -> str:

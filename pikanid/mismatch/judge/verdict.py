@@ -13,7 +13,7 @@ from pikanid.mismatch.catalogue.candidate import Channel
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import below, in_order, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import Again, Predict, speaks, why_not
+from pikanid.mismatch.judge.doubt import Again, Predict, gained, speaks, why_not
 from pikanid.mismatch.judge.partial import Part
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.same_law import integer_laws, merged_twins
@@ -164,7 +164,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
     apart = sum(not any(o.key < h.key for o in merged) for h in merged)
-    if proves and apart > asks.crowd:
+    if proves and apart > asks.crowd and below(gained(known[0], base, predict, scale),
+                                               asks.minor_strong):
         doubt = doubt or f"where {apart} explanations do, a law that nobody has listed may"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")

@@ -25,8 +25,8 @@ class VerdictSettings:
         unforeseen: Prior probability that what explains everything is a law that neither the
             catalogue nor what keeps its names away holds.
         crowd: Explanations, none of which holds another one, that recordings may leave and still
-            confirm as a set.  The more of a catalogue they leave, the more they would leave of laws
-            that are in none.
+            confirm as a set, unless it explains what `minor_strong` asks.  The more of a catalogue
+            they leave, the more they would leave of laws that are in none.
         improvement: Ratio of held-out misfits from which on downwards a prediction is better.
         worth: Share of the nominal held-out misfit that an effect must take away where a part
             remains.
