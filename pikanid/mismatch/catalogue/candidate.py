@@ -215,5 +215,10 @@ class Candidate:
         return self.ids if self.known else (SYMBOLIC + self.expression,)
 
     def applied(self, model: Model) -> Model:
-        """The model with this effect."""
+        """The model with this effect.
+
+        Raises:
+            BadUnit: If its formula has no meaning there, as a power of what a scale error has left
+                of a temperature in degC.
+        """
         return self.extend(model.with_parameters(*self.parameters))

@@ -28,9 +28,14 @@ class Along(Protocol):
     p: np.ndarray
 
 
-def equations_alone(model: Model, candidate: Candidate) -> bool:
-    """Whether an effect changes right-hand sides, and nothing else."""
-    extended = candidate.applied(model)
+def equations_alone(model: Model, candidate: Candidate) -> bool | None:
+    """Whether an effect changes right-hand sides, and nothing else; None where it cannot be added
+    to what the model holds.
+    """
+    try:
+        extended = candidate.applied(model)
+    except errors.BadUnit:
+        return None
     return (extended.states, extended.inputs, extended.outputs) == (
         model.states, model.inputs, model.outputs)
 

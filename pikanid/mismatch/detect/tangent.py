@@ -64,28 +64,30 @@ def directions(whitened: Whitened, theta: np.ndarray, candidates: Sequence[Candi
     several = len(whitened.simulators) > 1
     # what is described as text and in the model already shows as a column of its Jacobian
     model = whitened.problem.model
-    chosen = [c for c in candidates if not (several and c.per_recording)
+    listed = [c for c in candidates if not (several and c.per_recording)
               and not (c.probes and c.parameters[0].name in model.parameter_names)]
+    alone = {c.key: equations_alone(model, c) for c in listed if c.probes}
+    chosen = [c for c in listed if not c.probes or alone[c.key] is not None]
     simulated = {k: simulated_signs(whitened, theta, c) for k, c in enumerate(chosen)
-                 if c.probes and not equations_alone(model, c)}
+                 if c.probes and not alone[c.key]}
     for r, response in enumerate(whitened.responses(theta, states=True)):
         line = Tangent(whitened, theta, r, response.states)
         with np.errstate(over="ignore", invalid="ignore"):  # a motion gone wild: no sign of use
-            listed = {(k, n): s for k, c in enumerate(chosen) for n, s in enumerate(
+            signs = {(k, n): s for k, c in enumerate(chosen) for n, s in enumerate(
                 c.directions(line.view))}
             for k, c in enumerate(chosen):
                 if c.probes and k not in simulated:
                     for n, force in enumerate(added_forces(model, c, line)):
-                        listed[k, n] = replace(listed[k, n], forces=force)
-            blocks.append(line.columns([(chosen[k], s) for (k, _), s in listed.items()],
+                        signs[k, n] = replace(signs[k, n], forces=force)
+            blocks.append(line.columns([(chosen[k], s) for (k, _), s in signs.items()],
                                        functools.partial(whitened.whiten, r)))
-        for column, (k, n) in enumerate(listed):
+        for column, (k, n) in enumerate(signs):
             if k in simulated:
                 blocks[-1][:, column] = simulated[k][r][:, n]
-        places.append(list(listed))
+        places.append(list(signs))
         # what they do along the motion is as large as the columns, and not needed again
         known = {**{at: replace(s, force=None, forces=None, push={}, seen=None)
-                    for at, s in listed.items()}, **known}
+                    for at, s in signs.items()}, **known}
     every = {place: column for column, place in enumerate(sorted(known))}
     return Directions(blocks[0] if len(blocks) == 1 else _below(blocks, places, every),
                       tuple(chosen), np.array([k for k, _ in every], int),

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.closest import Closest
@@ -200,9 +201,12 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         settled: Keys of effects that need not be looked for beyond the hills about the start.
 
     Returns:
-        The best local fit, or None where none of the starts can be simulated.
+        The best local fit, or None where no start can be simulated or no model holds all effects.
     """
-    model = extended(nominal, effects)
+    try:
+        model = extended(nominal, effects)
+    except errors.BadUnit:
+        return None
     whitened = Whitened(model, records)
     rows = max(whitened.rows, 1)
     closest = closest or Closest()

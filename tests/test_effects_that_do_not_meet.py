@@ -1,0 +1,47 @@
+"""Effects of which a model holds either, but not both: what a scale error leaves of a temperature in
+degC has no fourth power.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid import errors
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.detect.tangent import directions
+from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.settings.settings import DEFAULTS
+from pikanid.mismatch.steps.opening import open_case
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    house = pk.systems.thermal_rc().with_values(R=0.005, C=1e7, T_0=20.0)
+    t = np.arange(0.0, 2e5, 600.0)
+    drive = pk.Recording.from_arrays(
+        t, {"T_a": 5 + 5 * np.sin(t / 2e4), "P": 2000.0 + 2000.0 * np.sign(np.sin(t / 7e3))},
+        {"T_a": "degC", "P": "W"}, hold={"T_a": "zero", "P": "zero"})
+    run = pk.simulate(house, drive, sigma={"T": 0.02}, seed=1)
+    return open_case(house, (run,), None, None, lambda text: None, DEFAULTS)
+
+
+def test_they_are_fitted_each_by_itself_and_not_together(case: Case) -> None:
+    listed = {c.ids[0] + c.variant: c for c in case.candidates}
+    gain, radiation = listed["input_gainT_a"], listed["radiation"]
+    for alone in (gain, radiation):
+        assert fitted(case.model, [alone], case.records, [{}], 30) is not None
+    assert fitted(case.model, [radiation, gain], case.records, [{}], 30) is None
+
+
+def test_what_cannot_be_added_shows_nothing(case: Case) -> None:
+    def refused(model: pk.Model) -> pk.Model:
+        raise errors.BadUnit("a power of degC")
+
+    listed = {c.ids[0] + c.variant: c for c in case.candidates}
+    bad = replace(listed["radiation"], extend=refused)
+    found = directions(case.base.whitened, case.base.minimum.theta, [bad, listed["convection"]])
+    assert {c.ids[0] for c in found.candidates} == {"convection"} and len(found.owner)
