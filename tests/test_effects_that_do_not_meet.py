@@ -1,5 +1,5 @@
-"""Effects of which a model holds either, but not both: what a scale error leaves of a temperature in
-degC has no fourth power.
+"""Effects of which a model holds either, but not both: what a scale error leaves of a temperature
+in degC has no fourth power.
 """
 
 from __future__ import annotations

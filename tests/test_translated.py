@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pikanid.model import Model, Parameter, systems
+from pikanid.model import Model, Output, Parameter, systems
 from pikanid.problem.problem import bind
 from pikanid.recording import Recording, excitation
 from pikanid.simulation.simulator import Simulator, Steps
@@ -61,6 +61,30 @@ def test_sensitivities_are_derivatives(term: str, parameters: dict[str, float]) 
         slope = (simulator.run(up, steps=steps).y - simulator.run(down, steps=steps).y) / (2 * h)
         np.testing.assert_allclose(exact[:, column], slope,
                                    atol=2e-3 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("term, parameters", [
+    ("-a*abs(theta_dot)*theta_dot", {"a": 0.3}),
+    ("-a*signed_power(theta_dot, n)", {"a": 0.3, "n": 1.5}),
+    ("-a*abs_power(theta, n)", {"a": 0.3, "n": 2.5}),
+], ids=["drag", "power", "power of the angle"])
+def test_an_output_that_shows_a_rate_late_agrees_with_its_compiled_self(
+        term: str, parameters: dict[str, float]) -> None:
+    """Its slope over time has the slopes of what the laws are made of."""
+    nominal = systems.sloshing()
+    acc = Output("acc", nominal.equations["theta_dot"], "rad/s^2")
+    model = nominal.replace(outputs=(*nominal.outputs, acc)).with_term(
+        "theta_dot", term, [Parameter(n, v) for n, v in parameters.items()]).map_output(
+        "acc", [Parameter("tau", 0.013, "s")], delay="tau")
+    experiment, p = bind(model, recorded(model)), values(model)
+    active = np.arange(4, len(p))
+    tape_run = Translated(model, experiment, estimated=tuple(active)).run(p, active, FINE)
+    compiled = Simulator(model, experiment).run(p, active, FINE)
+    # a tape runs through corners that the compiled model stops at
+    np.testing.assert_allclose(tape_run.y, compiled.y, atol=1e-5 * np.abs(compiled.y).max())
+    for ours, theirs in zip(tape_run.sensitivity.T, compiled.sensitivity.T, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=2e-3 * np.abs(theirs).max())
+    assert np.abs(compiled.sensitivity[len(compiled.y) // 2:, -1]).max() > 0.1
 
 
 def sliding_block() -> tuple[Model, Recording]:

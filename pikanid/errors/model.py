@@ -43,6 +43,11 @@ def not_in_model(what: str, name: str, known: Sequence[str], close: Sequence[str
     return f"The model has no {what} '{name}' (it has: {listed(known)}).{did_you_mean(close)}"
 
 
+def derivative_of_no_state(name: str, where: str, states: Sequence[str]) -> str:
+    return (f"The {where} asks for the derivative of '{name}', which is no state (states: "
+            f"{listed(states)}): name one of them, as in v' or derivative(v).")
+
+
 def foreign_symbols(names: Sequence[str], where: str) -> str:
     return (f"{where} uses {listed(names)}, unknown to the model: declare it as a parameter "
             "(pass parameters=[...]) or mend the name.")

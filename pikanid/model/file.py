@@ -27,6 +27,7 @@ from pikanid.model.effects_file import from_table, to_table
 from pikanid.model.lookup import Lookup
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
+from pikanid.model.shown_rates import DERIVATIVE, in_states, with_derivatives
 from pikanid.model.with_effect import with_candidates
 from pikanid.storage.entries import Entry
 from pikanid.storage.limits import toml_content
@@ -98,11 +99,17 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
     functions = [s.name for s in splines]
     work = Work()
 
-    def formula(value: Any, where: str, extra: Iterable[str] = ()) -> sp.Expr:
+    def formula(value: Any, where: str, extra: Iterable[str] = (), *more: str) -> sp.Expr:
         if isinstance(value, str):
-            return parse(value, names.union(extra), where, functions, work)
+            return parse(value, names.union(extra), where, (*functions, *more), work)
         number = Entry(value, f"The {where}", errors.BadModel).number()
         return sp.Float(number) if number else sp.Integer(0)
+
+    right = {n: formula(e, f"equation '{n}'") for n, e in equations.items()}
+
+    def shown(value: Any, where: str) -> sp.Expr:
+        text = with_derivatives(value) if isinstance(value, str) else value
+        return in_states(formula(text, where, (), DERIVATIVE), right, where)
 
     model = kind(
         name=content.get("name", Path(source).stem),
@@ -110,8 +117,8 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
         inputs=tuple(Input(n, e.get("unit", ""), e.get("hold", "zero"), e.get("default"))
                      for n, e in tables["inputs"].items()),
         parameters=tuple(parameters.values()),
-        equations={n: formula(e, f"equation '{n}'") for n, e in equations.items()},
-        outputs=tuple(_output(n, e, formula, source) for n, e in tables["outputs"].items()),
+        equations=right,
+        outputs=tuple(_output(n, e, shown, source) for n, e in tables["outputs"].items()),
         splines=splines, domain=content.get("domain"))
     for name, entry in tables["inputs"].items():
         if maps := _maps(entry, INPUT_MAPS, f"of input '{name}'", formula, ()):

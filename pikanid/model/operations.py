@@ -16,6 +16,7 @@ from pikanid.model.arguments import limits, number, parameters_of, table
 from pikanid.model.checks import Checked
 from pikanid.model.lookup import Lookup
 from pikanid.model.parts import Formula, Parameter, Spline, State
+from pikanid.model.shown_rates import followed
 
 
 class Operations(Lookup):
@@ -33,11 +34,17 @@ class Operations(Lookup):
     # --- new models from this one ----------------------------------------------------------------
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some of the fields replaced; what stays is not checked again."""
+        """A copy with some of the fields replaced; what stays is not checked again.
+
+        Outputs that show the rate of a state follow its equation (`pikanid.model.shown_rates`).
+        """
         fields: Any = self  # a dataclass: see `Model`
         names = fields.__dataclass_fields__
         if not changes.keys() <= names.keys():
             return dataclasses.replace(fields, **changes)  # which refuses them
+        if "equations" in changes:
+            changes["outputs"] = followed(
+                self, changes.get("outputs", self.outputs), changes["equations"])
         new = object.__new__(type(fields))
         for name in names:
             object.__setattr__(new, name, changes.get(name, getattr(self, name)))

@@ -19,7 +19,7 @@ _CALLED = {ops.SIN: "sin", ops.COS: "cos", ops.TAN: "tan", ops.EXP: "exp", ops.T
            ops.SINH: "sinh", ops.COSH: "cosh", ops.ATAN: "atan"}
 _INSIDE = {ops.LOG: ("log", "ogt", "0.0"), ops.SQRT: ("llvm.sqrt.f64", "oge", "0.0"),
            ops.ASIN: ("asin", "ole", "1.0"), ops.ACOS: ("acos", "ole", "1.0")}
-_TWO = (ops.ADD, ops.MUL, ops.DIV, ops.POSITIVE_POWER, ops.POWER, ops.ATAN2)
+_TWO = (ops.ADD, ops.MUL, ops.DIV, ops.POSITIVE_POWER, ops.POWER_SLOPE, ops.POWER, ops.ATAN2)
 _TURNED = {ops.SIN: ops.COS, ops.COS: ops.SIN, ops.SINH: ops.COSH, ops.COSH: ops.SINH}
 _NAN = "0x7FF8000000000000"
 _STEEP = "0x3EB0C6F7A0B5ED8D"  # 1e-6
@@ -106,7 +106,7 @@ def _value(w: Writer, op: int, x: str, y: str) -> str:
     if op == ops.LOG_ABS:
         return w.call("log_abs", x)
     return w.call({ops.POWER: "pow", ops.POSITIVE_POWER: "positive_power",
-                   ops.ATAN2: "atan2"}[op], x, y)
+                   ops.POWER_SLOPE: "power_slope", ops.ATAN2: "atan2"}[op], x, y)
 
 
 def _slopes(w: Writer, line: list[int], live: set[int], value: Callable[[int], str],
@@ -130,6 +130,9 @@ def _by_first(w: Writer, line: list[int], value: Callable[[int], str],
         return w.op("fdiv", "1.0", value(j))
     if op == ops.POSITIVE_POWER:
         return w.call("power_slope", value(i), value(j))
+    if op == ops.POWER_SLOPE:
+        return w.op("fmul", value(j), w.call(
+            "power_slope", value(i), w.op("fsub", value(j), "1.0")))
     if op == ops.POWER:
         return w.op("fmul", value(j), w.call("pow", value(i), w.op("fsub", value(j), "1.0")))
     if op == ops.ATAN2:
@@ -150,6 +153,9 @@ def _by_second(w: Writer, line: list[int], value: Callable[[int], str]) -> str:
         return w.op("fdiv", w.put(f"fneg double {value(o)}"), value(j))
     if op == ops.POSITIVE_POWER:
         return w.op("fmul", value(o), w.call("log_abs", value(i)))
+    if op == ops.POWER_SLOPE:
+        return w.op("fadd", w.call("positive_power", value(i), w.op("fsub", value(j), "1.0")),
+                    w.op("fmul", value(o), w.call("log_abs", value(i))))
     if op == ops.POWER:
         log = w.where(value(i), "ogt", "0.0", w.call("log", value(i)), "0.0")
         return w.op("fmul", value(o), log)

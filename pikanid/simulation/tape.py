@@ -26,11 +26,18 @@ import sympy as sp
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.formula.functions import log_abs
 from pikanid.model import Model
-from pikanid.simulation.lowering import LoweredModel, lower_model, positive_power, switch_symbol
+from pikanid.simulation.lowering import (
+    LoweredModel,
+    lower_model,
+    positive_power,
+    power_slope,
+    switch_symbol,
+)
 from pikanid.simulation.structure import Structure
 
 (ADD, MUL, DIV, SQUARE, POWER, POSITIVE_POWER, SIN, COS, TAN, EXP, LOG, SQRT, TANH, SINH, COSH,
- ATAN, ASIN, ACOS, ATAN2, LOG_ABS, SGN, NEGATE) = range(22)  # definition: numbers of the operations
+ ATAN, ASIN, ACOS, ATAN2, LOG_ABS, SGN, NEGATE, POWER_SLOPE) = range(23)  # definition: opcodes
+_BINARY = {positive_power: POSITIVE_POWER, power_slope: POWER_SLOPE, sp.atan2: ATAN2}
 _UNARY = {sp.sin: SIN, sp.cos: COS, sp.tan: TAN, sp.exp: EXP, sp.log: LOG, sp.tanh: TANH,
           sp.sinh: SINH, sp.cosh: COSH, sp.atan: ATAN, sp.asin: ASIN, sp.acos: ACOS,
           log_abs: LOG_ABS}
@@ -163,10 +170,9 @@ class _Recorder:
             return self._chain(ADD if isinstance(e, sp.Add) else MUL, e.args)
         if isinstance(e, sp.Pow):
             return self._power(*e.as_base_exp())
-        if isinstance(e, positive_power):
-            return self._note(POSITIVE_POWER, self.register(e.args[0]), self.register(e.args[1]))
-        if isinstance(e, sp.atan2):
-            return self._note(ATAN2, self.register(e.args[0]), self.register(e.args[1]))
+        if type(e) in _BINARY:
+            a, b = map(self.register, e.args)
+            return self._note(_BINARY[type(e)], a, b)
         return self._note(_UNARY[type(e)], self.register(e.args[0]))
 
     def _chain(self, op: int, args: Sequence[sp.Expr]) -> int:

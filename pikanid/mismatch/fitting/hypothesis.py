@@ -177,9 +177,9 @@ def _inverse(J: np.ndarray) -> np.ndarray:
 
 
 def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
-    """The nominal model with all effects."""
+    """The nominal model with all effects: sensors show what acts."""
     model = nominal
-    for effect in effects:
+    for effect in sorted(effects, key=lambda e: e.channel == "sensor"):
         model = effect.applied(model)
     return model
 

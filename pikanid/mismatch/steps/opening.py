@@ -34,6 +34,7 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Effect, Model
 from pikanid.model.domains import candidates_of, taken
 from pikanid.model.rates import in_rates
+from pikanid.model.shown_rates import shown_rates
 from pikanid.problem.problem import bind
 from pikanid.recording import Recording
 from pikanid.strategies.nls import NLS
@@ -73,6 +74,8 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     model, changes = in_rates(model)
     effects, said = candidates_of(model), taken(model)
     notes += [*changes, said] if said else changes
+    notes += [f"'{shows}' shows the rate of '{state}': what acts on that acts on it as well."
+              for shows, state in shown_rates(model).items()]
     model = held_as_recorded(model.replace(effects=()), train)
     # a model in which nothing can be looked for is refused before any fit, as a wrong effect is
     catalogue_of(sites(model, train), [e for e in effects if isinstance(e, Effect)])
