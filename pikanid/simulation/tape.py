@@ -36,7 +36,8 @@ from pikanid.simulation.lowering import (
 from pikanid.simulation.structure import Structure
 
 (ADD, MUL, DIV, SQUARE, POWER, POSITIVE_POWER, SIN, COS, TAN, EXP, LOG, SQRT, TANH, SINH, COSH,
- ATAN, ASIN, ACOS, ATAN2, LOG_ABS, SGN, NEGATE, POWER_SLOPE) = range(23)  # definition: opcodes
+ ATAN, ASIN, ACOS, ATAN2, LOG_ABS, SGN, NEGATE,
+ POWER_SLOPE) = range(23)  # definition: numbers of the operations
 _BINARY = {positive_power: POSITIVE_POWER, power_slope: POWER_SLOPE, sp.atan2: ATAN2}
 _UNARY = {sp.sin: SIN, sp.cos: COS, sp.tan: TAN, sp.exp: EXP, sp.log: LOG, sp.tanh: TANH,
           sp.sinh: SINH, sp.cosh: COSH, sp.atan: ATAN, sp.asin: ASIN, sp.acos: ACOS,
