@@ -46,7 +46,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     nominal = predict(fits[frozenset()])
     proof = predict(h)
     if nominal and proof and smaller(asks.worse * nominal.misfit, proof.misfit):
-        return "as it stands it predicts the held-out recording far worse than the nominal model"
+        return "as it stands it predicts the held-out recording worse than the nominal model"
     spread = min(h.whitened.records.spread, settings.noise.order_only)
     louder = float(np.exp(settings.louder * spread))
 

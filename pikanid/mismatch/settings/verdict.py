@@ -76,7 +76,7 @@ class VerdictSettings:
     needed: Amount = 4.0
     once: Share = 0.5
     sized: Amount = 3.0
-    worse: Factor = 1.5
+    worse: Factor = 1.1
     linear: Amount = 3.0
     missed: Amount = 15.0
     sharp: Amount = 0.12
