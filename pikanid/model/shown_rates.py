@@ -60,9 +60,10 @@ def shown_rates(model: Lookup) -> dict[str, str]:
     >>> model.with_term("v", "-0.1*v").output("acc").expression
     -k*x - 0.1*v
     """
-    moving = _moving(model)
+    moving = frozenset((*map(symbol, (*model.state_names, *model.input_names)), TIME))
+    # an output that is a state by itself, as most are, shows that
     found = {o.name: _shown(o.expression, tuple(model.equations.items()), moving)
-             for o in model.outputs}
+             for o in model.outputs if not (o.expression.is_Symbol or o.expression.is_number)}
     return {name: state for name, state in found.items() if state}
 
 
@@ -75,22 +76,16 @@ def followed(model: Lookup, outputs: Sequence[Output], equations: Mapping[str, s
     for output in outputs:
         state = shown.get(output.name, "")
         old, new = model.equations.get(state), equations.get(state)
-        if old is not None and new is not None and new != old:
+        if old is not None and isinstance(new, sp.Expr) and new != old:
             constant = sp.expand(before[output.name] - old)
             output = replace(output, expression=new + constant)
         made.append(output)
     return tuple(made)
 
 
-def _moving(model: Lookup) -> frozenset[sp.Symbol]:
-    return frozenset((*map(symbol, (*model.state_names, *model.input_names)), TIME))
-
-
 @functools.lru_cache(maxsize=512)
 def _shown(formula: sp.Expr, equations: tuple[tuple[str, sp.Expr], ...],
            moving: frozenset[sp.Symbol]) -> str:
-    if formula.is_Symbol or formula.is_number:
-        return ""
     for name, right in equations:
         if right.is_Symbol or right.is_number or not right.free_symbols <= formula.free_symbols:
             continue  # the rate that is a state by itself is shown as that
