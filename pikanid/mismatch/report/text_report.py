@@ -5,6 +5,9 @@ from __future__ import annotations
 from pikanid.estimate.rounding import rounded, with_unit
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.report.findings import DiagnosisData
+from pikanid.mismatch.report.sheets import parameters
+
+TOLD = 8  # layout: parameters of the model in a line
 
 
 def places(dx: DiagnosisData) -> list[str]:
@@ -37,6 +40,11 @@ def lines_of(dx: DiagnosisData) -> list[str]:
             lines.append(f"  {left}{e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
                 lines.append(f"    {name} = {with_unit(rounded(v.value, v.std), v.unit)}")
+    if dx.hypotheses:
+        told = [f"{name} = {with_unit(f'{before} -> {after}', unit.strip('-'))}"
+                for name, before, after, unit in parameters(dx).rows]
+        more = f"; and {len(told) - TOLD} more" if len(told) > TOLD else ""
+        lines.append(f"Model: {'; '.join(told[:TOLD])}{more}")
     lines += [f"Not: {title}: {why}" for title, why in dx.not_given[:4]]
     if dx.held_out is not None and dx.hypotheses:
         p = dx.held_out
