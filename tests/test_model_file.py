@@ -101,7 +101,7 @@ BROKEN = [
     ("name = ", "cannot be read"),
     ("name = -k*x", "stands in quotes"),
     ("x" * 100, "cannot be read"),
-    (DRIVEN.replace("[states]", "[state]"), "unknown key 'state'"),
+    (DRIVEN.replace("[states]", "[state]"), r"unknown key 'state' .* Did you mean 'states'\?"),
     (DRIVEN.replace("unit = \"rad\", initial", "units = \"rad\", initial"), "'units'"),
     (DRIVEN.replace("guess = 0.06", "gues = 0.06"), "'gues'"),
     (DRIVEN.replace("guess = 0.06, ", ""), "either 'guess'"),

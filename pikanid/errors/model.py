@@ -76,8 +76,10 @@ def bad_value(what: str, value: object, wanted: str) -> str:
 
 
 
-def model_file_key(path: str, where: str, key: str, known: Sequence[str]) -> str:
-    return f"'{path}': {where} has the unknown key '{key}' (known: {listed(known)})."
+def model_file_key(path: str, where: str, key: str, known: Sequence[str],
+                   close: Sequence[str]) -> str:
+    return (f"'{path}': {where} has the unknown key '{key}' (known: {listed(known)})."
+            f"{did_you_mean(close)}")
 
 
 def model_file_missing(path: str, where: str, wanted: str) -> str:

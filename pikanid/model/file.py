@@ -181,7 +181,7 @@ def _known_keys(table: Mapping[str, Any], known: tuple[str, ...], source: str, w
     for key in table:
         if key not in known:
             close = difflib.get_close_matches(str(key), known, 1)
-            raise errors.BadModel(errors.model_file_key(source, where, str(key), close or known))
+            raise errors.BadModel(errors.model_file_key(source, where, str(key), known, close))
 
 
 def _table(content: Mapping[str, Any], name: str, source: str) -> dict[str, Mapping[str, Any]]:
