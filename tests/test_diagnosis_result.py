@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 
 import pikanid as pk
@@ -32,7 +33,7 @@ def explanation(name: str, expression: str, probability: float = 0.5) -> Explana
 
 
 def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:
-    nothing = cast(Estimate, SimpleNamespace(model=sloshing()))
+    nothing = cast(Estimate, SimpleNamespace(model=sloshing(), free=(), theta=(), covariance=()))
     return Diagnosis(verdict, 1e-9, DEFAULTS, Where(("dynamics",), "v", (), (), None), given, (),
                      nothing, nothing, None)
 
@@ -52,6 +53,22 @@ def test_where_is_said_in_words_and_as_data() -> None:
     none = replace(said, where=replace(said.where, channels=()))
     assert [d.where.channel for d in (said, several, none)] == ["dynamics", "several", "undecided"]
     assert "channel undecided" in str(none) and "undecided between" in _where(none)
+
+
+def test_parameters_of_the_model_are_told_before_and_after() -> None:
+    def estimate(*values: float) -> Estimate:
+        free = [SimpleNamespace(label=f"k_{n}", unit="1/s^2") for n in range(len(values))]
+        return cast(Estimate, SimpleNamespace(
+            model=sloshing(), free=free, theta=np.array(values),
+            covariance=1e-4 * np.eye(len(values))))
+
+    one = diagnosis("named", explanation("drag", "-q*v"))
+    said = str(replace(one, before=estimate(2.0, 5.0), after=estimate(3.0, 5.5)))
+    assert ("\nModel: k_0 = 2.000 ± 0.010 -> 3.000 ± 0.010 1/s^2; "
+            "k_1 = 5.000 ± 0.010 -> 5.500 ± 0.010 1/s^2\n") in said
+    many = str(replace(one, before=estimate(*range(11)), after=estimate(*range(11))))
+    assert "k_7 = " in many and "k_8 = " not in many and "; and 3 more\n" in many
+    assert "Model:" not in str(one)
 
 
 @pytest.mark.parametrize(("count", "said"), [

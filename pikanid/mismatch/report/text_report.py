@@ -40,9 +40,10 @@ def lines_of(dx: DiagnosisData) -> list[str]:
             lines.append(f"  {left}{e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
                 lines.append(f"    {name} = {with_unit(rounded(v.value, v.std), v.unit)}")
-    if dx.hypotheses:
-        told = [f"{name} = {with_unit(f'{before} -> {after}', unit.strip('-'))}"
-                for name, before, after, unit in parameters(dx).rows]
+    units = {f.label: f.unit for f in dx.after.free}
+    told = [f"{name} = {with_unit(f'{before} -> {after}', units[name])}"
+            for name, before, after, _ in parameters(dx).rows]
+    if dx.hypotheses and told:
         more = f"; and {len(told) - TOLD} more" if len(told) > TOLD else ""
         lines.append(f"Model: {'; '.join(told[:TOLD])}{more}")
     lines += [f"Not: {title}: {why}" for title, why in dx.not_given[:4]]
