@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 from test_verdict import BASE, GUARD, LAW, A, answered, effect, hypothesis
@@ -9,24 +10,42 @@ from test_verdict import BASE, GUARD, LAW, A, answered, effect, hypothesis
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.settings.settings import DEFAULTS
 
+WEAK = hypothesis(1100.0)
+MOST = DEFAULTS.verdict.crowd
+NAMES = [effect(f"e{k}") for k in range(MOST + 1)]
+FITS = [hypothesis(1000.0 + 0.1 * k, e) for k, e in enumerate(NAMES)]
 
-def test_a_set_of_many_is_not_confirmed() -> None:
-    most = DEFAULTS.verdict.crowd
-    names = [effect(f"e{k}") for k in range(most + 1)]
-    weak = hypothesis(1100.0)
-    fits = [weak, *(hypothesis(1000.0 + 0.1 * k, e) for k, e in enumerate(names))]
-    few, many = answered(fits[:-1]), answered(fits)
-    assert (few.verdict, len(few.given)) == ("set", most)
-    assert (many.verdict, len(many.given)) == ("unconfirmed", most + 1)
-    assert f"where {most + 1} explanations do" in many.doubt
+
+def test_a_weak_set_of_many_is_not_confirmed() -> None:
+    few, many = answered([WEAK, *FITS[:-1]]), answered([WEAK, *FITS])
+    assert (few.verdict, len(few.given)) == ("set", MOST)
+    assert (many.verdict, len(many.given)) == ("unconfirmed", MOST + 1)
+    assert "nobody has listed" in many.doubt
     # few laws do what is strong
-    assert answered([BASE, *fits[1:]]).verdict == "set"
+    assert answered([BASE, *FITS]).verdict == "set"
     # of those that are one law under several names, one counts
-    twins = [replace(e, twin="scale") for e in names[-2:]]
-    assert answered([*fits[:-2], *(hypothesis(1001.0, e) for e in twins)]).verdict == "set"
+    twins = [replace(e, twin="scale") for e in NAMES[-2:]]
+    assert answered([WEAK, *FITS[:-2], *(hypothesis(1001.0, e) for e in twins)]).verdict == "set"
     # nor does what adds to one of them
-    more = hypothesis(989.0, names[0], effect("more"))
-    assert answered([*fits[:-1], more]).verdict == "set"
+    more = hypothesis(989.0, NAMES[0], effect("more"))
+    assert answered([WEAK, *FITS[:-1], more]).verdict == "set"
+
+
+def test_a_law_outside_the_catalogue_counts_against_a_set() -> None:
+    """Beside what is weak, and beside many, though not beside one or two that are strong."""
+    for base, known in itertools.product((BASE, WEAK), (FITS[:1], FITS[:-1])):
+        given = answered([base, *known, hypothesis(1000.0, GUARD)])
+        assert (given.verdict == "set") == (base is BASE and len(known) == 1)
+        assert {GUARD.key} in [h.key for h in given.given]
+
+
+def test_what_happens_once_has_to_be_strong() -> None:
+    """No other recording speaks of it: a weak one may be whatever else happens once."""
+    once = replace(A, absent=True)
+    assert answered([BASE, hypothesis(1000.0, once)]).verdict == "named"
+    weak = answered([WEAK, hypothesis(1000.0, once)])
+    assert weak.verdict == "unconfirmed" and "happens once" in weak.doubt
+    assert answered([WEAK, hypothesis(1000.0, A)]).verdict == "named"
 
 
 def test_a_formula_whose_form_is_not_told_is_not_confirmed() -> None:

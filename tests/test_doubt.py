@@ -121,6 +121,19 @@ def test_a_size_that_may_be_nothing_is_not_sure(
         assert sure == (said == "") and sure != ("may be nothing" in said)
 
 
+def test_a_size_that_may_be_nothing_beside_a_bound_is_not_sure(
+        hypotheses: tuple[Case, list[Hypothesis]], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bound holds a parameter of the explanation itself: that is hardly the system's."""
+    case, ranked = hypotheses
+    size = ranked[0].values["k3"]
+    for error, pinned, sure in ((size / 4.0, True, True), (size / 2.0, True, False),
+                                (size / 2.0, False, True)):
+        monkeypatch.setattr(Hypothesis, "std", {"k3": error})
+        monkeypatch.setattr(Hypothesis, "pinned", property(lambda h, p=pinned: p and h.effects))
+        said, _ = doubt(case, ranked, moved(2))
+        assert sure == (said == "") and sure != ("may be nothing" in said)
+
+
 def blows(seed: int) -> Recording:
     rng = np.random.default_rng(seed)
     t = np.arange(400) * 0.02

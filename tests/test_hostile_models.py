@@ -6,13 +6,18 @@ import inspect
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
 from hostile import CODE, MARK, VALUES, cut, nothing_evaluated, walk
 
 from pikanid import errors
 from pikanid.formula.expressions import parse, to_real
+from pikanid.mismatch.catalogue.between import effects_between
+from pikanid.mismatch.catalogue.site import sites
 from pikanid.model import Input, Model, Output, Parameter, State
+from pikanid.model.rates import in_rates
+from pikanid.recording import Recording
 
 __all__ = ["nothing_evaluated"]
 
@@ -213,3 +218,29 @@ def test_toml_nested_without_end(tmp_path: Path) -> None:
         with pytest.raises(errors.BadModel) as caught:
             Model.load(path)
         assert len(str(caught.value)) < 1000
+
+
+def endless(rate: str) -> Model:
+    """Two masses; the second one's rate is what a file says."""
+    return Model.from_dict({
+        "states": {n: {"unit": u} for n, u in
+                   (("x", "m"), ("v", "m/s"), ("y", "m"), ("w", "m/s"))},
+        "parameters": {n: {"guess": 1.5} for n in ("k", "c", "a", "b")},
+        "equations": {"x": "v", "v": "-a*x - k*(x - y) - c*(v - w)", "y": "w", "w": rate},
+        "outputs": {n: {"expression": n, "unit": "m"} for n in ("x", "y")}})
+
+
+@pytest.mark.parametrize("rate", [
+    "k*(x - y) + c*(v - w) + 1e-90*(a + b + k + c + x + y + v + w)**60",
+    "k*(x - y)*(a + b + c + 1)**99 + c*(v - w)*(a + b + k + 2)**98/(a + 2*b + k)**99",
+    "-b*w*(a + k + c + 1 + x + y + v)**70", "-w/(b*w + (a + k + c + 1 + x + y + v)**70)"],
+    ids=["force", "between", "lever", "denominator"])
+def test_no_site_multiplies_out_what_has_no_end(rate: str) -> None:
+    """Looking for levers and couplings must not ask for a million terms: it would not come back."""
+    model = endless(rate)
+    t = np.linspace(0.0, 1.0, 20)
+    seen = Recording.from_arrays(t, {"x": np.sin(t), "y": np.cos(t)})
+    motion = dict.fromkeys(model.state_names, t)
+    assert {s.v for s in sites(model, (seen,))} >= {"v", "w"}
+    assert in_rates(model)[0].state_names == model.state_names
+    list(effects_between(model, [("x", "v"), ("y", "w")], lambda: motion))

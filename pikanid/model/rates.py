@@ -12,6 +12,7 @@ from dataclasses import replace
 import sympy as sp
 
 from pikanid.formula import units
+from pikanid.formula.expanding import expanded
 from pikanid.formula.expressions import symbol
 from pikanid.model.effect import Effect
 from pikanid.model.model import Model
@@ -62,7 +63,7 @@ def _constant(model: Model, right: sp.Expr, moved: str) -> sp.Expr | None:
     """What a state is multiplied by in an equation that holds nothing but parameters besides."""
     factor = right.diff(symbol(moved))
     known = {symbol(n) for n in model.parameter_names}
-    alone = sp.expand(right - factor * symbol(moved)) == 0 and factor.free_symbols <= known
+    alone = expanded(right - factor * symbol(moved)) == 0 and factor.free_symbols <= known
     return factor if alone else None
 
 
@@ -74,7 +75,7 @@ def _in_rate(model: Model, coordinate: State, moved: str, factor: sp.Expr) -> Mo
     unit = units.product((coordinate.unit, 1), ("s", -1)) if coordinate.unit else ""
     equations = {n: e.xreplace(swap) for n, e in model.equations.items()}
     equations[coordinate.name] = symbol(name)
-    own = sp.expand(factor * equations.pop(moved))
+    own = expanded(factor * equations.pop(moved))
     return model.replace(
         states=tuple(State(name, unit, factor * s.initial) if s.name == moved else s
                      for s in model.states),

@@ -7,7 +7,6 @@ a state's equation, or that and a constant, stays so whatever the equation becom
 from __future__ import annotations
 
 import functools
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,12 +15,12 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from pikanid import errors
+from pikanid.formula.expanding import expanded
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model.lookup import Lookup
 from pikanid.model.parts import Output
 
 DERIVATIVE = "derivative"  # definition: of a state, as a function in formulas of outputs
-MOST_TERMS = 1000  # limit: of a formula that is multiplied out to be compared
 
 
 def with_derivatives(text: str) -> str:
@@ -80,7 +79,7 @@ def followed(model: Lookup, outputs: Sequence[Output], equations: Mapping[str, s
         old, new = model.equations.get(state), equations.get(state)
         if old is not None and isinstance(new, sp.Expr) and new != old:
             shows = before[output.name]
-            constant = 0 if shows == old else sp.expand(shows - old)
+            constant = 0 if shows == old else expanded(shows - old)
             output = replace(output, expression=new + constant)
         made.append(output)
     return tuple(made)
@@ -92,31 +91,6 @@ def _shown(formula: sp.Expr, equations: tuple[tuple[str, sp.Expr], ...],
     for name, right in equations:
         if right.is_Symbol or right.is_number or not right.free_symbols <= formula.free_symbols:
             continue  # the rate that is a state by itself is shown as that
-        if formula == right or (_is_short(formula) and _is_short(right) and not (
-                sp.expand(formula - right).free_symbols & moving)):
+        if not expanded(formula - right).free_symbols & moving:
             return name
     return ""
-
-
-def _is_short(formula: sp.Expr) -> bool:
-    """Whether a formula has few terms once it is multiplied out, as have all of its parts.
-
-    >>> x, y = sp.symbols("x y")
-    >>> _is_short(x * (x + y) ** 3), _is_short(sp.sin((x + y) ** 5000))
-    (True, False)
-    """
-    terms: dict[sp.Basic, int] = {}
-    for part in sp.postorder_traversal(formula):
-        own = [terms[a] for a in part.args]
-        if isinstance(part, sp.Add):
-            terms[part] = sum(own)
-        elif isinstance(part, sp.Mul):
-            terms[part] = math.prod(own)
-        elif isinstance(part, sp.Pow) and part.exp.is_Integer:
-            power = abs(int(part.exp))
-            terms[part] = math.comb(own[0] + power - 1, power)
-        else:
-            terms[part] = 1
-        if terms[part] > MOST_TERMS:
-            return False
-    return True

@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import sympy as sp
 
+from pikanid.formula.expanding import expanded
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.formula.functions import log_abs
 from pikanid.model import Model
@@ -125,7 +126,7 @@ class _Recorder:
         for q in sorted(g.free_symbols, key=str):
             slope = g.diff(q)
             if slope.is_number and slope != 0:
-                surface = {q: sp.expand(q - g / slope)}
+                surface = {q: expanded(q - g / slope)}
                 break
         else:
             return True
@@ -136,7 +137,7 @@ class _Recorder:
             if gap.has(positive_power):
                 gap = gap.replace(lambda z: isinstance(z, positive_power) and z.args[0] == 0,
                                   lambda z: sp.Integer(0))
-            if sp.expand(gap) != 0:
+            if expanded(gap) != 0:
                 return True
         return False
 

@@ -18,6 +18,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid import errors
+from pikanid.formula.expanding import expanded
 from pikanid.formula.expressions import FUNCTIONS, parse, symbol
 from pikanid.symbolic.numeric import Array, Compiled, compiled, slopes
 
@@ -264,7 +265,7 @@ def user_form(expression: sp.Expr | str, argument: str = "x", name: str | None =
         if not slope.has(s) and not any(slope.has(q) for q in linear):
             linear.append(s)
     columns = [expr.diff(s) for s in linear]
-    left = sp.expand(expr - sp.Add(*(s * c for s, c in zip(linear, columns, strict=True))))
+    left = expanded(expr - sp.Add(*(s * c for s, c in zip(linear, columns, strict=True))))
     columns = [c for c in columns if own in c.free_symbols]
     if left != 0 and own in left.free_symbols:
         columns.append(left)

@@ -14,6 +14,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid.formula import units
+from pikanid.formula.expanding import expanded, is_short
 from pikanid.formula.expressions import TIME, symbol, to_text
 from pikanid.formula.names import free_name
 from pikanid.model import Effect, Model
@@ -132,10 +133,11 @@ def _between(model: Model, name: str, coordinates: Sequence[tuple[str, str]], pl
         found = slope.diff(x)
         if found.free_symbols & moving:
             return None
-        return found if sp.expand(slope - found * (x - ratio * y)) == 0 else None
+        return found if expanded(slope - found * (x - ratio * y)) == 0 else None
 
     by_x, by_y = first.diff(x), first.diff(y)
-    if by_x == 0 or (by_x.free_symbols | by_y.free_symbols) & moving:
+    if by_x == 0 or (by_x.free_symbols | by_y.free_symbols) & moving or not (
+            is_short(by_x) and is_short(by_y)):
         return None
     ratio = sp.cancel(-by_y / by_x)
     shares = {v: share(s, ratio) for v, s in slopes.items()}

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
+from pikanid.formula.expanding import expanded
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
 
@@ -47,4 +48,4 @@ def lever(model: Model, v: str, rates: Sequence[str]) -> tuple[str, Mapping[str,
 def _without(product: sp.Expr, factor: sp.Symbol) -> sp.Expr:
     """A product without one of its factors, which stays in a denominator where it is none."""
     ratio = product / factor
-    return ratio if not ratio.has(factor) else sp.expand(ratio)
+    return ratio if not ratio.has(factor) else expanded(ratio)

@@ -10,6 +10,7 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.formula import units
+from pikanid.formula.expanding import expanded
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.formula.names import free_name
 from pikanid.mismatch.catalogue.lever import lever
@@ -247,7 +248,7 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
     alone = all(_at_rest(model, e.diff(symbol(q))).subs(at) == 0
                 for n, e in model.equations.items() if n not in (q, v))
     return Site(model, q, v, output, inputs, extra, k**0.5 if k > 0 else 0.0,
-                sp.simplify(force) == 0 and all(e == 0 for e in starts), alone,
+                expanded(force) == 0 and all(e == 0 for e in starts), alone,
                 all(_starts_still(model, r) for r in recordings),
                 (first.start, first.stop), _swing(first, output.name),
                 _interval(first, output.name), suffix)

@@ -75,10 +75,12 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                 return (f"the held-out recording could not have refuted {e.name} (it is worth "
                         f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
             gain = gained(h, o, predict, scale)
-            if below(gain, minor) and below(gain, asks.minor_strong):
-                return (f"{e.name} explains so little beside the rest that it may stand for "
-                        f"anything of its size (it lowers chi-squared by {gain:.0f} of "
-                        f"{minor / asks.minor:.0f}, {asks.minor_strong:.0f} are asked)")
+            if (e.absent or below(gain, minor)) and below(gain, asks.minor_strong):
+                what = ("happens once, of which no other recording speaks, and explains so little"
+                        if e.absent else "explains so little beside the rest")
+                return (f"{e.name} {what} that it may stand for anything of its size (it lowers "
+                        f"chi-squared by {gain:.0f} of {minor / asks.minor:.0f}, "
+                        f"{asks.minor_strong:.0f} are asked)")
             if below(gain, asked):
                 return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
                         f"{asked:.0f} are asked)")
@@ -91,6 +93,8 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                     and not speaks(h, other, predict, asks.needed * scale)
                     for other in _lasting(rest, o, fits.values())):
                 return f"a lasting effect would take up most of what {e.name} does"
+        if h.pinned and (said := no_size(e, h, 1.0, settings)):
+            return said
         if sizes and rest in fits and fits[rest].pinned:
             past = loosened(fits[rest], h)
             if past is None and (said := no_size(e, h, 1.0, settings)):

@@ -164,9 +164,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
     apart = sum(not any(o.key < h.key for o in merged) for h in merged)
-    if proves and apart > asks.crowd and below(gained(known[0], base, predict, scale),
-                                               asks.minor_strong):
-        doubt = doubt or f"where {apart} explanations do, a law that nobody has listed may"
+    weak = below(gained(known[0], base, predict, scale), asks.minor_strong)
+    if proves and (apart > asks.crowd) + any(not h.known for h in merged) + weak > 1:
+        doubt = doubt or "where all of these would do, a law that nobody has listed may"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
     others = [h for h in tried if h not in merged][:5]

@@ -24,9 +24,10 @@ class VerdictSettings:
             odds of e² to 1 that a law is one that has a name.
         unforeseen: Prior probability that what explains everything is a law that neither the
             catalogue nor what keeps its names away holds.
-        crowd: Explanations, none of which holds another one, that recordings may leave and still
-            confirm as a set, unless it explains what `minor_strong` asks.  The more of a catalogue
-            they leave, the more they would leave of laws that are in none.
+        crowd: Explanations, none of which holds another one, beyond which they are many.  The more
+            of a catalogue recordings leave, the more they would leave of laws that are in none: of
+            a set, two things must not be true that it holds many, that it holds a law outside the
+            catalogue, and that it explains less than `minor_strong`.
         improvement: Ratio of held-out misfits from which on downwards a prediction is better.
         worth: Share of the nominal held-out misfit that an effect must take away where a part
             remains.
@@ -37,8 +38,9 @@ class VerdictSettings:
             most of anything.
         minor: Share of what an explanation gains below which an effect of it is minor: a tenth
             of the misfit's size, as what nobody has modelled often is.
-        minor_strong: [χ² in all recordings] that a minor effect must gain: 10 standard deviations
-            in each of two recordings tell it from most laws of that size.
+        minor_strong: [χ² in all recordings] that a minor effect must gain, and one that happens
+            once, of which no other recording speaks: 10 standard deviations in each of two
+            recordings tell it from most laws of that size.
         shown: [χ²] that it must gain in the recording it was found in: the other one is the proof.
         needed: [criterion] that each of several effects must gain on held-out recordings.
         once: Share of what an effect that happens once takes away beside others that one that lasts
@@ -64,7 +66,7 @@ class VerdictSettings:
     same_law: Amount = 1.0
     decoy_handicap: Amount = 4.0
     unforeseen: Rate = 0.005
-    crowd: Count = 4
+    crowd: Count = 2
     improvement: Share = 0.9
     worth: Share = 0.05
     part: Share = 0.5
