@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+import pint  # noqa: F401 - imports dask where there is one, which pickles
 import pytest
 import sympy
 import sympy.parsing.sympy_parser
