@@ -64,3 +64,14 @@ def test_a_fit_that_another_one_follows_ends_where_a_step_promises_too_little() 
     share = 3.0**2 / (3.0**2 + 4.0**2)
     assert found(1.01 * share) == 3.0
     assert found(0.99 * share) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_a_start_without_any_residual_is_the_end(rows: int) -> None:
+    """What the guesses explain to the last digit is converged, after no step at all."""
+    theta = np.array([0.3, -0.7])
+    slopes = np.arange(2.0 * rows).reshape(rows, 2) + 1.0
+    found = minimise(lambda q: slopes @ (q - theta), lambda q: slopes, theta,
+                     np.full(2, -1.0), np.full(2, 1.0), 1e-8, 50)
+    assert found.converged and found.cost == 0.0
+    assert found.theta.tolist() == theta.tolist()

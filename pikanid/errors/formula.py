@@ -86,9 +86,13 @@ def units_meet(where: str, formula: str, found: str, wanted: str, unknown: Seque
         if unknown
         else "declare units that fit, and a parameter for every number that has a unit"
     )
+    return (units_disagree(where, formula, found, wanted)[:-1]
+            + f", and no factor turns one into the other: {advice}.")
+
+
+def units_disagree(where: str, formula: str, found: str, wanted: str) -> str:
     return (f"{where}: '{short(formula)}' comes out in '{found or 'dimensionless'}' where "
-            f"'{wanted or 'dimensionless'}' is needed, and no factor turns one into the other: "
-            f"{advice}.")
+            f"'{wanted or 'dimensionless'}' is needed.")
 
 
 def number_between_units(where: str, number: str) -> str:

@@ -115,6 +115,11 @@ class Model(Operations):
     def __hash__(self) -> int:
         return hash((self.name, self.parameters, tuple(self.equations.items())))
 
+    @property
+    def unit_disagreements(self) -> tuple[str, ...]:
+        """Where its units do not fit its formulas: see `pikanid.model.units.disagreements`."""
+        return model_units.disagreements(self)
+
     def map_input(self, name: str, parameters: Sequence[Parameter] = (), **maps: Any) -> Model:
         """Pass an input through gain, saturation, lag ...: see `pikanid.model.channel_maps`."""
         return channel_maps.map_input(self, name, parameters, **maps)

@@ -88,8 +88,10 @@ def inside(reached: Optimum, residual: Vector, jacobian: Vector, start: np.ndarr
     # beside a bound MINPACK's last steps were cut short, and are not as good as they promise
     beside = np.any(np.minimum(theta - lower, upper - theta) < BESIDE * np.abs(theta) + 1e-15)
     here, share = at(theta), max(tolerance, enough) * (LAST if beside else 1.0)
-    if here is None or (more := promised(here, theta, lower, upper)) < share * here.cost:
+    if here is None:
         return reached
+    if (more := promised(here, theta, lower, upper)) <= share * here.cost:
+        return reached if more > 0.0 else replace(reached, cost=0.5 * here.cost, converged=True)
     first = residual(start)
     least = tolerance**2 * float(first @ first)  # of what is exact, no share is worth a step
     if more < least:

@@ -138,6 +138,9 @@ def show_model(out: Console, model: Model, toml: str) -> None:
             bounds if p.free else "", p.description)
     out.print(values)
     out.print()
+    for told in model.unit_disagreements:
+        _say(out, f"Units: {told}", "yellow")
+        out.print()
     _say(out, "# the same as a model file", "dim")
     _say(out, toml)
 

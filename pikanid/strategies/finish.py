@@ -37,7 +37,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     cov = shown.covariance * scale
     covariance = cov if covariance is None else covariance
     fits, trajectories = evaluate(problem, shooting, theta, covariance)
-    notes = [*warnings]
+    notes = [*warnings, *problem.model.unit_disagreements]
     if not converged:
         notes.append("The optimiser stopped before it converged: raise max_evaluations or give "
                      "better guesses.")

@@ -163,9 +163,10 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         doubt = "a law outside the catalogue explains it better"
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
-    apart = sum(not any(o.key < h.key for o in merged) for h in merged)
+    laws = [h for h in merged if not h.next_form]  # a name's next form is of one kind with it
+    apart = sum(not any(o.key < h.key for o in laws) for h in laws)
     weak = below(gained(known[0], base, predict, scale), asks.minor_strong)
-    if proves and (apart > asks.crowd) + any(not h.known for h in merged) + weak > 1:
+    if proves and (apart > asks.crowd) + any(not h.known for h in laws) + weak > 1:
         doubt = doubt or "where all of these would do, a law that nobody has listed may"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
@@ -271,12 +272,12 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
     if any(below(asks.same_law, abs(d)) and below(d, asks.indistinct) for d in apart):
         doubt = "another law outside the catalogue explains it about as well"
         return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
-    if sum(h.symbolic for h in given) > 1:
+    if len(given) > 1:
         # forms that nobody has tried would do as well
         doubt = "these recordings do not tell which form it has"
         return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
-    return replace(found, given=given, verdict="named" if found.verdict == "set" and len(given) == 1
-                   else found.verdict)
+    return replace(found, given=given,
+                   verdict="named" if found.verdict == "set" else found.verdict)
 
 
 def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],

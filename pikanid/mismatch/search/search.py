@@ -158,11 +158,12 @@ class Search:
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
 
-    def _contenders(self) -> Iterator[Hypothesis]:
-        """The hypotheses that score about as well as the best."""
-        scale, ranked, close = self.scale(), self.ranked(), self.settings.verdict.indistinct
+    def _contenders(self, wide: float = 1.0) -> Iterator[Hypothesis]:
+        """The hypotheses that score about as well as the best, within so many times that."""
+        scale, ranked = self.scale(), self.ranked()
+        reach = ranked[0].score(scale) + wide * self.settings.verdict.indistinct
         for h in ranked[:self.settings.budget.rivals]:
-            if below(h.score(scale), ranked[0].score(scale) + close) and not self.budget_exhausted:
+            if below(h.score(scale), reach) and not self.budget_exhausted:
                 yield h
 
     def _simplify(self) -> None:
@@ -195,11 +196,11 @@ class Search:
 
     def closer(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Fit neighbours of hypotheses on from where these stand; whether that found anything."""
-        before = {h.fit for h in self.fits.values()}
+        before, wide = {h.fit for h in self.fits.values()}, self.settings.verdict.behind
         for h in hypotheses[:self.settings.budget.asked_again]:
             self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates),
                          *places.elsewhere(h, self.candidates),
-                         *neighbours.from_its_place(h, self._contenders(), self.base())), h.key)
+                         *neighbours.from_its_place(h, self._contenders(wide), self.base())), h.key)
             self._exchange(h, anyway=True)
         return {h.fit for h in self.fits.values()} != before
 

@@ -33,6 +33,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
              shape: ForceShape | None) -> Diagnosis:
     """The diagnosis of a case, with proof, place, advice and notes."""
     alpha, asked = case.settings.alpha, case.settings.least_proof
+    case.notes += case.model.unit_disagreements
     if case.excuse:
         case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
     best = answer.given[0] if answer.given else case.base
