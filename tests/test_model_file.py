@@ -105,7 +105,7 @@ BROKEN = [
     (DRIVEN.replace("unit = \"rad\", initial", "units = \"rad\", initial"), "'units'"),
     (DRIVEN.replace("guess = 0.06", "gues = 0.06"), "'gues'"),
     (DRIVEN.replace("guess = 0.06, ", ""), "either 'guess'"),
-    (DRIVEN.replace("guess = 0.06", "guess = 0.06, value = 1"), "either 'guess'"),
+    (DRIVEN.replace("guess = 0.06", "guess = 0.06, value = 1"), "a 'guess' and a 'value'"),
     (DRIVEN.replace("guess = 0.06", "guess = \"0.06\""), "a number"),
     (DRIVEN.replace("guess = 0.06", "guess = true"), "a number"),
     (DRIVEN.replace("guess = 0.06", "guess = nan"), "finite"),

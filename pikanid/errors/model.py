@@ -136,3 +136,8 @@ def too_few_of_its_own(where: str, samples: int, parameters: Sequence[str]) -> s
     return (f"Recording '{where}' has {samples} usable samples for {len(parameters)} parameters of "
             f"its own ({listed(parameters)}); at least {len(parameters)} are needed: record more, "
             "or share or fix them.")
+
+
+def guess_and_value(source: str, name: str) -> str:
+    return (f"'{source}': parameter '{name}' has a 'guess' and a 'value': leave out the value if it "
+            "is to be estimated, the guess if it is known.")

@@ -230,7 +230,9 @@ def _bounds(entry: Mapping[str, Any]) -> Any:
 
 
 def _parameter(name: str, entry: Mapping[str, Any], source: str) -> Parameter:
-    if ("guess" in entry) == ("value" in entry):
+    if "guess" in entry and "value" in entry:
+        raise errors.BadModel(errors.guess_and_value(source, name))
+    if "guess" not in entry and "value" not in entry:
         raise errors.BadModel(errors.model_file_missing(
             source, f"parameter '{name}'", "either 'guess' (estimated) or 'value' (fixed)"))
     free = "guess" in entry

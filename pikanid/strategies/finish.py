@@ -11,6 +11,7 @@ import numpy as np
 from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
+from pikanid.estimate.outlying import outlying_warning
 from pikanid.objective.shooting import Shooting
 from pikanid.optimise.box import met
 from pikanid.optimise.propagation import propagated
@@ -50,6 +51,7 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
                      "little.")
     notes += shown.warnings(problem.free, uncertainty)
     notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
+    notes += filter(None, map(outlying_warning, fits))
     for e in problem.experiments:
         if e.unused:
             notes.append(f"Recording '{e.name}': the model does not use {', '.join(e.unused)}.")

@@ -1,0 +1,75 @@
+"""Samples that lie far off a fit by themselves are told, and nothing else is taken for one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pikanid as pk
+from pikanid.estimate.data import Fit
+from pikanid.estimate.outlying import outlying
+
+SIGMA = 0.1 * np.pi / 180
+SEEN = pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=SIGMA, seed=4)
+
+
+def spoilt(*samples: int, by: float = 40 * SIGMA) -> pk.Recording:
+    theta = SEEN["theta"].values.copy()
+    theta[list(samples)] += by
+    return pk.Recording.from_arrays(SEEN["theta"].time, {
+        "theta": theta, "u_x": np.interp(SEEN["theta"].time, SEEN["u_x"].time, SEEN["u_x"].values),
+    }, {"theta": "rad", "u_x": "m/s^2"}, hold={"u_x": "first"})
+
+
+def of(residual: np.ndarray) -> Fit:
+    n = len(residual)
+    return Fit("run", "y", "", np.arange(n) / 10, residual, np.zeros(n))
+
+
+def test_one_wrong_sample_moves_an_estimate_and_is_told() -> None:
+    model = pk.systems.sloshing()
+    right, wrong = (pk.NLS().fit(model, rec) for rec in (spoilt(), spoilt(130, by=4.0)))
+    assert not any("far off" in w for w in right.warnings)
+    (said,) = (w for w in wrong.warnings if "far off" in w)
+    assert f"t = {SEEN['theta'].time[130]:.6g} s" in said and "1 sample lies" in said
+    off = abs(wrong.value("d_theta") - right.value("d_theta"))
+    assert off > 3 * right.std("d_theta")
+
+
+def test_several_are_counted() -> None:
+    found = pk.NLS().fit(pk.systems.sloshing(), spoilt(40, 130, 260, 400))
+    (said,) = (w for w in found.warnings if "far off" in w)
+    assert "4 samples lie" in said and ", ..." in said
+
+
+@pytest.mark.parametrize("noise", ["normal", "uniform", "steps", "correlated"])
+def test_ordinary_noise_has_none(noise: str) -> None:
+    """In at most one of a thousand recordings; of 2000, more than 8 have a probability of 1e-3."""
+    rng = np.random.default_rng(21)
+    count = 0
+    for _ in range(2000):
+        e = rng.standard_normal(300)
+        if noise == "uniform":
+            e = rng.uniform(-1, 1, 300)
+        if noise == "steps":
+            e = np.round(e)
+        if noise == "correlated":
+            e = np.convolve(rng.standard_normal(309), np.ones(10) / 10, "valid")
+        count += len(outlying(of(e))) > 0
+    assert count <= 8
+
+
+def test_what_lasts_or_is_frequent_is_none() -> None:
+    rng = np.random.default_rng(5)
+    e = rng.standard_normal(300)
+    assert outlying(of(e + 30.0 * (np.arange(300) == 77))).tolist() == [77]
+    assert len(outlying(of(e + 30.0 * np.isin(np.arange(300), range(77, 83))))) == 0
+    assert len(outlying(of(e + 30.0 * (rng.random(300) < 0.05)))) == 0
+    assert len(outlying(of(np.zeros(300)))) == len(outlying(of(e[:10] + 99 * (e[:10] > 1)))) == 0
+
+
+@pytest.mark.parametrize("end", [0, 299])
+def test_the_first_and_the_last_sample_count(end: int) -> None:
+    e = np.random.default_rng(6).standard_normal(300)
+    e[end] = -25.0
+    assert outlying(of(e)).tolist() == [end]
