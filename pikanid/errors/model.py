@@ -139,5 +139,5 @@ def too_few_of_its_own(where: str, samples: int, parameters: Sequence[str]) -> s
 
 
 def guess_and_value(source: str, name: str) -> str:
-    return (f"'{source}': parameter '{name}' has a 'guess' and a 'value': leave out the value if it "
-            "is to be estimated, the guess if it is known.")
+    return (f"'{source}': parameter '{name}' has a 'guess' and a 'value': leave out the value if "
+            "it is to be estimated, the guess if it is known.")
