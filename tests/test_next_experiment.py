@@ -73,12 +73,22 @@ def test_profiles_are_the_same_for_a_seed_and_differ_between_draws() -> None:
 
 
 @pytest.mark.parametrize("wrong", [
-    {"duration": 2.5}, {"frequency": 12.0}, {"frequency": 0.0}, {"quiet": 19.9}])
+    {"duration": 2.5}, {"duration": 3.4}, {"frequency": 12.0}, {"frequency": 0.0}, {"quiet": 19.9}])
 def test_profiles_that_cannot_be(wrong: dict[str, float]) -> None:
     with pytest.raises(errors.BadSetting, match="profile"):
         profiles(**{"frequency": 2.35, **wrong})  # type: ignore[arg-type]
     with pytest.raises(errors.BadSetting, match="velocity"):
         Bounds(velocity=0.0)
+
+
+def test_the_shortest_profiles_hold_all_kicks() -> None:
+    for duration in np.arange(3.0, 5.0, 0.05):
+        try:
+            made = profiles(2.35, duration=duration, draws=1)
+        except errors.BadSetting:
+            assert duration < 3.55
+        else:
+            assert all(np.any(p["u_x"].values) for p in made)
 
 
 def test_scaled_profile_is_smaller() -> None:
@@ -219,6 +229,18 @@ def test_what_was_recorded_before_counts() -> None:
     # The same again: √2 times as far apart, and no better than a repetition.
     assert chosen.value == pytest.approx(np.sqrt(2) * chosen.before, rel=1e-6)
     assert chosen.gain == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("length", "made"), [(8.0, 8.0), (0.6, 5.0 / 2.35), (None, 20.0)])
+def test_profiles_are_as_long_as_what_was_recorded(length: float | None, made: float) -> None:
+    """But for a recording in which nothing could swing."""
+    model = systems.sloshing()
+    before = [] if length is None else [pk.simulate(
+        model, excitation.two_pulse(duration=8.0), sigma=SIGMA).window(0.0, length)]
+    chosen = d_optimal(model, recorded=before, sigma=SIGMA)
+    assert chosen.profile.stop == pytest.approx(made, rel=0.02)
+    asked = d_optimal(model, recorded=before, sigma=SIGMA, duration=5.0)
+    assert asked.profile.stop == pytest.approx(5.0, rel=0.01)
 
 
 def test_more_noise_separates_less() -> None:

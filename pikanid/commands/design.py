@@ -58,7 +58,8 @@ def design(
     limit: Annotated[list[str], typer.Option(
         metavar="NAME=VALUE", show_default=False,
         help="largest value that an output may reach, as theta=15deg")] = [],  # noqa: B006
-    duration: Annotated[float, typer.Option(metavar="S", help="of the profile [s]")] = 20.0,
+    duration: Annotated[float | None, typer.Option(
+        metavar="S", help="of the profile [s]; that of --recorded, or 20 s, by default")] = None,
     rate: Annotated[float | None, typer.Option(
         metavar="HZ", help="its sampling rate; that of --recorded, or 100 Hz, by default")] = None,
     *,

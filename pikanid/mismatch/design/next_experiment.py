@@ -119,7 +119,7 @@ class NextExperiment:
 
 def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
                     sigma: Sigma = None, candidates: Sequence[Recording] | None = None,
-                    bounds: Bounds | None = None, duration: float = 20.0,
+                    bounds: Bounds | None = None, duration: float | None = None,
                     dt: float | None = None, limits: Mapping[str, float] | None = None,
                     seed: int = 0, workers: int = 1, settings: Settings = DEFAULTS,
                     ranges: Mapping[str, Range] | None = None) -> NextExperiment:
@@ -133,7 +133,8 @@ def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recordin
         candidates: Profiles to choose from; by default those of `profiles`.
         bounds: Of the drive, for the default candidates; by default those of a planar motor for
             inputs that are accelerations.
-        duration: Of the default candidates [s].
+        duration: Of the default candidates [s]; by default that of the longest recording, 20 s
+            without any.
         dt: Their sampling interval [s]; by default that of what was recorded, else 0.01 s.
         limits: Output -> largest |value| that the experiment may reach; profiles are made smaller
             until every hypothesis keeps to it.
@@ -187,7 +188,7 @@ def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recordin
 
 def d_optimal(model: Model, recorded: Sequence[Recording] | Recording = (), sigma: Sigma = None,
               candidates: Sequence[Recording] | None = None, bounds: Bounds | None = None,
-              duration: float = 20.0, dt: float | None = None,
+              duration: float | None = None, dt: float | None = None,
               limits: Mapping[str, float] | None = None, seed: int = 0,
               settings: Settings = DEFAULTS, ranges: Mapping[str, Range] | None = None
               ) -> NextExperiment:

@@ -34,6 +34,9 @@ FINEST = 0.1  # limit: of a period, that the sampling interval may be
 RESOLVED = 0.05  # numerical: natural periods a sampling interval, at most, that kicks can follow
 REST = (2.0, 0.2)  # limit: [s], and share of a profile, that the drive rests at first
 PERIODS = 10.0  # limit: in a profile, of the frequency that is taken where a model has none
+LEAST = 3.5  # limit: periods of motion in a profile: kicks of three sizes take one each
+FEWEST = 5.0  # limit: periods in a profile as long as a recording
+LONG = 20.0  # definition: [s] of a profile where nothing was recorded before
 EVERY = 0.01  # definition: [s] between samples where nothing was recorded before
 DIGITS = 6  # numerical: of a profile's values: a file of decimals is run as it was designed
 
@@ -106,7 +109,7 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
     """
     bounds = bounds or Bounds()
     t = grid(duration, dt)
-    if not (0 < frequency * dt < FINEST and quiet >= 0 and duration - quiet > 2 / frequency):
+    if not (0 < frequency * dt < FINEST and quiet >= 0 and duration - quiet > LEAST / frequency):
         raise errors.BadSetting(errors.no_room_for_profile(duration, quiet, frequency, dt))
     first = int(np.ceil(quiet / dt - 1e-9))
     rng = np.random.default_rng(seed)
@@ -124,10 +127,11 @@ def profiles(frequency: float, bounds: Bounds | None = None, duration: float = 2
     return made
 
 
-def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: float,
+def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: float | None,
                  dt: float | None, seed: int, ranges: Mapping[str, Range] | None = None,
                  recorded: Sequence[Recording] = ()) -> list[Recording]:
-    """Profiles for the first input, and others at the same time for all further ones.
+    """Profiles for the first input, and others at the same time for all further ones; by default as
+    long as the longest recording, and sampled as often.
 
     Raises:
         BadSetting: If the models have no input, the range of one is not known, or as for
@@ -139,7 +143,11 @@ def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: f
     known = ranges_of(inputs.values(), ranges, recorded, bounds is not None)
     dt = dt or _interval(inputs, recorded) or EVERY
     first, *others = inputs.values()
-    frequency = natural_frequency(next(iter(models.values()))) or PERIODS / duration
+    natural = natural_frequency(next(iter(models.values())))
+    if duration is None:
+        longest = max((r.stop - r.start for r in recorded), default=LONG)
+        duration = max(longest, FEWEST / natural) if natural else longest
+    frequency = natural or PERIODS / duration
     # A hypothesis that rings faster than the profile can follow is driven at the fastest it can.
     frequency = min(frequency, RESOLVED / dt)
     made = {i.name: profiles(
