@@ -9,6 +9,7 @@ operation (`with_term`, `map_input`, ...) returns a new model.
 
 from __future__ import annotations
 
+import functools
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -115,7 +116,7 @@ class Model(Operations):
     def __hash__(self) -> int:
         return hash((self.name, self.parameters, tuple(self.equations.items())))
 
-    @property
+    @functools.cached_property
     def unit_disagreements(self) -> tuple[str, ...]:
         """Where its units do not fit its formulas: see `pikanid.model.units.disagreements`."""
         return model_units.disagreements(self)
