@@ -9,8 +9,8 @@ operation (`with_term`, `map_input`, ...) returns a new model.
 
 from __future__ import annotations
 
-import functools
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
