@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,21 +44,30 @@ def test_several_are_counted() -> None:
     assert "4 samples lie" in said and ", ..." in said
 
 
+@pytest.mark.parametrize("n", [20, 60, 300])
 @pytest.mark.parametrize("noise", ["normal", "uniform", "steps", "correlated"])
-def test_ordinary_noise_has_none(noise: str) -> None:
+def test_ordinary_noise_has_none(noise: str, n: int) -> None:
     """In at most one of a thousand recordings; of 2000, more than 8 have a probability of 1e-3."""
     rng = np.random.default_rng(21)
     count = 0
     for _ in range(2000):
-        e = rng.standard_normal(300)
+        e = rng.standard_normal(n)
         if noise == "uniform":
-            e = rng.uniform(-1, 1, 300)
+            e = rng.uniform(-1, 1, n)
         if noise == "steps":
-            e = np.round(e)
+            e = np.round(2 * e + 0.37 * np.arange(n)) - 0.37 * np.arange(n)
         if noise == "correlated":
-            e = np.convolve(rng.standard_normal(309), np.ones(10) / 10, "valid")
+            e = np.convolve(rng.standard_normal(n + 9), np.ones(10) / 10, "valid")
         count += len(outlying(of(e))) > 0
     assert count <= 8
+
+
+def test_a_sample_that_is_said_to_be_uncertain_is_none() -> None:
+    rng = np.random.default_rng(8)
+    e, sigma = rng.standard_normal(300), np.ones(300)
+    e[40], sigma[40] = 50.0, 50.0
+    assert outlying(of(e)).tolist() == [40]
+    assert len(outlying(replace(of(e), sigma=sigma))) == 0
 
 
 def test_what_lasts_or_is_frequent_is_none() -> None:
@@ -65,7 +76,10 @@ def test_what_lasts_or_is_frequent_is_none() -> None:
     assert outlying(of(e + 30.0 * (np.arange(300) == 77))).tolist() == [77]
     assert len(outlying(of(e + 30.0 * np.isin(np.arange(300), range(77, 83))))) == 0
     assert len(outlying(of(e + 30.0 * (rng.random(300) < 0.05)))) == 0
-    assert len(outlying(of(np.zeros(300)))) == len(outlying(of(e[:10] + 99 * (e[:10] > 1)))) == 0
+    assert len(outlying(of(np.zeros(300)))) == 0
+    assert len(outlying(of(e[:19] + 99 * (np.arange(19) == 7)))) == 0
+    # two beside each other are no more alone than what an input's step leaves
+    assert len(outlying(of(e + 30.0 * (np.arange(300) == 77) - 30.0 * (np.arange(300) == 78)))) == 0
 
 
 @pytest.mark.parametrize("end", [0, 299])

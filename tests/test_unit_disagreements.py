@@ -22,6 +22,8 @@ def room(loss: str = "W/K", **more: str) -> pk.Model:
         "parameters": {"UA": {"guess": 5.0, "unit": loss, "bounds": [0.0, 100.0]},
                        "C": {"value": 20.0, "unit": "J/K"}, "s": {"value": 1.0}},
         "equations": {"T": more.get("T", "(P - UA*(T - T_a))/C")},
+        **({"splines": {"f": {"degree": 1, "knots": [0.0, 0.0, 50.0, 100.0, 100.0]}}}
+           if "f(T)" in more.get("T", "") else {}),
         "outputs": {"T": {"unit": "degC", "expression": "T", "sigma": 0.1}}})
 
 
@@ -50,10 +52,30 @@ def test_what_fits_or_has_no_unit_is_not(unit: str) -> None:
 
 @pytest.mark.parametrize(("formula", "said"), [
     ("(P - 4.7*(T - T_a))/C", False), ("(P - s*(T - T_a))/C", False), ("P/UA/C", True),
-    ("(P - UA*(T - T_a)*sin(P))/C", True), ("(P - UA*(T - T_a)*sin(s*P))/C", False)],
-    ids=["a number", "no unit", "a quotient", "a sine", "a sine without"])
+    ("(P - UA*(T - T_a)*sin(P))/C", True), ("(P - UA*(T - T_a)*sin(s*P))/C", False),
+    ("P/C - 2*(T - T_a)", False), ("P/C - (T - T_a)/5", False), ("(P - UA*abs(T - T_a)**s)/C", False),
+    ("(P - UA*signed_power(T - T_a, s))/C", False), ("P/C*tanh(10*P)", False),
+    ("P/C*f(T)", False), ("P/C - f(T)*T", False), ("P/C - (T - T_a)", True)],
+    ids=["a number", "no unit", "a quotient", "a sine", "a sine without", "two", "a fifth",
+         "a power", "a power with a sign", "ten", "a spline", "a spline for a rate", "none"])
 def test_a_number_or_a_name_without_a_unit_may_have_any(formula: str, said: bool) -> None:
     assert bool(room(T=formula).unit_disagreements) == said
+
+
+def test_the_term_that_is_wrong_is_told_and_once() -> None:
+    """Whatever the order of the terms, the one in another unit than the equation's."""
+    model = pk.Model.from_dict({
+        "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}},
+        "parameters": {"c": {"guess": 1.0, "unit": "1/s"}},
+        "equations": {"x": "v", "v": "-x - c*v"},
+        "outputs": {"x": {"unit": "m", "expression": "x"}}})
+    (sentence,) = model.unit_disagreements
+    assert "'-x' comes out in 'm' where 'm/s^2' is needed" in sentence
+
+
+def test_a_lag_of_a_tenth_of_a_second_is_a_time() -> None:
+    model = pk.systems.sloshing().map_input("u_x", lag="0.1")
+    assert model.unit_disagreements == ()
 
 
 def test_results_say_so_and_are_the_same() -> None:

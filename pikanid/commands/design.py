@@ -59,7 +59,7 @@ def design(
         metavar="NAME=VALUE", show_default=False,
         help="largest value that an output may reach, as theta=15deg")] = [],  # noqa: B006
     duration: Annotated[float | None, typer.Option(
-        metavar="S", help="of the profile [s]; that of --recorded, or 20 s, by default")] = None,
+        metavar="S", help="of the profile; by default that of --recorded, or 20 s")] = None,
     rate: Annotated[float | None, typer.Option(
         metavar="HZ", help="its sampling rate; that of --recorded, or 100 Hz, by default")] = None,
     *,

@@ -40,9 +40,9 @@ FileRate = Annotated[float | None, typer.Option(
 Sheet = Annotated[str | None, typer.Option(
     "--sheet", metavar="NAME", help="sheet of a workbook, by name or number from 0")]
 Start = Annotated[float | None, typer.Option(
-    "--from", metavar="S", help="start [s]", show_default=False)]
+    "--from", metavar="S", help="start", show_default=False)]
 Stop = Annotated[float | None, typer.Option(
-    "--to", metavar="S", help="end [s]", show_default=False)]
+    "--to", metavar="S", help="end", show_default=False)]
 OwnTimes = Annotated[bool, typer.Option(
     "--own-times", help="take the times of files joined by + as they stand, whatever their dates")]
 Stride = Annotated[int, typer.Option(
@@ -52,7 +52,7 @@ Excitation = Annotated[str, typer.Option(
     help=f"what drives the model: {', '.join(EXCITATIONS)}, or a recording of its inputs (files "
     "joined by + are one)")]
 Duration = Annotated[float, typer.Option(
-    "--duration", metavar="S", help="of a built-in excitation [s]")]
+    "--duration", metavar="S", help="of a built-in excitation")]
 Rate = Annotated[float | None, typer.Option(
     "--rate", metavar="HZ", show_default=False,
     help="sampling rate of a built-in excitation, 100 by default, or of a file without times")]

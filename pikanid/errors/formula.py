@@ -86,13 +86,19 @@ def units_meet(where: str, formula: str, found: str, wanted: str, unknown: Seque
         if unknown
         else "declare units that fit, and a parameter for every number that has a unit"
     )
-    return (units_disagree(where, formula, found, wanted)[:-1]
+    return (_other_unit(where, formula, found, wanted)
             + f", and no factor turns one into the other: {advice}.")
 
 
 def units_disagree(where: str, formula: str, found: str, wanted: str) -> str:
+    return (_other_unit(where, formula, found, wanted)
+            + "; its numbers are used as they are: check the formula and its units.")
+
+
+def _other_unit(where: str, formula: str, found: str, wanted: str) -> str:
+    needed = f"'{wanted}'" if wanted else "a pure number"
     return (f"{where}: '{short(formula)}' comes out in '{found or 'dimensionless'}' where "
-            f"'{wanted or 'dimensionless'}' is needed.")
+            f"{needed} is needed")
 
 
 def number_between_units(where: str, number: str) -> str:

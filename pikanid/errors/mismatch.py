@@ -48,8 +48,8 @@ def not_a_range(text: str, example: str) -> str:
 
 def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: float) -> str:
     return (f"No profile fits into {duration:g} s with {quiet:g} s of rest and samples every "
-            f"{dt:g} s for a model that rings at {frequency:.3g} Hz: leave four periods of "
-            "motion, and ten samples a period.")
+            f"{dt:g} s for motion at {frequency:.3g} Hz: leave four periods of it, and "
+            "ten samples a period.")
 
 
 def not_in_catalogue(effect: str, known: Iterable[str]) -> str:

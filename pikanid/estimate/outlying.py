@@ -6,11 +6,12 @@ Least squares follow one such sample as far as a thousand ordinary ones would le
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import stdtrit
 
 from pikanid.estimate.data import Fit
 
 RATE = 1e-3  # limit: probability that normal noise has such a sample anywhere in a recording
+EFFICIENCY = 0.37  # definition: of the median absolute deviation, normal noise
 MOST = 0.01  # limit: share of samples; of more, the noise or the model is what is different
 FEWEST = 20  # limit: samples that tell how large the noise is
 SHOWN = 3  # layout: times that are listed
@@ -33,16 +34,18 @@ def outlying(fit: Fit) -> np.ndarray:
     >>> outlying(fit)
     array([17])
     """
-    r = fit.residual
+    r = fit.residual if fit.sigma is None else fit.residual / fit.sigma
     if len(r) < FEWEST:
         return np.array([], int)
     r = r - np.median(r)
     noise = MAD * float(np.median(np.abs(r)))
-    far = -float(ndtri(0.5 * RATE / len(r))) * noise
+    # what few samples say of the noise is as uncertain as Student's t says
+    far = -float(stdtrit(EFFICIENCY * len(r), 0.5 * RATE / len(r))) * noise
     inner = np.pad(r, 1, mode="reflect")
     off = np.minimum(np.abs(r - inner[:-2]), np.abs(r - inner[2:]))
     found = np.flatnonzero((np.abs(r) > far) & (off > far)) if noise > 0.0 else np.array([], int)
-    return found if len(found) <= max(MOST * len(r), 1) else np.array([], int)
+    alone = (np.diff(found, prepend=-2) > 1) & (np.diff(found, append=len(r) + 1) > 1)
+    return found[alone] if len(found) <= max(MOST * len(r), 1) else np.array([], int)
 
 
 def outlying_warning(fit: Fit) -> str:
@@ -54,5 +57,5 @@ def outlying_warning(fit: Fit) -> str:
     more = ", ..." if len(found) > SHOWN else ""
     what = "1 sample lies" if len(found) == 1 else f"{len(found)} samples lie"
     return (f"Recording '{fit.recording}', '{fit.output}': {what} far off all others "
-            f"(t = {times}{more} s). One that is wrong can move every estimate: leave it empty in "
-            "the file, or NaN.")
+            f"(t = {times}{more} s). A wrong reading can move every estimate: if it is one, leave "
+            "it empty in the file, or NaN.")

@@ -96,6 +96,17 @@ def coefficients(expr: sp.Expr) -> list[float]:
     return [c for c in found if math.isfinite(c) and c > 0]
 
 
+def holds_numbers(expr: sp.Expr) -> bool:
+    """Whether a product in a formula has a number for a factor, which may have a unit.
+
+    >>> x, v = sp.symbols("x v")
+    >>> holds_numbers(x**2 - v / x), holds_numbers(sp.tanh(10 * v)), holds_numbers((x - v) / 0.5)
+    (False, True, True)
+    """
+    return any(abs(sp.prod([a for a in node.args if a.is_number])) != 1
+               for node in expr.atoms(sp.Mul))
+
+
 def simple(number: float) -> bool:
     """Whether a number is one that formulas hold by their nature: 2, 1/2, 3/4."""
     return any(math.isclose(number * k, round(number * k), rel_tol=1e-12) and 0 < number * k <= 12

@@ -24,6 +24,7 @@ from pikanid.model.unit_algebra import (
     Unit,
     coefficients,
     declared,
+    holds_numbers,
     of_other_zero,
     simple,
 )
@@ -43,13 +44,13 @@ class Conversion:
         known: Name -> part of the model.
         added: Parameters put into formulas so far that the model did not have.
         used: Whether any factor was put into a formula.
-        disagreements: Sentences about units of different kinds that met.
+        disagreements: Place -> what is said of units of different kinds that met there first.
     """
 
     known: Mapping[str, Any]
     added: list[Parameter] = field(default_factory=list)
     used: bool = False
-    disagreements: list[str] = field(default_factory=list)
+    disagreements: dict[str, str] = field(default_factory=dict)
 
     def put(self, expr: sp.Expr, wanted: Unit, where: str, open_: bool = False) -> sp.Expr:
         """The formula with the factors that it needs to come out in `wanted`.
@@ -80,7 +81,7 @@ class Conversion:
         if isinstance(expr, AppliedUndef):
             first = self.known.get(f"{expr.func.__name__}_0")
             inner, _ = self.walk(expr.args[0], where)
-            return expr.func(inner), declared(first.unit if first else "")
+            return expr.func(inner), declared(first.unit if first else "", expr.func.__name__)
         if expr.is_Add or isinstance(expr, _OF_ONE_UNIT):
             return self.meeting(expr, where, wanted)
         if expr.is_Mul:
@@ -120,7 +121,8 @@ class Conversion:
         own = [u for u in own if u.measure.kind] or own
         if not own:
             return [e for e, _ in walked], dataclasses.replace(BARE, unknown=unknown)
-        goal = min(own, key=lambda u: (not u.same_size(wanted), not u.same_size(ONE)))
+        goal = min(own, key=lambda u: (u.measure.kind != wanted.measure.kind,
+                                       not u.same_size(wanted), not u.same_size(ONE)))
         bare = [e for e, u in walked if u not in own and e != 0]
         if bare and any(not u.same_size(goal) for u in own):
             raise errors.BadUnit(errors.number_between_units(where, to_text(bare[0])))
@@ -154,7 +156,8 @@ class Conversion:
         exponent = self.argument(expr.args[1], where, expr)
         if unit.measure.kind:
             # what unit x^n has depends on n: numbers are what they are
-            return expr.func(base, exponent), BARE
+            return expr.func(base, exponent), dataclasses.replace(
+                BARE, unknown=frozenset([to_text(exponent)]))
         return expr.func(self.fitted(base, unit, ONE, where, expr), exponent), BARE
 
     def fitted(self, expr: sp.Expr, unit: Unit, wanted: Unit, where: str,
@@ -167,8 +170,8 @@ class Conversion:
             if not unit.measure.kind and unit.same_size(ONE):
                 return expr  # a pure number takes any
             if unit.same_size(wanted):  # without a factor between them units are documentation
-                if not unknown and all(map(simple, coefficients(expr))):
-                    self.disagreements.append(errors.units_disagree(
+                if not (unknown or holds_numbers(expr)):
+                    self.disagreements.setdefault(where, errors.units_disagree(
                         where, to_text(expr), unit.text, wanted.text))
                 return expr
             raise errors.BadUnit(errors.units_meet(

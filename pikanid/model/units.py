@@ -61,8 +61,8 @@ def disagreements(model: Lookup) -> tuple[str, ...]:
     """Formulas of a model in which SI units of different kinds meet, a sentence for each.
 
     Numbers in them are what they are, whatever their units: the model can be used, but a formula or
-    a unit in it is likely to be wrong.  Formulas that hold names without a unit, or numbers that
-    may have one, tell nothing.
+    a unit in it is likely to be wrong.  Terms that hold names without a unit, powers that are not
+    known, or factors that are numbers tell nothing.
 
     >>> from pikanid.model import Model
     >>> model = Model.from_dict({
@@ -70,12 +70,13 @@ def disagreements(model: Lookup) -> tuple[str, ...]:
     ...     "parameters": {"c": {"guess": 1.0, "unit": "N"}, "m": {"guess": 2.0, "unit": "kg"}},
     ...     "outputs": {"v": {"expression": "v"}}})
     >>> disagreements(model)
-    ("The equation of 'v': '-c*v/m' comes out in 'N*m/(s*kg)' where 'm/s^2' is needed.",)
+    ("The equation of 'v': '-c*v/m' comes out in 'N*m/(kg*s)' where 'm/s^2' is needed; \
+its numbers are used as they are: check the formula and its units.",)
     """
     named: list[State | Input | Parameter] = [*model.states, *model.inputs, *model.parameters]
     conversion = Conversion({p.name: p for p in named})
     _converted(model, conversion.put)
-    return tuple(dict.fromkeys(conversion.disagreements))
+    return tuple(conversion.disagreements.values())
 
 
 def _converted(model: Lookup, put: Callable[..., sp.Expr]) -> dict[str, Any]:

@@ -91,7 +91,8 @@ def inside(reached: Optimum, residual: Vector, jacobian: Vector, start: np.ndarr
     if here is None:
         return reached
     if (more := promised(here, theta, lower, upper)) <= share * here.cost:
-        return reached if more > 0.0 else replace(reached, cost=0.5 * here.cost, converged=True)
+        exact = here.cost == 0.0  # also where MINPACK has not been asked
+        return replace(reached, cost=0.0, converged=True) if exact else reached
     first = residual(start)
     least = tolerance**2 * float(first @ first)  # of what is exact, no share is worth a step
     if more < least:

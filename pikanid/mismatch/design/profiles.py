@@ -36,6 +36,7 @@ REST = (2.0, 0.2)  # limit: [s], and share of a profile, that the drive rests at
 PERIODS = 10.0  # limit: in a profile, of the frequency that is taken where a model has none
 LEAST = 3.5  # limit: periods of motion in a profile: kicks of three sizes take one each
 FEWEST = 5.0  # limit: periods in a profile as long as a recording
+MOST = 10_000  # limit: samples of one: each of several dozen is simulated
 LONG = 20.0  # definition: [s] of a profile where nothing was recorded before
 EVERY = 0.01  # definition: [s] between samples where nothing was recorded before
 DIGITS = 6  # numerical: of a profile's values: a file of decimals is run as it was designed
@@ -131,7 +132,7 @@ def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: f
                  dt: float | None, seed: int, ranges: Mapping[str, Range] | None = None,
                  recorded: Sequence[Recording] = ()) -> list[Recording]:
     """Profiles for the first input, and others at the same time for all further ones; by default as
-    long as the longest recording, and sampled as often.
+    long as the longest recording, if that makes 5 periods and 10,000 samples, and sampled as often.
 
     Raises:
         BadSetting: If the models have no input, the range of one is not known, or as for
@@ -145,8 +146,8 @@ def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: f
     first, *others = inputs.values()
     natural = natural_frequency(next(iter(models.values())))
     if duration is None:
-        longest = max((r.stop - r.start for r in recorded), default=LONG)
-        duration = max(longest, FEWEST / natural) if natural else longest
+        longest = min(max((r.stop - r.start for r in recorded), default=LONG), MOST * dt)
+        duration = max(longest, FEWEST / min(natural or np.inf, RESOLVED / dt))
     frequency = natural or PERIODS / duration
     # A hypothesis that rings faster than the profile can follow is driven at the fastest it can.
     frequency = min(frequency, RESOLVED / dt)
