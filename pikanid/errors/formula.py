@@ -86,19 +86,15 @@ def units_meet(where: str, formula: str, found: str, wanted: str, unknown: Seque
         if unknown
         else "declare units that fit, and a parameter for every number that has a unit"
     )
-    return (_other_unit(where, formula, found, wanted)
-            + f", and no factor turns one into the other: {advice}.")
+    return (f"{where}: '{short(formula)}' comes out in '{found or 'dimensionless'}' where "
+            f"'{wanted or 'dimensionless'}' is needed, and no factor turns one into the other: "
+            f"{advice}.")
 
 
 def units_disagree(where: str, formula: str, found: str, wanted: str) -> str:
-    return (_other_unit(where, formula, found, wanted)
-            + "; its numbers are used as they are: check the formula and its units.")
-
-
-def _other_unit(where: str, formula: str, found: str, wanted: str) -> str:
     needed = f"'{wanted}'" if wanted else "a pure number"
-    return (f"{where}: '{short(formula)}' comes out in '{found or 'dimensionless'}' where "
-            f"{needed} is needed")
+    return (f"{where}: '{short(formula)}' comes out in '{found or 'dimensionless'}' where {needed} "
+            "is needed; its numbers are used as they are: check the formula and its units.")
 
 
 def number_between_units(where: str, number: str) -> str:
