@@ -78,8 +78,7 @@ def followed(model: Lookup, outputs: Sequence[Output], equations: Mapping[str, s
         state = shown.get(output.name, "")
         old, new = model.equations.get(state), equations.get(state)
         if old is not None and isinstance(new, sp.Expr) and new != old:
-            shows = before[output.name]
-            constant = 0 if shows == old else expanded(shows - old)
+            constant = expanded(before[output.name] - old)
             output = replace(output, expression=new + constant)
         made.append(output)
     return tuple(made)
