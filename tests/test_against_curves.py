@@ -89,6 +89,22 @@ def test_what_one_curve_does_by_itself_is_not_several_effects(
                "by itself" in d.why for d in found.doubtful)
 
 
+@pytest.mark.parametrize(("key", "states"), [
+    ("static_bias", ["theta", "theta_dot"]), ("coulomb_friction", ["theta_dot"]),
+    ("even_stiffness", ["theta"]), ("second_mode", []), ("wobble", [])])
+def test_what_a_curve_of_a_state_may_be(key: str, states: list[str]) -> None:
+    """A mode and what changes with time are none, and a constant is one of anything."""
+    own = next(c for c in case_of(MODEL).candidates if c.key == key)
+    assert [s for s in own.site.moving if curves._may_be_of(own, s)] == states
+
+
+def test_several_effects_that_no_curve_is_are_compared_with_one() -> None:
+    """A force of one range of speeds is no mode beside a constant force."""
+    rig = MODEL.with_term("theta_dot", "1.5*exp(-((theta_dot - 0.8)/0.5)**2)")
+    found = judged(case_of(rig), "second_mode", "static_bias")
+    assert not found.present and all("by itself" in d.why for d in found.doubtful)
+
+
 def test_a_limit_keeps_its_name() -> None:
     found = judged(case_of(MODEL.map_input("u_x", saturation=0.5)), "input_saturation")
     assert [p.names for p in found.present] == [("input_saturation",)]

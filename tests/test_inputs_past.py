@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pikanid.mismatch.data.inputs_past import explained
 from pikanid.mismatch.data.outliers import without_lone, without_outliers
 from pikanid.mismatch.data.preparation import with_refined_noise
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model, systems
 from pikanid.noise.level import NoiseModel
+from pikanid.problem.held import HeldInput
+from pikanid.problem.inputs_past import explained
 from pikanid.recording import Recording
-from pikanid.recording.channel import Channel
 from pikanid.simulation import simulate
 from pikanid.strategies.nls import NLS
 
@@ -88,7 +88,9 @@ def test_noise_is_not_explained_by_chance() -> None:
         if seed % 2:
             for k in range(1, 600):
                 noise[k] += 0.8 * noise[k - 1]
-        moves = [Channel("a", t, rng.standard_normal(600), "V"), driven(seed, 600)["u"]]
+        u = driven(seed, 600)["u"]
+        moves = [HeldInput("a", t, rng.standard_normal(600), "zero"),
+                 HeldInput("u", u.time, u.values, "zero")]
         assert not explained(t, noise, moves, 12, 1e-4).any()
     assert not explained(t, noise, [], 12, 1e-4).any()
 
@@ -97,7 +99,7 @@ def test_noise_that_a_controller_feeds_back_stays_noise() -> None:
     """At the same instant its output knows the noise that the sensor gave it."""
     rng = np.random.default_rng(3)
     t, noise = STEP * np.arange(600), rng.standard_normal(600)
-    assert not explained(t, noise, [Channel("u", t, -2.0 * noise, "V")], 12, 1e-4).any()
+    assert not explained(t, noise, [HeldInput("u", t, -2.0 * noise, "zero")], 12, 1e-4).any()
 
 
 def test_gross_errors_do_not_hide_what_inputs_explain() -> None:
@@ -106,7 +108,7 @@ def test_gross_errors_do_not_hide_what_inputs_explain() -> None:
     answer = np.convolve(u.values, [0.0, 0.5, 0.3, 0.2])[:1000]
     y = answer + 0.01 * np.random.default_rng(4).standard_normal(1000)
     y[[77, 391, 708]] += 10.0
-    left = y - explained(t, y, [u], 12, 1e-6)
+    left = y - explained(t, y, [HeldInput("u", t, u.values, "zero")], 12, 1e-6)
     jumps = np.abs(np.diff(np.delete(left, [77, 391, 708])))[5:]
     assert jumps.max() < 0.1
 
@@ -128,8 +130,8 @@ def test_a_slow_input_far_from_zero_explains_nothing_by_itself(offset: float) ->
     """
     rng, t = np.random.default_rng(4), 5.0 * np.arange(400.0)
     heat = np.repeat(rng.uniform(0, 900, 40), 10)
-    room = Channel("T_a", t, offset + 4 * np.sin(t / 300), "K")
+    room = HeldInput("T_a", t, offset + 4 * np.sin(t / 300), "zero")
     y = 0.01 * np.concatenate([heat[:1], heat[:-1]])
     part = explained(t, y + 0.1 * rng.standard_normal(400),
-                     [Channel("P", t, heat, "W"), room], 5, 1e-6)
+                     [HeldInput("P", t, heat, "zero"), room], 5, 1e-6)
     assert np.std(part - y) < 0.15 * np.std(y)

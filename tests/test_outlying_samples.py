@@ -10,6 +10,7 @@ import pytest
 import pikanid as pk
 from pikanid.estimate.data import Fit
 from pikanid.estimate.outlying import outlying
+from pikanid.problem.held import HeldInput
 
 SIGMA = 0.1 * np.pi / 180
 SEEN = pk.simulate(pk.systems.sloshing(), pk.excitation.two_pulse(), sigma=SIGMA, seed=4)
@@ -87,3 +88,17 @@ def test_the_first_and_the_last_sample_count(end: int) -> None:
     e = np.random.default_rng(6).standard_normal(300)
     e[end] = -25.0
     assert outlying(of(e)).tolist() == [end]
+
+
+def test_what_follows_the_steps_of_an_input_is_none() -> None:
+    """A sensor that is late by part of a sample leaves one large residual after each step."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 16), 50)
+    u[300:] = np.where(np.arange(500) < 250, 30.0, u[300:])  # two steps much larger than the others
+    late = np.diff(u, prepend=u[0])
+    fit = of(rng.standard_normal(800) + 2.0 * np.concatenate([[0.0], late[:-1]]))
+    inputs = [HeldInput("u", fit.t, u, "zero")]
+    assert len(outlying(fit)) == 2
+    assert len(outlying(fit, inputs)) == 0
+    wrong = replace(fit, measured=fit.measured + 60.0 * (np.arange(800) == 77))
+    assert outlying(wrong, inputs).tolist() == [77]

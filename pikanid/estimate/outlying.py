@@ -5,21 +5,28 @@ Least squares follow one such sample as far as a thousand ordinary ones would le
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.special import stdtrit
 
 from pikanid.estimate.data import Fit
+from pikanid.problem.held import HeldInput
+from pikanid.problem.inputs_past import explained
 
 RATE = 1e-3  # limit: probability that normal noise has such a sample anywhere in a recording
 EFFICIENCY = 0.37  # definition: of the median absolute deviation, normal noise
 MOST = 0.01  # limit: share of samples; of more, the noise or the model is what is different
 FEWEST = 20  # limit: samples that tell how large the noise is
+LAGS = 12  # limit: samples after which a rig that is as fast as its sampling has answered
+CHANCE = 1e-6  # limit: that noise alone counts as what the inputs' past explains
 SHOWN = 3  # layout: times that are listed
 MAD = 1.4826  # definition: median absolute deviation to standard deviation, normal noise
 
 
-def outlying(fit: Fit) -> np.ndarray:
-    """Which samples lie off a fit by themselves, farther than normal noise would go.
+def outlying(fit: Fit, inputs: Sequence[HeldInput] = ()) -> np.ndarray:
+    """Which samples lie off a fit by themselves, farther than normal noise would go, and than what
+    the inputs' past explains: a late sensor leaves a sample alone after each step of an input.
 
     The noise is what the median absolute residual says, which a few samples do not move (P. J.
     Rousseeuw and C. Croux, J. Am. Stat. Assoc. 88, 1993).  A sample counts that is as far off both
@@ -41,16 +48,24 @@ def outlying(fit: Fit) -> np.ndarray:
     noise = MAD * float(np.median(np.abs(r)))
     # what few samples say of the noise is as uncertain as Student's t says
     far = -float(stdtrit(EFFICIENCY * len(r), 0.5 * RATE / len(r))) * noise
-    inner = np.pad(r, 1, mode="reflect")
-    off = np.minimum(np.abs(r - inner[:-2]), np.abs(r - inner[2:]))
-    found = np.flatnonzero((np.abs(r) > far) & (off > far)) if noise > 0.0 else np.array([], int)
-    alone = (np.diff(found, prepend=-2) > 1) & (np.diff(found, append=len(r) + 1) > 1)
-    return found[alone] if len(found) <= max(MOST * len(r), 1) else np.array([], int)
+    found = (np.abs(r) > far) & (_alone(r) > far) if noise > 0.0 else np.zeros(len(r), bool)
+    if found.any() and inputs:
+        # of slow parts the explanation knows little: only how neighbours differ counts
+        found &= _alone(r - explained(fit.t, r, inputs, LAGS, CHANCE)) > far
+    at = np.flatnonzero(found)
+    apart = (np.diff(at, prepend=-2) > 1) & (np.diff(at, append=len(r) + 1) > 1)
+    return at[apart] if len(at) <= max(MOST * len(r), 1) else np.array([], int)
 
 
-def outlying_warning(fit: Fit) -> str:
+def _alone(r: np.ndarray) -> np.ndarray:
+    """How far each sample (N,) is from the nearer one of its neighbours."""
+    beside = np.pad(r, 1, mode="reflect")
+    return np.minimum(np.abs(r - beside[:-2]), np.abs(r - beside[2:]))
+
+
+def outlying_warning(fit: Fit, inputs: Sequence[HeldInput]) -> str:
     """What to do about samples that lie off a fit by themselves; empty where there are none."""
-    found = outlying(fit)
+    found = outlying(fit, inputs)
     if len(found) == 0:
         return ""
     times = ", ".join(f"{t:.6g}" for t in fit.t[found][:SHOWN])

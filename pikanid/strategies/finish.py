@@ -51,7 +51,8 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
                      "little.")
     notes += shown.warnings(problem.free, uncertainty)
     notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
-    notes += filter(None, map(outlying_warning, fits))
+    held = {e.name: e.held for e in problem.experiments}
+    notes += filter(None, (outlying_warning(fit, held[fit.recording]) for fit in fits))
     for e in problem.experiments:
         if e.unused:
             notes.append(f"Recording '{e.name}': the model does not use {', '.join(e.unused)}.")

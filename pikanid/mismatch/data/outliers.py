@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from pikanid import errors
-from pikanid.mismatch.data.inputs_past import explained
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.noise.level import high_band_sigma
+from pikanid.problem.held import HeldInput
+from pikanid.problem.inputs_past import explained
 from pikanid.recording import Recording
 
 CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0  # numerical: through two neighbours a side
@@ -63,10 +64,12 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
 def from_inputs(recording: Recording, t: np.ndarray, y: np.ndarray, inputs: Sequence[str],
                 settings: Settings) -> np.ndarray:
     """The part (N,) of a signal or a residual y (N,) at times t that these inputs' past explains
-    beyond chance.
+    beyond chance; an input that is not held is so between its samples.
     """
-    return explained(t, y, [recording[u] for u in inputs if u in recording],
-                     settings.detection.lags, settings.noise.by_chance)
+    channels = [recording[u] for u in inputs if u in recording]
+    held = [HeldInput(c.name, c.time, c.values, "zero" if c.hold in (None, "zero") else "first")
+            for c in channels]
+    return explained(t, y, held, settings.detection.lags, settings.noise.by_chance)
 
 
 def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:

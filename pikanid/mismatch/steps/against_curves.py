@@ -117,7 +117,7 @@ def _curves_of_all(case: Case, h: Hypothesis, own_left: float, noise: Sequence[d
         return
     for site in case.sites:
         for s in site.moving:
-            if all(e.site.v == site.v and e.argument in ("", s) and e.channel == "dynamics"
+            if all(e.site.v == site.v and e.channel == "dynamics" and _may_be_of(e, s)
                    for e in h.effects):
                 continue
             # of fewer pieces where what the train recordings did not visit cannot be run
@@ -125,6 +125,12 @@ def _curves_of_all(case: Case, h: Hypothesis, own_left: float, noise: Sequence[d
                            noise, own_left) for n in PIECES)
             if not smaller(own_left, next(filter(np.isfinite, left), np.inf)):
                 yield site, s
+
+
+def _may_be_of(effect: Candidate, s: str) -> bool:
+    """Whether a force is a function of a state, or constant."""
+    return effect.argument == s or any(
+        f == "constant force" or _argument(f, effect) == s for f in effect.families)
 
 
 def _holds(curve: tuple[Site, str], p: Present) -> bool:

@@ -14,7 +14,6 @@ from scipy.special import fdtrc
 from pikanid.noise.autoregressive import fit, innovations
 from pikanid.noise.projection import orthonormal
 from pikanid.problem.held import HeldInput
-from pikanid.recording.channel import Channel
 
 GAP = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0  # numerical: by which it is left
 CLIPPED = 3.0  # numerical: standard deviations beyond which a deviation counts as so much only
@@ -24,7 +23,7 @@ ROWS = 10  # numerical: samples a column from which on those are told from noise
 NORMAL = 0.6745  # definition: median absolute value of a unit Gaussian
 
 
-def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[Channel], lags: int, chance: float
+def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[HeldInput], lags: int, chance: float
               ) -> np.ndarray:
     """The part (N,) of a signal y (N,) that is a weighted sum of the inputs some samples ago, less
     its mean; zeros where they tell no more of the next sample than its own past does (C. W. J.
@@ -37,14 +36,14 @@ def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[Channel], lags: int
     Args:
         t: (N,) [s].
         y: (N,) there.
-        inputs: As recorded; one that is not held is so between its samples.
+        inputs: As recorded.
         lags: Intervals up to which the past reaches.
         chance: That noise alone is explained as well.
 
     >>> t = np.arange(300.0)
     >>> u = np.repeat(np.random.default_rng(0).normal(size=30), 10)
     >>> y = 2 * np.concatenate([[u[0]], u[:-1]])
-    >>> part = explained(t, y, [Channel("u", t, u, "V")], 5, 1e-6)
+    >>> part = explained(t, y, [HeldInput("u", t, u, "zero")], 5, 1e-6)
     >>> bool(np.ptp(part - y) < 1e-9)
     True
     """
@@ -80,14 +79,13 @@ def _robust(wanted: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]
     return said, float(fdtrc(k, freedom, float(said @ said) / k * freedom / left)) if k else 1.0
 
 
-def _past(t: np.ndarray, inputs: Sequence[Channel], lags: int) -> np.ndarray:
+def _past(t: np.ndarray, inputs: Sequence[HeldInput], lags: int) -> np.ndarray:
     """Columns (N, k): every input that moves, one interval ago and more.
 
     At the same instant an input may know the output's noise, where a controller drives it.
     """
     step = float(np.median(np.diff(t)))
-    held = [HeldInput(u.name, u.time, u.values, "zero" if u.hold in (None, "zero") else "first")
-            for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0]
-    columns = [x for u in held for k in range(1, lags + 1)
+    moving = [u for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0]
+    columns = [x for u in moving for k in range(1, lags + 1)
                if np.ptp(x := u.at(t, k * step)) > 0]
     return np.stack(columns, axis=1) if columns else np.empty((len(t), 0))
