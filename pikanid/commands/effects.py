@@ -23,6 +23,8 @@ from pikanid.commands.reading import Driven, every_source
 from pikanid.commands.simulate import excited
 from pikanid.figures import ENDINGS, save_figure
 
+AGREES = 0.1  # layout: difference of derivatives from which on "agrees" would be the wrong word
+
 EXAMPLES = """Examples:
 
   pikanid effects --model tanks.toml
@@ -72,6 +74,7 @@ def effects(
             f"{size.name} = {one.size:.3g} {size.unit}".strip(),
             "cannot be simulated there" if one.failure else largest,
             "" if one.failure else "reaches no output" if math.isnan(one.derivative) else
-            f"agrees to {100 * one.derivative:.1g} %")
+            f"agrees to {100 * one.derivative:.1g} %" if one.derivative < AGREES else
+            f"differs by {100 * one.derivative:.0f} %")
     console().print(made)
     return 0

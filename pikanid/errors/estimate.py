@@ -10,7 +10,8 @@ def undetermined(name: str, value: float, std: float) -> str:
 
 
 def sigma_unknown(output: str) -> str:
-    return f"The noise of output '{output}' is not known: pass sigma, in the output's unit."
+    return (f"The noise of output '{output}' is not known: give it in the output's unit (--sigma "
+            "0.1; in Python sigma=0.1).")
 
 
 def no_influence(name: str) -> str:

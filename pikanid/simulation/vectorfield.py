@@ -51,7 +51,7 @@ class VectorField:
 
     def rhs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """f (M, n)."""
-        return self._functions.values["f"](t, x, u, p)
+        return self._functions.values("f")(t, x, u, p)
 
     def rhs_jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
                       ) -> tuple[np.ndarray, np.ndarray]:
@@ -64,7 +64,7 @@ class VectorField:
 
     def outputs(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """y = h (M, q)."""
-        return self._functions.values["h"](t, x, u, p)
+        return self._functions.values("h")(t, x, u, p)
 
     def output_jacobians(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
                          ) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +86,7 @@ class _Functions:
         self.switches = [switch_symbol(k) for k in range(len(self.lowered.switches))]
         exprs = {"f": self.lowered.rhs, "h": self.lowered.outputs}
         self.exprs = exprs
-        self.values = {name: self._vector(e) for name, e in exprs.items()}
+        self._values: dict[str, Callable[..., np.ndarray]] = {}
         self._tables: dict[str, Any] = {}
         self._plans: dict[tuple[str, tuple[int, ...], tuple[int, ...]], Linearised] = {}
 
@@ -124,6 +124,12 @@ class _Functions:
     @property
     def all_symbols(self) -> list[sp.Symbol]:
         return [TIME, *self.x, *self.u, *self.p, *self.switches]
+
+    def values(self, name: str) -> Callable[..., np.ndarray]:
+        """f or h as a function; written when first asked for, as machine code has no need of it."""
+        if name not in self._values:
+            self._values[name] = self._vector(self.exprs[name])
+        return self._values[name]
 
     def _vector(self, exprs: Sequence[sp.Expr]) -> Callable[..., np.ndarray]:
         function = self._lambdify(self.all_symbols, [*exprs, sp.Integer(0)])
@@ -286,6 +292,6 @@ def _log_abs(x: np.ndarray) -> np.ndarray:
         return np.where(np.asarray(x) == 0, 0.0, np.log(np.abs(x)))
 
 
-@functools.lru_cache(maxsize=32)
+@functools.lru_cache(maxsize=256)
 def _functions(structure: Structure) -> _Functions:
     return _Functions(structure.model)

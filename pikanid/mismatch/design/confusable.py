@@ -121,7 +121,7 @@ class Confusable:
         for e in self.effects:
             size = ("not at all" if e.smallest == inf else
                     f"{e.parameter} {'<' if e.falling else '>'} {e.smallest:.3g} {e.unit}"
-                    if e.parameter else "always")
+                    if e.parameter else "not at all" if e.strength < self.separated else "always")
             near = [f"{r.key} ({r.distance:.1f} σ)" for r in e.rivals
                     if r.distance < self.separated]
             if e.strength < self.separated:
