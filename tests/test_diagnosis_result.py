@@ -13,7 +13,9 @@ import pikanid as pk
 import pikanid.mismatch.diagnose as module
 from pikanid.estimate import Estimate
 from pikanid.mismatch.beyond.region import Interval
+from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.judge.verdict import Answer, Verdict
+from pikanid.mismatch.report.advice import advice
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import _behind
 from pikanid.mismatch.report.findings import Explanation, NamedEffect, Where
@@ -170,3 +172,18 @@ def test_what_only_the_held_out_recording_shows_is_to_be_looked_for_there(stiffe
     assert result.verdict == "none" and result.held_out is not None
     assert (result.held_out.p_value < 0.01) == (stiffer > 0)
     assert any("does not predict the held-out one" in n for n in result.notes) == (stiffer > 0)
+
+
+def test_what_happened_once_is_not_confirmed_elsewhere() -> None:
+    """The other recording is predicted without it, which proves nothing of it."""
+    given = explanation("a force local in time", "peak*exp(-(t - 2)**2)")
+    once = replace(given, effects=(replace(given.effects[0], once=True),))
+    assert diagnosis("named", given).sentence().endswith("confirmed on the held-out recording.")
+    said = diagnosis("named", once).sentence()
+    assert said.endswith("confirmed as what happened once, and not on the held-out recording, "
+                         "which is predicted without it.")
+    both = replace(once, effects=(*given.effects, *once.effects))
+    assert diagnosis("named", both).sentence().endswith("confirmed on the held-out recording.")
+    records = cast(Records, None)
+    assert "take that effect out" in advice("named", [once], records, 1.0, True)
+    assert advice("named", [given], records, 1.0, True) == ""

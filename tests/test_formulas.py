@@ -1,5 +1,7 @@
 """Laws outside the catalogue: formulas that are read and confirmed, and edges without a name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -67,7 +69,10 @@ def test_a_patch_predicts_better_inside_its_range(case: Case) -> None:
     found = patch(case.base, case.model, shape, case.sites[0], case.records, case.later,
                   case.predicted)
     assert found is not None and found.argument == "theta"
-    assert found.rmse_after < 1.3 * SIGMA < found.rmse_before
+    [(before, after, unit)] = found.rmse.values()
+    assert after < 1.3 * SIGMA < before and f"RMSE from {before:.3g} to" in found.sentence()
+    two = replace(found, rmse={"v": (2.0, 1.0, unit), "i": (1.0, 1.5, "A")}).sentence()
+    assert "RMSE of 'v' from 2 to 1" in two and "of 'i' from 1 to 1.5 A" in two
     assert np.corrcoef(found.values, bent(found.grid, 60.0 * found.grid**2))[0, 1] > 0.98
     # the B-spline in the model is the edge that was fitted
     spline = found.model.splines[0]
@@ -101,7 +106,8 @@ def test_units_that_need_factors_keep_nothing_from_being_offered() -> None:
         assert candidate.applied(opened.base.model).with_values({})
     found = patch(opened.base, opened.model, shape, site, opened.records, opened.later,
                   opened.predicted)
-    assert found is not None and found.rmse_after < found.rmse_before
+    assert found is not None
+    assert all(after < before for before, after, _ in found.rmse.values())
 
 
 def bent(x: np.ndarray, y: np.ndarray) -> np.ndarray:

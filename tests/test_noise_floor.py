@@ -15,8 +15,8 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise import level as noise
 from pikanid.noise.floor import repeated, rounding_noise, rounding_step
-from pikanid.noise.level import NoiseModel
-from pikanid.objective.adequacy import difference_noise, judge
+from pikanid.noise.level import NoiseModel, difference_noise
+from pikanid.objective.adequacy import judge
 from pikanid.recording.channel import Channel
 
 TIMES = np.arange(600) * 0.01

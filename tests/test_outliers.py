@@ -173,3 +173,16 @@ def test_outliers_of_the_held_out_recording_are_no_mismatch() -> None:
                  for rec, values in ((train, train["theta"].values), (later, bad))), workers=1)
     assert found.verdict == "none"
     assert any("of the held-out recording can be seen" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_beside_a_missing_sample_none_is_an_outlier(seed: int) -> None:
+    """Neighbours by number are no neighbours in time: good ones beside gaps had been left out."""
+    rng, t = np.random.default_rng(seed), 0.01 * np.arange(1500)
+    y = np.sin(2 * np.pi * 1.5 * t) + 0.002 * rng.standard_normal(1500)
+    y[rng.random(1500) < 0.03] = np.nan
+    y[400:440] = np.nan
+    y[900] += 0.5
+    run = Recording.from_arrays(t, {"y": y})
+    clean, count = without_outliers(run, "y", DEFAULTS)
+    assert count == 1 and np.isnan(clean["y"].values[900])

@@ -9,7 +9,7 @@ import pytest
 
 import pikanid as pk
 from pikanid.estimate.data import Fit
-from pikanid.estimate.outlying import outlying
+from pikanid.estimate.outlying import loose_warning, outlying
 from pikanid.problem.held import HeldInput
 
 SIGMA = 0.1 * np.pi / 180
@@ -102,3 +102,15 @@ def test_what_follows_the_steps_of_an_input_is_none() -> None:
     assert len(outlying(fit, inputs)) == 0
     wrong = replace(fit, measured=fit.measured + 60.0 * (np.arange(800) == 77))
     assert outlying(wrong, inputs).tolist() == [77]
+
+
+def test_a_stated_sigma_that_is_far_too_large_is_told() -> None:
+    """Beside another output it would do no harm to the verdict, and all to the weights."""
+    rng = np.random.default_rng(2)
+    for n, sigma, said in ((200, 1.0, False), (200, 3.0, False), (200, 50.0, True),
+                           (19, 50.0, False)):
+        fit = replace(of(rng.standard_normal(n)), sigma=np.full(n, sigma), unit="A")
+        assert bool(loose_warning(fit)) == said, (n, sigma)
+    assert "0.02 times the stated noise (50 A)" in loose_warning(
+        replace(of(np.ones(30)), sigma=np.full(30, 50.0), unit="A"))
+    assert not loose_warning(replace(of(np.zeros(30)), sigma=np.ones(30)))  # clean data

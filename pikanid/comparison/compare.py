@@ -25,7 +25,7 @@ from pikanid.comparison.residual_analysis import ResidualAnalysis
 from pikanid.comparison.runs import Start, free_run
 from pikanid.comparison.scores import Score, score
 from pikanid.comparison.validation import ALPHA, NOISE, Validation
-from pikanid.objective.adequacy import difference_noise
+from pikanid.noise.level import difference_noise
 from pikanid.problem.arguments import several
 from pikanid.recording import Recording
 
@@ -178,7 +178,8 @@ def _quieter(named: dict[str, list[Prediction]], there: list[np.ndarray]
     """
     found: dict[str, list[Prediction]] = {name: [] for name in named}
     for same, m in zip(zip(*named.values(), strict=True), there, strict=True):
-        left = [difference_noise(p.residual[m]) for p in same if np.isfinite(p.residual[m]).all()]
+        left = [difference_noise(p.residual[m], p.t[m]) for p in same
+                if np.isfinite(p.residual[m]).all()]
         least = least_noise(same[0].measured)
         for name, p in zip(named, same, strict=True):
             sigma = p.sigma if p.sigma_source == "given" else np.minimum(

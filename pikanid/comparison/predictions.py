@@ -13,8 +13,7 @@ from pikanid.comparison.horizon import predict_ahead
 from pikanid.comparison.linear import ARX, Series, best_arx, even_grid
 from pikanid.comparison.runs import Run, Start, free_run
 from pikanid.model import Model
-from pikanid.noise.level import estimate
-from pikanid.objective.adequacy import difference_noise
+from pikanid.noise.level import difference_noise, estimate
 from pikanid.optimise.propagation import propagated
 from pikanid.problem.problem import Experiment, Samples, bind
 from pikanid.recording import Recording
@@ -128,7 +127,7 @@ def noise_of(recording: Recording, model: Model, samples: Samples) -> tuple[np.n
     try:
         sigma = estimate(recording.as_output(output.name, unit)).sigma
     except errors.BadRecording:
-        sigma = difference_noise(samples.y)
+        sigma = difference_noise(samples.y, samples.t)
     return np.full(len(samples.t), max(sigma, least_noise(samples.y))), "estimated"
 
 

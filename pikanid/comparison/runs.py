@@ -11,7 +11,7 @@ from pikanid import errors
 from pikanid.comparison.contender import Contender
 from pikanid.formula.expressions import symbol
 from pikanid.model import Model, Parameter
-from pikanid.objective.adequacy import difference_noise
+from pikanid.noise.level import difference_noise
 from pikanid.optimise.minpack import minimise
 from pikanid.problem.problem import Experiment, Samples, bind
 from pikanid.recording import Recording
@@ -131,7 +131,7 @@ def weights(samples: tuple[Samples, ...]) -> np.ndarray:
     spreads = [np.empty(0)]
     for s in samples:
         least = max(1e-6 * float(np.ptp(s.y)), 1e-300) if len(s.y) else 1.0
-        sigma = difference_noise(s.y) if s.sigma is None and len(s.y) else s.sigma
+        sigma = difference_noise(s.y, s.t) if s.sigma is None and len(s.y) else s.sigma
         spreads.append(np.full(len(s.y), 1.0) * np.maximum(1.0 if sigma is None else sigma, least))
     return 1.0 / np.concatenate(spreads)
 

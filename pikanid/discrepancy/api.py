@@ -155,7 +155,7 @@ def _estimate(level: Level, covariance: np.ndarray, method: str, begun: float) -
     fit, problem, shooting = level.fit, level.problem, level.shooting
     fits, trajectories = evaluate(problem, shooting, fit.theta)
     adequacy = judge([f.residual for f in fits], shooting.known, shooting.data,
-                     round(fit.effective))
+                     round(fit.effective), times=[f.t for f in fits])
     notes = []
     if adequacy.verdict == "misfit":
         notes.append(errors.no_static_law([p.argument for p in level.plans]))

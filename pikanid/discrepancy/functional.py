@@ -22,7 +22,7 @@ from pikanid.discrepancy.smoothness import STIFF
 from pikanid.estimate import Estimate
 from pikanid.formula.expressions import symbol
 from pikanid.model import Model, Output
-from pikanid.objective.adequacy import difference_noise
+from pikanid.noise.level import difference_noise
 from pikanid.objective.shooting import Shooting
 from pikanid.problem.problem import Problem
 from pikanid.recording import Channel, Recording
@@ -65,8 +65,9 @@ def _with_sigma(recording: Recording, model: Model) -> Recording:
     for o in model.outputs:
         channel = recording[o.name]
         if channel.sigma is None and o.sigma is None:
+            seen = np.isfinite(channel.values)
             recording = recording.with_sigma(**{o.name: difference_noise(
-                channel.values[np.isfinite(channel.values)])})
+                channel.values[seen], channel.time[seen])})
     return recording
 
 

@@ -141,6 +141,11 @@ def not_a_number(where: str, row: int, header: str, cell: str) -> str:
     return f"'{where}', row {row}, column '{header}': '{short(cell, 40)}' is not a number."
 
 
+def not_an_iso_date(where: str, row: int, header: str, cell: str) -> str:
+    return (f"'{where}', row {row}, column '{header}': '{short(cell, 40)}' is not a number; of "
+            "dates only those as 2024-03-31T13:50:00 are read, or give seconds.")
+
+
 def header_twice(where: str, header: str) -> str:
     return f"'{where}' has two columns called '{header}': rename one of them."
 

@@ -11,17 +11,17 @@ import numpy as np
 from scipy.special import stdtrit
 
 from pikanid.estimate.data import Fit
+from pikanid.noise.level import EFFICIENCY, NORMAL
 from pikanid.problem.held import HeldInput
 from pikanid.problem.inputs_past import explained
 
 RATE = 1e-3  # limit: probability that normal noise has such a sample anywhere in a recording
-EFFICIENCY = 0.37  # definition: of the median absolute deviation, normal noise
 MOST = 0.01  # limit: share of samples; of more, the noise or the model is what is different
 FEWEST = 20  # limit: samples that tell how large the noise is
 LAGS = 12  # limit: samples after which a rig that is as fast as its sampling has answered
 CHANCE = 1e-6  # limit: that noise alone counts as what the inputs' past explains
+LOOSE = 0.2  # limit: of a stated σ; of 20 samples right noise leaves so little once in 10^11
 SHOWN = 3  # layout: times that are listed
-MAD = 1.4826  # definition: median absolute deviation to standard deviation, normal noise
 
 
 def outlying(fit: Fit, inputs: Sequence[HeldInput] = ()) -> np.ndarray:
@@ -45,7 +45,7 @@ def outlying(fit: Fit, inputs: Sequence[HeldInput] = ()) -> np.ndarray:
     if len(r) < FEWEST:
         return np.array([], int)
     r = r - np.median(r)
-    noise = MAD * float(np.median(np.abs(r)))
+    noise = float(np.median(np.abs(r))) / NORMAL
     # what few samples say of the noise is as uncertain as Student's t says
     far = -float(stdtrit(EFFICIENCY * len(r), 0.5 * RATE / len(r))) * noise
     found = (np.abs(r) > far) & (_alone(r) > far) if noise > 0.0 else np.zeros(len(r), bool)
@@ -61,6 +61,20 @@ def _alone(r: np.ndarray) -> np.ndarray:
     """How far each sample (N,) is from the nearer one of its neighbours."""
     beside = np.pad(r, 1, mode="reflect")
     return np.minimum(np.abs(r - beside[:-2]), np.abs(r - beside[2:]))
+
+
+def loose_warning(fit: Fit) -> str:
+    """What to do about a stated σ far above what a fit leaves; empty where it is not: two outputs,
+    one of them in another unit, would look fine together.
+    """
+    if fit.sigma is None or len(fit.residual) < FEWEST:
+        return ""
+    ratio = float(np.sqrt(np.mean((fit.residual / fit.sigma) ** 2)))
+    if not 0.0 < ratio < LOOSE:
+        return ""
+    stated = f"{float(np.median(fit.sigma)):.3g} {fit.unit}".rstrip()
+    return (f"Recording '{fit.recording}', '{fit.output}': the fit leaves {ratio:.2g} times the "
+            f"stated noise ({stated}), which hardly counts so: is that sigma in another unit?")
 
 
 def outlying_warning(fit: Fit, inputs: Sequence[HeldInput]) -> str:

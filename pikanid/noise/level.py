@@ -21,6 +21,9 @@ from pikanid.noise.quiet import about_mean, about_trend, find_quiet, without_mov
 from pikanid.noise.settings import ROUNDING, USUAL, QuietSettings, RoundingSettings
 from pikanid.recording.channel import Array, Channel, check_times, check_values
 
+EFFICIENCY = 0.37  # definition: of the median absolute deviation, normal noise
+NORMAL = 0.6744897501960817  # definition: median absolute value of a unit Gaussian
+
 
 @dataclass(frozen=True)
 class NoiseModel:
@@ -137,19 +140,51 @@ def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
     >>> round(high_band_sigma(Channel("y", t, y))[0], 2)
     0.1
     """
-    differences = beside_neighbours(channel)
+    differences = beside_neighbours(channel.time, channel.values)
     if len(differences) < 8:
         raise errors.BadRecording(errors.noise_short(channel.name, len(differences) + 4))
-    # 0.6745: the median absolute deviation of a unit Gaussian
-    sigma = float(np.median(np.abs(differences)) / 0.6745)
-    sigma = max(sigma, rounding_noise(channel.values, rounding))
+    sigma = max(_spread(differences), rounding_noise(channel.values, rounding))
     if sigma == 0:
         raise errors.BadRecording(errors.noise_none(channel.name))
+    return sigma, sigma * known_by(differences) / 2
+
+
+def difference_noise(values: Array, time: Array | None = None,
+                     rounding: RoundingSettings = ROUNDING) -> float:
+    """σ of white noise on a smooth signal (N,) by the same differences, whatever there is of it; at
+    least that of rounding to the sensor's step.
+
+    Args:
+        values: (N,), all finite.
+        time: (N,) [s]; None where sampling is even.
+
+    >>> t = np.arange(2000) * 0.01
+    >>> noisy = np.sin(t) + np.random.default_rng(0).normal(0, 0.1, 2000)
+    >>> bool(abs(difference_noise(noisy) - 0.1) < 0.01)
+    True
+    """
+    if len(values) < 5:
+        return float(np.std(values))
+    differences = beside_neighbours(
+        np.arange(float(len(values))) if time is None else time, values)
+    return max(_spread(differences), rounding_noise(values, rounding))
+
+
+def _spread(differences: Array) -> float:
+    """Their standard deviation; by the median, as a few kinks must not count."""
+    return float(np.median(np.abs(differences)) / NORMAL)
+
+
+def known_by(differences: Array) -> float:
+    """Relative standard error of the noise's power by so many differences.
+
+    >>> round(known_by(np.ones(500)), 3)
+    0.169
+    """
     weights = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
     lags = np.correlate(weights, weights, "full") / np.sum(weights**2)
-    # The median uses 37 % of the information; neighbouring differences share samples.
-    spread = sigma * np.sqrt(np.sum(lags**2) / 0.37 / (2 * len(differences)))
-    return sigma, float(spread)
+    # the median uses 37 % of the information; neighbouring differences share samples
+    return 2 * float(np.sqrt(np.sum(lags**2) / EFFICIENCY / (2 * len(differences))))
 
 
 def _from_quiet(channel: Channel, start: float, stop: float, settings: QuietSettings,

@@ -2,7 +2,7 @@
 
 With known σ the sum of squared standardised residuals follows χ² with N - n_free degrees of
 freedom when the model is right (Seber & Wild, Nonlinear Regression, 1989, sec. 2.1).  Without σ the
-residual is compared with the recording's own high-frequency noise.
+residual is compared with the recording's own high-frequency noise, which is as uncertain.
 
 A few degrees of freedom decide nothing: where a residual of twice the noise would be missed more
 often than not, a model that is not refuted is not confirmed either.
@@ -13,14 +13,16 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
 from typing import Any, Literal
 
 import numpy as np
 
-from pikanid.noise.floor import rounding_noise
+from pikanid.noise.level import EFFICIENCY, difference_noise
 from pikanid.objective.settings import USUAL, AdequacySettings
 
+# degrees of freedom a sample of a variance by the median of fourth differences: of the information
+# that a normal sample has, over the sum of their squared correlations
+KNOWN_BY = EFFICIENCY / (12870 / 4900)  # definition: see there
 Verdict = Literal["fits", "misfit", "unknown"]
 
 
@@ -29,8 +31,9 @@ class Adequacy:
     """The χ² verdict.
 
     `value` is Σ (residual/σ)² over `dof` degrees of freedom; `p_value` the probability of a larger
-    one if the model is right; `source` says where σ came from ("given" or "differences").  The
-    verdict is "unknown" where nothing was measured, or too little to judge by.
+    one if the model is right, by F where σ is read off the samples; `source` says where it came
+    from ("given" or "differences").  The verdict is "unknown" where nothing was measured, or too
+    little to judge by.
     """
 
     value: float
@@ -46,14 +49,15 @@ class Adequacy:
 
 
 def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
-          data: Sequence[np.ndarray], n_free: int,
-          settings: AdequacySettings = USUAL) -> Adequacy:
+          data: Sequence[np.ndarray], n_free: int, settings: AdequacySettings = USUAL,
+          times: Sequence[np.ndarray] | None = None) -> Adequacy:
     """Judge the residuals of all outputs together.
 
     Args:
         residuals, sigmas, data: One array (N_o,) an output and recording; σ None where unknown.
         n_free: Number of estimated parameters.
         settings: Rate at which a right model is called a misfit, and what else the test needs.
+        times: Of each array (N_o,) [s]; None where sampling is even.
 
     >>> r = np.random.default_rng(0).normal(0, 2.0, 500)
     >>> judge([r], [np.full(500, 2.0)], [r], 2).verdict
@@ -61,7 +65,7 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
     >>> judge([r], [np.full(500, 1.0)], [r], 2).verdict
     'misfit'
     """
-    from scipy.special import chdtrc
+    from scipy.special import chdtrc, fdtrc
 
     count = sum(map(len, residuals))
     dof = max(count - n_free, 1)
@@ -74,19 +78,23 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
         p = float(chdtrc(dof, value))
         refuted = p < settings.alpha and count > n_free
         return Adequacy(value, dof, p, "misfit" if refuted else otherwise, "given")
-    value, threshold = 0.0, 0.0
-    for r, s, y in zip(residuals, sigmas, data, strict=True):
-        noise = difference_noise(y) if s is None else s
+    value, threshold, unsure = 0.0, 0.0, 0.0
+    where: Sequence[np.ndarray | None] = [None] * len(data) if times is None else times
+    for r, s, y, t in zip(residuals, sigmas, data, where, strict=True):
+        noise = difference_noise(y, t) if s is None else s
         floor = 1e-9 * max(float(np.ptp(y)), 1e-300)
-        value += float(np.sum((r / np.maximum(noise, floor)) ** 2))
-        threshold += len(r)
+        own = float(np.sum((r / np.maximum(noise, floor)) ** 2))
+        value, threshold, unsure = value + own, threshold + len(r), unsure + own * (s is None)
+    known_by = KNOWN_BY * sum(len(r) for r, s in zip(residuals, sigmas, strict=True) if s is None)
+    # as uncertain as the share of it that σ read off the samples makes
+    share = max(unsure, 1e-300) / max(value, 1e-300)
+    p = float(fdtrc(dof, max(known_by, 1.0) / share**2, value / dof))
     if not any(s is not None or len(r) >= settings.samples
                for r, s in zip(residuals, sigmas, strict=True)):
-        return Adequacy(value, dof, float(chdtrc(dof, value)), "unknown", "differences")
+        return Adequacy(value, dof, p, "unknown", "differences")
     # the noise is itself estimated, and coloured noise fools differences: ask for a large factor
     far = value > settings.far * threshold and count > n_free
-    return Adequacy(value, dof, float(chdtrc(dof, value)), "misfit" if far else otherwise,
-                    "differences")
+    return Adequacy(value, dof, p, "misfit" if far else otherwise, "differences")
 
 
 def decides(dof: int, settings: AdequacySettings = USUAL) -> bool:
@@ -104,23 +112,3 @@ def _decides(dof: int, alpha: float, times: float, power: float) -> bool:
     from scipy.special import chdtrc, chdtri
 
     return dof > 0 and float(chdtrc(dof, chdtri(dof, alpha) / times**2)) >= power
-
-
-def difference_noise(y: np.ndarray, order: int = 4) -> float:
-    """σ of white noise on a smooth, evenly sampled signal, from its differences; at least that of
-    rounding to the sensor's step.
-
-    The `order`-th difference removes polynomials below that degree and multiplies the variance of
-    white noise by binomial(2 order, order) (Rice, Annals of Statistics 12, 1984, p. 1215).
-
-    >>> t = np.arange(2000) * 0.01
-    >>> noisy = np.sin(t) + np.random.default_rng(0).normal(0, 0.1, 2000)
-    >>> bool(abs(difference_noise(noisy) - 0.1) < 0.01)
-    True
-    """
-    if len(y) <= order:
-        return float(np.std(y))
-    d = np.diff(y, order)
-    # median, not mean: a few kinks must not count
-    spread = float(np.median(np.abs(d))) / 0.6744897501960817
-    return max(spread / float(np.sqrt(comb(2 * order, order))), rounding_noise(y))

@@ -23,7 +23,7 @@ from pikanid.approximators import Array
 from pikanid.approximators.tables import Shown, anchor, side_by_side
 from pikanid.formula.expressions import symbol
 from pikanid.model import Model
-from pikanid.objective.adequacy import difference_noise
+from pikanid.noise.level import difference_noise
 from pikanid.objective.rows import ONE, AnyApproximator, Part, Rows, Sites, by_coefficients
 from pikanid.problem.chains import Chains
 from pikanid.problem.evaluated import delays
@@ -279,7 +279,7 @@ def _spread(samples: Samples, several: bool) -> Array | float:
     """σ; where unknown, 1 for a single output and the visible noise of each of several."""
     if samples.sigma is not None or not several:
         return 1.0 if samples.sigma is None else samples.sigma
-    return max(difference_noise(samples.y), 1e-6 * float(np.ptp(samples.y)), 1e-300)
+    return max(difference_noise(samples.y, samples.t), 1e-6 * float(np.ptp(samples.y)), 1e-300)
 
 
 @functools.lru_cache(maxsize=64)

@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from pikanid.objective.adequacy import Adequacy, difference_noise, judge
+from pikanid.noise.level import difference_noise
+from pikanid.objective.adequacy import Adequacy, judge
 from pikanid.objective.settings import USUAL, AdequacySettings
 from pikanid.problem.problem import Problem, Samples
 from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
@@ -36,6 +37,7 @@ class Shooting:
         self.steps: list[Steps] = []
         self.limits: list[Steps] = []
         self.data = [s.y for e in problem.experiments for s in e.samples]
+        self.times = [s.t for e in problem.experiments for s in e.samples]
         self.known = [s.sigma for e in problem.experiments for s in e.samples]
         several = len(problem.model.outputs) > 1
         spreads = [_spread(s, several) for e in problem.experiments for s in e.samples]
@@ -164,7 +166,27 @@ class Shooting:
         for d in self.data:
             own.append(r[row:row + len(d)])
             row += len(d)
-        return judge(own, self.known, self.data, len(theta), self.settings)
+        return judge(own, self.known, self.data, len(theta), self.settings,
+                     self.times)
+
+    def undefined(self, theta: np.ndarray) -> str:
+        """Where a recording begins with a rate that is no number, in words; empty where none does.
+        """
+        from pikanid.simulation.vectorfield import VectorField
+
+        model = self.problem.model
+        field = VectorField(model)
+        for r, e in enumerate(self.problem.experiments):
+            p = self.problem.parameters(theta, r)
+            x = e.initial(p)
+            t = np.array([e.t0])
+            rates = field.rhs(t, x[None], e.inputs(t), p)[0]
+            bad = [n for n, rate in zip(model.state_names, rates, strict=True)
+                   if not np.isfinite(rate)]
+            if bad:
+                at = ", ".join(f"{n} = {v:.4g}" for n, v in zip(model.state_names, x, strict=True))
+                return f"the rate of {' and of '.join(bad)} is no finite number at its start ({at})"
+        return ""
 
     def explains(self, theta: np.ndarray) -> bool:
         """Whether the fit at θ is within the noise, so that no other start is needed."""
@@ -174,7 +196,7 @@ class Shooting:
 def _spread(samples: Samples, several: bool) -> np.ndarray:
     if samples.sigma is not None:
         return samples.sigma
-    noise = difference_noise(samples.y) if several else 1.0
+    noise = difference_noise(samples.y, samples.t) if several else 1.0
     floor = 1e-6 * float(np.ptp(samples.y)) if several and len(samples.y) else 1e-300
     return np.full(len(samples.y), max(noise, floor))
 

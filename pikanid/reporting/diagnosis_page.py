@@ -153,8 +153,7 @@ def _lost(dx: Diagnosis) -> str:
 def _patch(dx: Diagnosis) -> str:
     if dx.patch is None:
         return ""
-    unit = dx.held_out.unit if dx.held_out is not None else ""
-    return f"<h2>Until it is understood</h2><p>Patch: {text(dx.patch.sentence(unit))}.</p>"
+    return f"<h2>Until it is understood</h2><p>Patch: {text(dx.patch.sentence())}.</p>"
 
 
 def _next(dx: Diagnosis) -> str:

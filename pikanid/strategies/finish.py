@@ -11,7 +11,7 @@ import numpy as np
 from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
-from pikanid.estimate.outlying import outlying_warning
+from pikanid.estimate.outlying import loose_warning, outlying_warning
 from pikanid.objective.shooting import Shooting
 from pikanid.optimise.box import met
 from pikanid.optimise.propagation import propagated
@@ -49,10 +49,13 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         notes.append("The model, simulated at these estimates, does not explain the recording: "
                      "they are biased or make up for missing physics, and standard errors mean "
                      "little.")
-    notes += shown.warnings(problem.free, uncertainty)
+    # what a bound holds may be what nothing else determines
+    whole = Directions.of(jacobian, np.ones(len(theta), bool)) if at_bound.any() else shown
+    notes += whole.warnings(problem.free, uncertainty)
     notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
     held = {e.name: e.held for e in problem.experiments}
     notes += filter(None, (outlying_warning(fit, held[fit.recording]) for fit in fits))
+    notes += filter(None, map(loose_warning, fits))
     for e in problem.experiments:
         if e.unused:
             notes.append(f"Recording '{e.name}': the model does not use {', '.join(e.unused)}.")

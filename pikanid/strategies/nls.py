@@ -105,7 +105,7 @@ class NLS:
             if k == 0 and content and shooting.explains(best.theta):
                 break
         if best is None:
-            raise errors.SimulationFailed(errors.bad_start())
+            raise errors.SimulationFailed(errors.bad_start(shooting.undefined(problem.guess)))
         if best is not found or len(history) > 1:
             shooting.hurry(False)
             shooting.choose_steps(best.theta, "fine")

@@ -13,7 +13,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.approximators import Array
-from pikanid.objective.adequacy import difference_noise
+from pikanid.noise.level import difference_noise
 from pikanid.objective.functional import Functional
 from pikanid.optimise.gauss_newton import Point
 from pikanid.problem.chains import find_chains
@@ -220,7 +220,8 @@ def _noise(functional: Functional) -> float:
         if samples.sigma is not None:
             level = weight * float(np.sqrt(np.mean(samples.sigma**2)))
         else:
-            level = weight * max(difference_noise(samples.y), CLEAN * float(np.ptp(samples.y)))
+            level = weight * max(difference_noise(samples.y, samples.t),
+                                 CLEAN * float(np.ptp(samples.y)))
         squares, count = squares + samples.t.size * level**2, count + samples.t.size
     return float(np.sqrt(squares / max(count, 1))) or 1.0
 

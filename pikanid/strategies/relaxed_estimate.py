@@ -159,7 +159,7 @@ def _unsimulated(strategy: str, fit: Relaxed, curves: Curves,
         grid = np.unique(np.concatenate([s.t for s in experiment.samples]))
         paths.append(Trajectory(grid, curves.states(grid, r)))
     adequacy = judge([f.residual for f in fits], [f.sigma for f in fits],
-                     [f.measured for f in fits], fit.theta.size)
+                     [f.measured for f in fits], fit.theta.size, times=[f.t for f in fits])
     return Estimate(
         model=problem.model, strategy=strategy, free=problem.free, theta=fit.theta,
         covariance=fit.covariance, fits=tuple(fits), trajectories=tuple(paths),

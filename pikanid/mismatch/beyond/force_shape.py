@@ -34,6 +34,7 @@ INTERVALS, DEGREE = 8, 3  # numerical: knots to spare, which the penalty holds d
 GRID = 101  # numerical: points at which an edge is drawn
 TYPICAL = 120  # numerical: and visited ones at which laws are compared with it
 RIDGES = 10.0 ** np.arange(-9.0, 4.0, 0.5)  # numerical: weights of roughness that are compared
+LARGEST = 1e100  # numerical: length of a sign, of which squares can still be summed
 GAUGE = 1e-3  # numerical: of a sign: less is left when the free parameters can do the same
 
 
@@ -149,8 +150,12 @@ class _Edges:
             base.whitened, fit.theta,
             [_candidate(site, n, s) for n, s in zip(self.names, self.splines, strict=True)])
         D = self.found.D
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = np.linalg.norm(D, axis=0)
+        # of what grows without bounds along an unstable motion a force shows nothing
+        within = np.isfinite(size) & (size < LARGEST)
+        D, size = np.where(within, D, 0.0), np.where(within, size, 0.0)
         self.D = np.vstack([D, np.zeros((len(fit.r) - len(D), D.shape[1]))])
-        size = np.linalg.norm(self.D, axis=0)
         self.size = np.where(size > 0, size, np.inf)
         self.rest = project(base.movable, self.D)
         self._line = base.whitened.settings.beyond.line

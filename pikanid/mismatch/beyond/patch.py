@@ -7,7 +7,7 @@ the prediction of recordings that it never saw and that stay inside that range.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +41,7 @@ class Patch:
         grid, values, std: (G,) over the range, without mean and slope, which constants and
             parameters share; outside the range the edge means nothing.
         inside: Share of the held-out motion in that range.
-        rmse_before, rmse_after: Of the first output, held out.
+        rmse: Held out, of each output by name: before, after, and its unit.
     """
 
     model: Model
@@ -51,14 +51,16 @@ class Patch:
     values: np.ndarray
     std: np.ndarray
     inside: float
-    rmse_before: float
-    rmse_after: float
+    rmse: Mapping[str, tuple[float, float, str]]
 
-    def sentence(self, unit: str) -> str:
-        """What it does, where; `unit` is that of the first output."""
+    def sentence(self) -> str:
+        """What it does, where."""
+        changes = [f"{f'of {name!r} ' if len(self.rmse) > 1 else ''}from {before:.3g} to "
+                   f"{after:.3g} {unit}".rstrip()
+                   for name, (before, after, unit) in self.rmse.items()]
         return (f"a KAN edge of {self.argument} over {self.grid[0]:.3g} ... {self.grid[-1]:.3g} "
-                f"takes the held-out RMSE from {self.rmse_before:.3g} to {self.rmse_after:.3g} "
-                f"{unit}; it holds in that range only and has no name".replace("  ", " "))
+                f"takes the held-out RMSE {', '.join(changes)}; it holds in that range only and "
+                "has no name")
 
 
 def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, records: Records,
@@ -98,7 +100,8 @@ def patch(base: Hypothesis, nominal: Model, shape: ForceShape, site: Site, recor
     spread = np.einsum("gi,ij,gj->g", seen, found.covariance[np.ix_(at, at)], seen)
     return Patch(basis.extended(nominal, site, found), edge.argument, shape.unit, grid,
                  seen @ found.minimum.theta[at], np.sqrt(np.maximum(spread, 0.0)), inside,
-                 *(next(iter(p.rmse.values())) for p in (before, after)))
+                 {o.name: (before.rmse[o.name], after.rmse[o.name], o.unit)
+                  for o in nominal.outputs if o.name in before.rmse and o.name in after.rmse})
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.thresholds import bic
 from pikanid.noise.floor import rounding_noise
-from pikanid.noise.level import NoiseModel, estimate
+from pikanid.noise.level import NoiseModel, difference_noise, estimate, known_by
+from pikanid.noise.neighbours import beside_neighbours
 from pikanid.noise.quiet import TREND, about_mean, about_trend
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array, Channel
@@ -28,6 +29,7 @@ TAPERED = 0.9  # numerical: (Σw²)²/(N Σw⁴): share of the ordinates that st
 BRIDGED = 0.1  # numerical: least share of white noise's power that a spectrum is divided by
 HIGHEST = 0.97  # numerical: of half the sampling rate: beyond, anti-alias filters bend a spectrum
 MEAN_OF = 50  # numerical: frequencies that a mean power is taken over
+LEAST = 8  # limit: neighbourhoods of a residual that say anything of its noise
 STANDARD = 0.683  # definition: probability within one standard deviation
 GRID = np.linspace(0.0, 0.95, 191)  # numerical: correlations of neighbours that are compared
 Spectrum = tuple[np.ndarray, np.ndarray, float]  # ω [rad a sample], power, weight of an ordinate
@@ -63,7 +65,7 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
     """
     found = _spectrum(level, t, residual, rate, settings.noise)
     if found is None:
-        return level
+        return _from_neighbours(level, channel, t, residual, settings, explained)
     omega, power, high, share, low = found
     spectra = [(omega[high], power[high], TAPERED * share)]
     source = "the residual's highest frequencies"
@@ -97,6 +99,29 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
     # a fit leaves nothing of a rounded signal at rest: where it moves there is more
     least = rounding_noise(channel.values, settings.rounding)
     return replace(level, sigma=max(sigma, least), rho=rho, spread=spread, source=source)
+
+
+def _from_neighbours(level: NoiseModel, channel: Channel, t: Array, residual: Array,
+                     settings: Settings, explained: bool) -> NoiseModel:
+    """The level again where samples are few, or off an even grid: white noise, by what neighbours
+    do not tell of a residual, which reaches less far up than the motion.
+    """
+    differences = beside_neighbours(t, residual)
+    if level.source == "given" or len(differences) < LEAST:
+        return level
+    quiet = level.stretch is not None
+    sigma, spread, source = level.sigma, level.spread, level.source
+    if not quiet:
+        sigma, spread = difference_noise(residual, t), known_by(differences)
+        source = "what the residual's neighbours do not tell"
+    # as above: a fit leaves no less than noise, and what explains all leaves noise alone
+    whole = float(np.sqrt(np.mean(residual**2)))
+    louder = 2 * np.log(whole / sigma) if whole > 0 and sigma > 0 else 0.0
+    if louder < -settings.noise.less * spread or (explained and louder < 0):
+        sigma, spread = whole, np.sqrt(2 / len(residual))
+        source = "the residual at all frequencies"
+    least = rounding_noise(channel.values, settings.rounding)
+    return replace(level, sigma=max(sigma, least), spread=float(spread), source=source)
 
 
 def louder(level: NoiseModel, t: np.ndarray, residual: np.ndarray, rate: float,

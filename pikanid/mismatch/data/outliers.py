@@ -16,17 +16,18 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.noise.level import high_band_sigma
+from pikanid.noise.neighbours import LONGEST, neighbour_weights
 from pikanid.problem.held import HeldInput
 from pikanid.problem.inputs_past import explained
 from pikanid.recording import Recording
 
-CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0  # numerical: through two neighbours a side
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
 def without_outliers(recording: Recording, output: str, settings: Settings,
                      inputs: Sequence[str] = ()) -> tuple[Recording, int]:
-    """The recording without samples that leave the cubic through their neighbours, and how many.
+    """The recording without samples that leave the cubic through their neighbours, where they lie
+    in time, and how many.
 
     The worst goes first: beside a spike its neighbours look bad as well.
     """
@@ -43,17 +44,19 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
     given = channel.sigma[seen] if isinstance(channel.sigma, np.ndarray) else 0.0
     own = np.maximum(sigma, given) * np.ones(len(y))
     y -= from_inputs(recording, channel.time[seen], y, inputs, settings)
-    gap = np.zeros(len(y))
-    gap[2:-2] = y[2:-2] - np.convolve(y, CUBIC, "valid")
+    weights, lengths = neighbour_weights(channel.time[seen])
+    known = lengths <= LONGEST * np.median(lengths)  # across a gap a motion may do anything
+    usual = own[2:-2] * np.sqrt(np.sum(weights**2, axis=1))
+    gap = np.where(known, np.sum(weights * np.lib.stride_tricks.sliding_window_view(y, 5), 1), 0.0)
     bad: list[int] = []
     while len(bad) <= noise.most_outliers * len(y):
-        k = int(np.argmax(np.abs(gap) / own))
-        if abs(gap[k]) < noise.spike * own[k] * np.sqrt(1 + np.sum(CUBIC**2)):
+        k = int(np.argmax(np.abs(gap) / usual))
+        if abs(gap[k]) < noise.spike * usual[k]:
             break
-        bad.append(k)
-        y[k] -= gap[k]
-        for near in range(max(k - 2, 2), min(k + 3, len(y) - 2)):
-            gap[near] = y[near] - CUBIC @ y[near - 2:near + 3]
+        bad.append(k + 2)
+        y[k + 2] -= gap[k]
+        for near in range(max(k - 2, 0), min(k + 3, len(gap))):
+            gap[near] = weights[near] @ y[near:near + 5] if known[near] else 0.0
     if not bad or len(bad) > noise.most_outliers * len(y):
         return recording, 0
     values = channel.values.copy()

@@ -56,6 +56,9 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         driven: Whether inputs act.
         idle: Names of given effects that do not act in the held-out recordings.
     """
+    if verdict == "named" and any(e.once for h in given for e in h.effects):
+        return ("Find out what happened at that time. The extended model does it again in every "
+                "run: take that effect out before you predict with it.")
     if verdict in ("none", "named"):
         return ""
     outside = any(e.ids[0].startswith(SYMBOLIC) for h in given for e in h.effects)

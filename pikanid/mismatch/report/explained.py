@@ -43,7 +43,7 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         table = answer.twins.get(h.key, {})
         effects = tuple(NamedEffect(
             table.get(e.key, e.names), e.name, e.expression,
-            values_of(e.parameters, h.values, h.std, overdispersion), e.channel, e.site.v)
+            values_of(e.parameters, h.values, h.std, overdispersion), e.channel, e.site.v, e.absent)
             for e in h.effects)
         p = predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(

@@ -26,8 +26,8 @@ TOLD = 3  # layout: explanations in the sentence; all of them stand below it
 @dataclass(frozen=True)
 class NamedEffect:
     """One effect of a hypothesis: its ids (several where twins cannot be told apart), its name for
-    people, what is added to the model, its parameters, its channel, and the state in whose equation
-    it acts or, of an input or a sensor, shows first.
+    people, what is added to the model, its parameters, its channel, the state in whose equation it
+    acts or, of an input or a sensor, shows first, and whether it happens once, in one recording.
     """
 
     ids: tuple[str, ...]
@@ -36,6 +36,7 @@ class NamedEffect:
     parameters: Mapping[str, Value]
     channel: str = "dynamics"
     equation: str = ""
+    once: bool = False
 
 
 @dataclass(frozen=True)
@@ -266,13 +267,14 @@ class DiagnosisData:
 
     @property
     def _confirmed_on(self) -> str:
-        met = "on the held-out recording"
-        later = self.held_out.not_met if self.held_out is not None else ()
+        met, later = "on the held-out recording", self.held_out.not_met if self.held_out else ()
+        if all(e.once for e in self.hypotheses[0].effects):
+            return f"as what happened once, and not {met}, which is predicted without it"
         if not later:
             return met
         again = "where the recording meets it again: the held-out one does not"
-        return again if len(later) == len(self.hypotheses[0].effects) else (
-            f"{met}, and {listed(later)} {again}")
+        everything = len(later) == len(self.hypotheses[0].effects)
+        return again if everything else f"{met}, and {listed(later)} {again}"
 
 
 def _first(titles: Sequence[str]) -> str:

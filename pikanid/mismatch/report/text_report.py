@@ -54,8 +54,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
             told.append(f"{whose}{change}{moved} (noise {error.noise:.3g})")
         lines.append(f"Proof: held-out RMSE {'; '.join(told)}, p = {p.p_value:.2g}")
     if dx.patch is not None:
-        unit = dx.held_out.unit if dx.held_out is not None else ""
-        lines.append(f"Patch: {dx.patch.sentence(unit)}.")
+        lines.append(f"Patch: {dx.patch.sentence()}.")
     if dx.next_experiment:
         lines.append(f"Next: {dx.next_experiment}")
     return [*lines, *dx.noise, *dx.notes, str(dx.settings)]

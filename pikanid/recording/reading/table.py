@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from numbers import Real
 from typing import Any
@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 
 from pikanid import errors
+from pikanid.formula import units
 from pikanid.recording.channel import Array
 
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
+_BRACKETS = re.compile(r"^[\[(](.*)[\])]$")
+_DATE = re.compile(r"\s*\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\b")
 _EMPTY = frozenset(["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"])
 
 
@@ -113,9 +116,37 @@ def from_rows(where: str, rows: Sequence[Sequence[object]], numbers: list[int],
         raise errors.BadRecording(errors.no_rows(where))
     if not headed:
         headers = [str(k + 1) for k in range(len(rows[0]))]
+    own = _units(body[:2], decimal) if headed else None
+    notes: tuple[str, ...] = ()
+    if own is not None:
+        notes = (f"'{where}', row {shown[0]}: taken for the columns' units.",)
+        body, shown = body[1:], shown[1:]
     columns = tuple(from_cells(where, header, cells, shown, decimal) for header,
                     cells in zip(headers, zip(*body, strict=True), strict=True))
-    return Table(columns, shown)
+    if own is not None:
+        columns = tuple(replace(c, unit=unit or c.unit)
+                        for c, unit in zip(columns, own, strict=True))
+    return Table(columns, shown, notes=notes)
+
+
+def _units(rows: Sequence[Sequence[object]], decimal: str) -> list[str] | None:
+    """The units in the row below the headers, where most of its cells are units and none is a
+    number, as some are in the next one.
+
+    >>> _units([["s", "[m/s^2]", "-"], ["0", "1.5", "3"]], ".")
+    ['s', 'm/s^2', '']
+    >>> _units([["0", "1.5", "on"], ["1", "1.5", "off"]], ".") is None
+    True
+    """
+    if len(rows) < 2 or not all(isinstance(cell, str) or cell is None for cell in rows[0]):
+        return None
+    texts = [str(cell or "").strip() for cell in rows[0]]
+    said = [_BRACKETS.sub(r"\1", text) if text.casefold() not in _EMPTY else "" for text in texts]
+    told = [text for text in said if text]
+    numbers = [value for cell in rows[1] if (value := _number(cell, decimal)) is not None]
+    if any(map(_DIGIT_FIRST.match, told)) or not np.isfinite(numbers).any():
+        return None
+    return said if told and 2 * sum(map(units.is_unit, told)) > len(told) else None
 
 
 def heads(row: Sequence[object], decimal: str) -> bool:
@@ -145,7 +176,9 @@ def from_cells(where: str, header: str, cells: Sequence[object], rows: Sequence[
     values = np.array([np.nan if value is None else value for value in parsed])
     if not bad:
         return Column(header, values)
-    defect = errors.not_a_number(where, rows[bad[0]], header, str(cells[bad[0]]))
+    first = str(cells[bad[0]])
+    defect = (errors.not_an_iso_date if _DATE.match(first) else errors.not_a_number)(
+        where, rows[bad[0]], header, first)
     words = sum(1 for k in bad if not _DIGIT_FIRST.match(str(cells[k])))
     return Column(header, values, defect, text=words > np.isfinite(values).sum())
 
