@@ -20,7 +20,7 @@ RATE = float(np.sqrt(9.81 / 0.045))
 
 def explanation(title: str, term: str, identifier: str = "law") -> Explanation:
     model = pk.systems.sloshing().with_term("theta_dot", term, [pk.Parameter("a", 0.5)])
-    effects = (SimpleNamespace(ids=(identifier,)),)
+    effects = (SimpleNamespace(ids=(identifier,), once=False),)
     return cast(Explanation, SimpleNamespace(title=title, model=model, effects=effects))
 
 

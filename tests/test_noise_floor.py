@@ -145,3 +145,18 @@ def test_dry_friction_of_a_rig_that_rests_at_first_is_found() -> None:
     found = pk.diagnose(motor(), train, held_out=later)
     assert found.mismatch
     assert "coulomb_friction" in {i for h in found.hypotheses for e in h.effects for i in e.ids}
+
+
+def test_noise_is_no_louder_than_what_a_fit_leaves() -> None:
+    """High frequencies tell little of its colour: what all frequencies hold bounds it, but for a
+    line, which is none of it; a colour that is there leaves it open.
+    """
+    rng = np.random.default_rng(4)
+    white = 0.01 * rng.standard_normal(2000)
+    slow = white + 0.02 * np.sin(0.3 * np.arange(2000) * 0.01 * 2 * np.pi)
+    dull = np.convolve(0.01 * rng.standard_normal(2010), 0.7 ** np.arange(11), "valid")
+    t = 0.01 * np.arange(2000)
+    level = NoiseModel(0.01, 0.0, 0.1, 0.01, "the highest frequencies")
+    found = {name: refined(level, Channel("y", t, values, "rad"), t, values, 30.0, None, DEFAULTS)
+             for name, values in (("white", white), ("slow", slow), ("dull", dull))}
+    assert max(found["white"].excess, found["slow"].excess) < 0.15 < 0.5 < found["dull"].excess

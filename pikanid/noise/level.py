@@ -36,6 +36,8 @@ class NoiseModel:
         interval: Between neighbours [s].
         source: In words; "given" where σ was not estimated.
         stretch: Start and stop [s] of a quiet stretch long enough to tell low frequencies.
+        excess: By how much louder it can be there at most, as the logarithm of a power, whatever
+            its colour: a fit leaves no less than noise.
     """
 
     sigma: float
@@ -44,6 +46,7 @@ class NoiseModel:
     interval: float
     source: str
     stretch: tuple[float, float] | None = None
+    excess: float = np.inf
 
     def sentence(self, output: str) -> str:
         """What was found."""

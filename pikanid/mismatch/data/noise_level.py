@@ -94,11 +94,14 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
             explained and (louder < 0 or dearer < settings.contradiction)):
         sigma, rho, spread = whole
         source = "the residual at all frequencies"
+    # whatever colour it may have, noise is no louder than what a fit leaves
+    excess = max(float(louder), 0.0) + whole[2]
     if given is not None:
-        return replace(level, rho=rho, spread=spread if rho else 0.0)
+        return replace(level, rho=rho, spread=spread if rho else 0.0, excess=excess)
     # a fit leaves nothing of a rounded signal at rest: where it moves there is more
     least = rounding_noise(channel.values, settings.rounding)
-    return replace(level, sigma=max(sigma, least), rho=rho, spread=spread, source=source)
+    return replace(level, sigma=max(sigma, least), rho=rho, spread=spread, source=source,
+                   excess=excess)
 
 
 def _from_neighbours(level: NoiseModel, channel: Channel, t: Array, residual: Array,

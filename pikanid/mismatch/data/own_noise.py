@@ -42,5 +42,6 @@ def with_own_noise(records: Records, residuals: Sequence[Residual],
         found = louder(at_that_rate, t, left, rate, records.settings.noise)
         if found and found[0] > np.exp(certain * np.hypot(found[1], level.spread)):
             levels[r][name] = replace(level, sigma=level.sigma * np.sqrt(found[0]),
-                                      spread=float(np.hypot(found[1], level.spread)))
+                                      spread=float(np.hypot(found[1], level.spread)),
+                                      excess=np.inf)
     return replace(records, levels=tuple(levels))

@@ -41,6 +41,12 @@ class Records:
         """Relative standard error of the noise's power, where it is known least."""
         return max(level.spread for found in self.levels for level in found.values())
 
+    @property
+    def allowed(self) -> float:
+        """The same as tests of a residual allow for it: no more than what a fit has left."""
+        return max(min(level.spread, level.excess)
+                   for found in self.levels for level in found.values())
+
     def sigma(self, output: str) -> float:
         """σ of an output's noise; of several recordings the root mean square of their samples."""
         counts = [np.isfinite(r[output].values).sum() for r in self.recordings]

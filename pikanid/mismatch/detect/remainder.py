@@ -35,7 +35,7 @@ def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.n
     del found  # of a long recording there is no room for all at once
     bands, inputs = lines(whitened, rate, more, short)
     units, _ = unit_columns(D, short(J))
-    return detect(-short(r), short(J), units, one_sided, bands, inputs, whitened.records.spread,
+    return detect(-short(r), short(J), units, one_sided, bands, inputs, whitened.records.allowed,
                   whitened.settings, seed)
 
 
