@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from read_off_noise import p_value
 from scipy.stats import binom, chi2
-from scipy.stats import f as f_law
 
 from pikanid.noise.level import difference_noise
 from pikanid.objective.adequacy import judge
@@ -158,7 +158,7 @@ def test_value_against_the_visible_noise_and_where_it_becomes_a_misfit() -> None
         assert found.value == pytest.approx(60 * factor**2)
         assert (found.dof, found.verdict) == (55, verdict)
         assert found.p_value == pytest.approx(
-            f_law.sf(found.value / 55, 55, 60 * 0.37 / 2.6265), rel=1e-3)
+            p_value([(found.value, 56)], 55), rel=1e-3)
     # half of the samples have a stated noise: theirs counts
     stated = judge([2 * noise * r, r], [None, np.ones(60)], [y, y], 0)
     assert stated.value == pytest.approx(60 * 4 + 60)

@@ -183,7 +183,8 @@ def test_what_happened_once_is_not_confirmed_elsewhere() -> None:
     assert said.endswith("confirmed as what happened once, and not on the held-out recording, "
                          "which is predicted without it.")
     both = replace(once, effects=(*given.effects, *once.effects))
-    assert diagnosis("named", both).sentence().endswith("confirmed on the held-out recording.")
+    assert diagnosis("named", both).sentence().endswith(
+        "confirmed on the held-out recording, a force local in time as what happened once.")
     records = cast(Records, None)
     assert "take that effect out" in advice("named", [once], records, 1.0, True)
     assert advice("named", [given], records, 1.0, True) == ""

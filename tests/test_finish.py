@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import interpreted
 import numpy as np
 import pytest
-from scipy.stats import chi2
-from scipy.stats import f as f_law
+from read_off_noise import p_value
 from scipy.stats import t as student
 
 import pikanid as pk
@@ -97,8 +96,10 @@ class Regression:
     p_value: float
 
 
-def visible(t: np.ndarray, y: np.ndarray) -> float:
-    """σ from what polynomials through four neighbours leave, where no wider than twice as usual."""
+def visible(t: np.ndarray, y: np.ndarray) -> tuple[float, int]:
+    """σ from what polynomials through four neighbours leave, where no wider than twice as usual,
+    and how many tell it.
+    """
     left, wide = [], []
     for k in range(2, len(t) - 2):
         near = [k - 2, k - 1, k + 1, k + 2]
@@ -107,7 +108,7 @@ def visible(t: np.ndarray, y: np.ndarray) -> float:
         left.append((y[k] - weights @ y[near]) / np.sqrt(1 + weights @ weights))
         wide.append(at[-1] - at[0])
     use = np.array(wide) <= 2.0001 * np.median(wide)
-    return float(np.median(np.abs(np.array(left)[use]))) / 0.6744897501960817
+    return float(np.median(np.abs(np.array(left)[use]))) / 0.6744897501960817, int(use.sum())
 
 
 def regression(case: Case, columns: list[int] | None = None,
@@ -116,7 +117,7 @@ def regression(case: Case, columns: list[int] | None = None,
 
     θ is a, or one a recording, then b, then c.
     """
-    rows, y, weights, noise, told = [], [], [], [], []
+    rows, y, weights, noise, told = [], [], [], [], []  # told: of each part, by how many
     for r, recording in enumerate(measured(case)):
         for output, how in case.sigma.items():
             channel = recording[output]
@@ -127,8 +128,8 @@ def regression(case: Case, columns: list[int] | None = None,
             if "w" in case.sigma:
                 design = np.column_stack([design, np.full(t.size, float(output == "w"))])
             values = channel.values[seen]
-            unknown = visible(t, values)
-            told += [bool(how)] * t.size
+            unknown, by = visible(t, values)
+            told.append((t.size, np.inf if how else by))
             spread = np.full(t.size, unknown)
             if how:
                 spread = np.broadcast_to(np.asarray(channel.sigma), channel.values.shape)[seen]
@@ -148,14 +149,10 @@ def regression(case: Case, columns: list[int] | None = None,
     covariance[np.ix_(free, free)] = np.linalg.inv(A.T @ A)
     if not all(case.sigma.values()):
         covariance *= np.sum((W * residual) ** 2) / dof
-    squares, unsure = (residual / S) ** 2, ~np.array(told)
-    value = float(np.sum(squares))
-    if not unsure.any():
-        return Regression(theta, covariance, residual, value, dof, chi2.sf(value, dof))
-    share = np.sum(squares[unsure]) / value
-    known_by = 0.37 / (12870 / 4900) * np.sum(unsure) / share**2
-    return Regression(theta, covariance, residual, value, dof,
-                      f_law.sf(value / dof, dof, known_by))
+    squares = (residual / S) ** 2
+    parts = np.split(squares, np.cumsum([n for n, _ in told])[:-1])
+    p = p_value([(float(part.sum()), by) for part, (_, by) in zip(parts, told, strict=True)], dof)
+    return Regression(theta, covariance, residual, float(np.sum(squares)), dof, p)
 
 
 @pytest.fixture

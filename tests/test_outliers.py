@@ -186,3 +186,20 @@ def test_beside_a_missing_sample_none_is_an_outlier(seed: int) -> None:
     run = Recording.from_arrays(t, {"y": y})
     clean, count = without_outliers(run, "y", DEFAULTS)
     assert count == 1 and np.isnan(clean["y"].values[900])
+
+
+@pytest.mark.parametrize("draw", ["uniform", "exponential"])
+def test_at_any_times_the_wrong_sample_is_blamed_and_no_other(draw: str) -> None:
+    """In uneven neighbourhoods another sample can weigh more than the middle one."""
+    kept = lost = 0
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        steps = rng.uniform(0.3, 1.7, 300) if draw == "uniform" else rng.exponential(1.0, 300)
+        y = 0.01 * rng.standard_normal(300)
+        y[150] += 1.0
+        clean, _ = without_outliers(Recording.from_arrays(np.cumsum(steps + 1e-6), {"y": y}), "y",
+                                    DEFAULTS)
+        gone = np.isnan(clean["y"].values)
+        kept += not gone[150]
+        lost += int(gone.sum()) - gone[150]
+    assert kept <= 1 and lost == 0

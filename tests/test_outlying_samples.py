@@ -114,3 +114,13 @@ def test_a_stated_sigma_that_is_far_too_large_is_told() -> None:
     assert "0.02 times the stated noise (50 A)" in loose_warning(
         replace(of(np.ones(30)), sigma=np.full(30, 50.0), unit="A"))
     assert not loose_warning(replace(of(np.zeros(30)), sigma=np.ones(30)))  # clean data
+
+
+@pytest.mark.parametrize("lag", [1, 3, 11, 20])
+def test_one_step_of_an_input_explains_no_wrong_reading_after_it(lag: int) -> None:
+    rng = np.random.default_rng(lag)
+    t = np.arange(400) / 10
+    u = np.where(np.arange(400) < 200, 0.0, 1.0)
+    residual = 0.1 * rng.standard_normal(400)
+    residual[200 + lag] += 3.0
+    assert outlying(of(residual), [HeldInput("u", t, u, "zero")]).tolist() == [200 + lag]

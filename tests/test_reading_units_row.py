@@ -45,3 +45,9 @@ def test_dates_of_a_locale_are_refused_with_those_that_are_read(tmp_path: Path) 
     text = "Timestamp,y\n03/31/2024 01:50:00 AM,1\n03/31/2024 01:50:01 AM,2\n"
     with pytest.raises(BadRecording, match="2024-03-31T13:50:00"):
         Recording.read(written(tmp_path, text))
+
+
+def test_headers_with_units_have_no_row_of_them(tmp_path: Path) -> None:
+    """Which of both is meant is for the file's author to say."""
+    with pytest.raises(BadRecording, match="row 2, column"):
+        Recording.read(written(tmp_path, "t [ms],y [mm]\ns,m\n0,1\n100,2\n200,4\n"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import interpreted
 import numpy as np
 import pytest
-from scipy.stats import f as f_law
+from read_off_noise import p_value
 
 from pikanid.model import Model
 from pikanid.objective.shooting import HURRY, Shooting
@@ -75,10 +75,10 @@ def test_residual_jacobian_and_verdict_by_hand() -> None:
     found = shooting.adequacy(THETA)
     assert found.value == pytest.approx(np.sum((r / sigma) ** 2), rel=1e-4)
     assert (found.dof, found.source) == (96 - 4, "differences")
-    unsure = np.r_[np.zeros(31, bool), np.ones(17 + 31 + 17, bool)]
-    share = np.sum((r / sigma)[unsure] ** 2) / found.value
-    known_by = 0.37 / (12870 / 4900) * 65 / share**2
-    assert found.p_value == pytest.approx(f_law.sf(found.value / 92, 92, known_by), rel=1e-3)
+    parts = np.split((r / sigma) ** 2, np.cumsum([31, 17, 31]))
+    by = (np.inf, 13, 27, 13)
+    assert found.p_value == pytest.approx(
+        p_value([(float(part.sum()), m) for part, m in zip(parts, by, strict=True)], 92), rel=1e-3)
     # what is kept belongs to its θ
     other = THETA * [1.0, 1.0, 1.0, 1.5]
     assert np.abs(shooting.residual(other) - r / sigma).max() > 1

@@ -74,7 +74,7 @@ def effects(
             f"{size.name} = {one.size:.3g} {size.unit}".strip(),
             "cannot be simulated there" if one.failure else largest,
             "" if one.failure else "reaches no output" if math.isnan(one.derivative) else
-            f"agrees to {100 * one.derivative:.1g} %" if one.derivative < AGREES else
+            f"agrees to {100 * one.derivative:.2g} %" if one.derivative < AGREES else
             f"differs by {100 * one.derivative:.0f} %")
     console().print(made)
     return 0

@@ -111,7 +111,7 @@ def curve_misleads(name: str, value: float, reference: float, std: float, residu
 def bad_start(undefined: str = "") -> str:
     if undefined:
         return (f"The model cannot be simulated: {undefined}. A logarithm, a root or a quotient in "
-                "its equation, or another initial value, must be made good there.")
+                "its equation must have a value there, or another one begin.")
     return ("The model cannot be simulated from any starting point: give other guesses or narrower "
             "bounds.")
 

@@ -21,6 +21,7 @@ FEWEST = 20  # limit: samples that tell how large the noise is
 LAGS = 12  # limit: samples after which a rig that is as fast as its sampling has answered
 CHANCE = 1e-6  # limit: that noise alone counts as what the inputs' past explains
 LOOSE = 0.2  # limit: of a stated σ; of 20 samples right noise leaves so little once in 10^11
+CLEAN = 1e-4  # limit: of a signal's range: less is left of simulations without noise
 SHOWN = 3  # layout: times that are listed
 
 
@@ -51,7 +52,12 @@ def outlying(fit: Fit, inputs: Sequence[HeldInput] = ()) -> np.ndarray:
     found = (np.abs(r) > far) & (_alone(r) > far) if noise > 0.0 else np.zeros(len(r), bool)
     if found.any() and inputs:
         # of slow parts the explanation knows little: only how neighbours differ counts
-        found &= _alone(r - explained(fit.t, r, inputs, LAGS, CHANCE)) > far
+        part = explained(fit.t, r, inputs, LAGS, CHANCE)
+        left, told = _alone(r - part), _alone(part)
+        # one step alone would explain any sample after it: the same must follow another one
+        again = np.flatnonzero((told > 0.5 * far) & (left < 0.5 * told))
+        for k in np.flatnonzero(found & (left <= far)):
+            found[k] = not np.any(np.abs(again - k) > LAGS)
     at = np.flatnonzero(found)
     apart = (np.diff(at, prepend=-2) > 1) & (np.diff(at, append=len(r) + 1) > 1)
     return at[apart] if len(at) <= max(MOST * len(r), 1) else np.array([], int)
@@ -70,7 +76,7 @@ def loose_warning(fit: Fit) -> str:
     if fit.sigma is None or len(fit.residual) < FEWEST:
         return ""
     ratio = float(np.sqrt(np.mean((fit.residual / fit.sigma) ** 2)))
-    if not 0.0 < ratio < LOOSE:
+    if ratio >= LOOSE or fit.rmse <= CLEAN * np.ptp(fit.measured):
         return ""
     stated = f"{float(np.median(fit.sigma)):.3g} {fit.unit}".rstrip()
     return (f"Recording '{fit.recording}', '{fit.output}': the fit leaves {ratio:.2g} times the "

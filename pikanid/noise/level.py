@@ -173,6 +173,14 @@ def difference_noise(values: Array, time: Array | None = None,
     return max(_spread(differences), rounding_noise(values, rounding))
 
 
+def difference_freedom(values: Array, time: Array | None = None) -> float:
+    """Degrees of freedom of the power that `difference_noise` tells: 2 over its squared error."""
+    if len(values) < 5:
+        return 1.0
+    time = np.arange(float(len(values))) if time is None else time
+    return 2 / known_by(beside_neighbours(time, values)) ** 2
+
+
 def _spread(differences: Array) -> float:
     """Their standard deviation; by the median, as a few kinks must not count."""
     return float(np.median(np.abs(differences)) / NORMAL)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pikanid.recording.channel import Array
@@ -10,6 +12,7 @@ _UNEVEN = 0.2  # numerical: of an interval, by which one is no whole number of u
 _GRID = 0.9  # numerical: share of the intervals that are whole numbers on an even grid
 _SHORTEST = 1 / 3  # numerical: share of the neighbourhoods, the shortest, that tell of noise
 _ENOUGH = 60  # numerical: as many in any case, where there are so many: fewer say little
+_LEAST = 1e-3  # numerical: of a usual interval, as which a repeated time counts
 LONGEST = 2.0  # numerical: times the usual length, as which one may last
 _EXACT = 1e-12  # numerical: of the values, what rounding leaves of nothing
 
@@ -34,12 +37,19 @@ def beside_neighbours(time: Array, values: Array) -> Array:
     if len(time) < 5:
         return np.empty(0)
     weights, lengths = neighbour_weights(time)
-    wanted = min(max(int(_SHORTEST * len(lengths)), _ENOUGH), len(lengths)) - 1
-    longest = min(float(np.partition(lengths, wanted)[wanted]), LONGEST * np.median(lengths))
-    use = lengths <= longest * (1 + 1e-9)
+    use = are_short(lengths)
     y = np.lib.stride_tricks.sliding_window_view(values, 5)[use]
     left = np.sum(weights[use] * y, axis=1) / np.sqrt(np.sum(weights[use] ** 2, axis=1))
     return np.where(np.abs(left) > _EXACT * np.max(np.abs(values)), left, 0.0)
+
+
+def are_short(lengths: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Which neighbourhoods (N,) tell of noise by their lengths (N,): longer ones, as beside gaps,
+    leave a motion room.
+    """
+    wanted = min(max(int(_SHORTEST * len(lengths)), _ENOUGH), len(lengths)) - 1
+    longest = min(float(np.partition(lengths, wanted)[wanted]), LONGEST * np.median(lengths))
+    return np.asarray(lengths <= longest * (1 + 1e-9))
 
 
 def neighbour_weights(time: Array) -> tuple[Array, Array]:
@@ -66,9 +76,9 @@ def _places(time: Array) -> Array:
     jitter, which is no signal.
     """
     steps = np.diff(time)
-    steps = steps / np.median(steps)
+    steps = steps / max(float(np.median(steps)), 1e-300)
     whole = np.maximum(np.rint(steps), 1.0)
     near = np.abs(steps - whole) <= _UNEVEN
     if np.mean(near) >= _GRID:
         steps = np.where(near, whole, steps)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    return np.concatenate([[0.0], np.cumsum(np.maximum(steps, _LEAST))])

@@ -17,12 +17,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pikanid.noise.level import EFFICIENCY, difference_noise
+from pikanid.noise.level import difference_freedom, difference_noise
 from pikanid.objective.settings import USUAL, AdequacySettings
 
-# degrees of freedom a sample of a variance by the median of fourth differences: of the information
-# that a normal sample has, over the sum of their squared correlations
-KNOWN_BY = EFFICIENCY / (12870 / 4900)  # definition: see there
+LEAST = 3.0  # limit: degrees of freedom of a noise, below which its ratio to another has no mean
 Verdict = Literal["fits", "misfit", "unknown"]
 
 
@@ -65,7 +63,7 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
     >>> judge([r], [np.full(500, 1.0)], [r], 2).verdict
     'misfit'
     """
-    from scipy.special import chdtrc, fdtrc
+    from scipy.special import chdtrc
 
     count = sum(map(len, residuals))
     dof = max(count - n_free, 1)
@@ -78,23 +76,37 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
         p = float(chdtrc(dof, value))
         refuted = p < settings.alpha and count > n_free
         return Adequacy(value, dof, p, "misfit" if refuted else otherwise, "given")
-    value, threshold, unsure = 0.0, 0.0, 0.0
+    value, threshold, told = 0.0, 0.0, []
     where: Sequence[np.ndarray | None] = [None] * len(data) if times is None else times
     for r, s, y, t in zip(residuals, sigmas, data, where, strict=True):
         noise = difference_noise(y, t) if s is None else s
         floor = 1e-9 * max(float(np.ptp(y)), 1e-300)
         own = float(np.sum((r / np.maximum(noise, floor)) ** 2))
-        value, threshold, unsure = value + own, threshold + len(r), unsure + own * (s is None)
-    known_by = KNOWN_BY * sum(len(r) for r, s in zip(residuals, sigmas, strict=True) if s is None)
-    # as uncertain as the share of it that σ read off the samples makes
-    share = max(unsure, 1e-300) / max(value, 1e-300)
-    p = float(fdtrc(dof, max(known_by, 1.0) / share**2, value / dof))
+        value, threshold = value + own, threshold + len(r)
+        told.append((own, np.inf if s is not None else max(difference_freedom(y, t), LEAST)))
+    p = _p_value(told, dof)
     if not any(s is not None or len(r) >= settings.samples
                for r, s in zip(residuals, sigmas, strict=True)):
         return Adequacy(value, dof, p, "unknown", "differences")
     # the noise is itself estimated, and coloured noise fools differences: ask for a large factor
     far = value > settings.far * threshold and count > n_free
     return Adequacy(value, dof, p, "misfit" if far else otherwise, "differences")
+
+
+def _p_value(told: Sequence[tuple[float, float]], dof: int) -> float:
+    """Of Σ (residual/σ)² by parts, each with the degrees of freedom of its σ² (inf: given), by an F
+    distribution (F. E. Satterthwaite, Biometrics 2, 1946).
+    """
+    from scipy.special import chdtrc, fdtrc
+
+    # 1/σ² that is read off is too large on average
+    parts = [(own * (1 - 2 / known), known) for own, known in told]
+    value = sum(own for own, _ in parts)
+    unsure = sum((own / value) ** 2 / known for own, known in parts) if value > 0 else 0.0
+    if unsure == 0 or not np.isfinite(value):
+        return float(chdtrc(dof, value))
+    freedom = max(1 / unsure, LEAST)
+    return float(fdtrc(dof, freedom, value / dof * freedom / (freedom - 2)))
 
 
 def decides(dof: int, settings: AdequacySettings = USUAL) -> bool:

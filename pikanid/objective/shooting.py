@@ -184,7 +184,9 @@ class Shooting:
             bad = [n for n, rate in zip(model.state_names, rates, strict=True)
                    if not np.isfinite(rate)]
             if bad:
-                at = ", ".join(f"{n} = {v:.4g}" for n, v in zip(model.state_names, x, strict=True))
+                names = (*model.state_names, *model.input_names)
+                at = ", ".join(f"{n} = {v:.4g}" for n, v in zip(
+                    names, (*x, *e.inputs(t)[0]), strict=True))
                 return f"the rate of {' and of '.join(bad)} is no finite number at its start ({at})"
         return ""
 

@@ -53,8 +53,8 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     whole = Directions.of(jacobian, np.ones(len(theta), bool)) if at_bound.any() else shown
     notes += whole.warnings(problem.free, uncertainty)
     notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
-    held = {e.name: e.held for e in problem.experiments}
-    notes += filter(None, (outlying_warning(fit, held[fit.recording]) for fit in fits))
+    held = [e.held for e in problem.experiments for _ in e.samples]
+    notes += filter(None, map(outlying_warning, fits, held))
     notes += filter(None, map(loose_warning, fits))
     for e in problem.experiments:
         if e.unused:

@@ -50,8 +50,8 @@ def first_level(recording: Recording, output: str, quiet: tuple[float, float] | 
 
 
 def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.ndarray, rate: float,
-            quiet: tuple[float, float] | None, settings: Settings, explained: bool = False
-            ) -> NoiseModel:
+            quiet: tuple[float, float] | None, settings: Settings, explained: bool = False,
+            freedom: float = 1.0) -> NoiseModel:
     """The level again, now that a fit has taken the motion away.
 
     Args:
@@ -62,10 +62,11 @@ def refined(level: NoiseModel, channel: Channel, t: np.ndarray, residual: np.nda
         quiet: Stretch in which nothing moves, if one is known.
         settings: What counts as noise.
         explained: Whether the fit leaves nothing that a test sees.
+        freedom: Share of the samples that the fit's parameters leave, which matters of few.
     """
     found = _spectrum(level, t, residual, rate, settings.noise)
     if found is None:
-        return _from_neighbours(level, channel, t, residual, settings, explained)
+        return _from_neighbours(level, channel, t, residual / np.sqrt(freedom), settings, explained)
     omega, power, high, share, low = found
     spectra = [(omega[high], power[high], TAPERED * share)]
     source = "the residual's highest frequencies"
@@ -119,12 +120,16 @@ def _from_neighbours(level: NoiseModel, channel: Channel, t: Array, residual: Ar
         source = "what the residual's neighbours do not tell"
     # as above: a fit leaves no less than noise, and what explains all leaves noise alone
     whole = float(np.sqrt(np.mean(residual**2)))
-    louder = 2 * np.log(whole / sigma) if whole > 0 and sigma > 0 else 0.0
+    if whole == 0 or sigma == 0:
+        return level
+    louder = 2 * float(np.log(whole / sigma))
+    excess = max(louder, 0.0) + np.sqrt(2 / len(residual))
     if louder < -settings.noise.less * spread or (explained and louder < 0):
         sigma, spread = whole, np.sqrt(2 / len(residual))
         source = "the residual at all frequencies"
     least = rounding_noise(channel.values, settings.rounding)
-    return replace(level, sigma=max(sigma, least), spread=float(spread), source=source)
+    return replace(level, sigma=max(sigma, least), spread=float(spread), source=source,
+                   excess=excess)
 
 
 def louder(level: NoiseModel, t: np.ndarray, residual: np.ndarray, rate: float,

@@ -16,11 +16,12 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.noise.level import high_band_sigma
-from pikanid.noise.neighbours import LONGEST, neighbour_weights
+from pikanid.noise.neighbours import LONGEST, are_short, neighbour_weights
 from pikanid.problem.held import HeldInput
 from pikanid.problem.inputs_past import explained
 from pikanid.recording import Recording
 
+MOST, NORMAL = 0.9, 1.645  # definition: a probability, and what normal noise stays below by it
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
@@ -45,23 +46,40 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
     own = np.maximum(sigma, given) * np.ones(len(y))
     y -= from_inputs(recording, channel.time[seen], y, inputs, settings)
     weights, lengths = neighbour_weights(channel.time[seen])
-    known = lengths <= LONGEST * np.median(lengths)  # across a gap a motion may do anything
-    usual = own[2:-2] * np.sqrt(np.sum(weights**2, axis=1))
-    gap = np.where(known, np.sum(weights * np.lib.stride_tricks.sliding_window_view(y, 5), 1), 0.0)
+    weights /= (own[2:-2] * np.sqrt(np.sum(weights**2, axis=1)))[:, None]
+    gap = np.sum(weights * np.lib.stride_tricks.sliding_window_view(y, 5), axis=1)
+    # where neighbours are farther away a motion does more than noise; across a gap, anything
+    far = ~are_short(lengths)
+    if far.any():
+        weights[far] /= max(1.0, float(np.quantile(np.abs(gap[far]), MOST)) / NORMAL)
+        weights[lengths > LONGEST * np.median(lengths)] = 0.0
+        gap = np.sum(weights * np.lib.stride_tricks.sliding_window_view(y, 5), axis=1)
     bad: list[int] = []
     while len(bad) <= noise.most_outliers * len(y):
-        k = int(np.argmax(np.abs(gap) / usual))
-        if abs(gap[k]) < noise.spike * usual[k]:
+        k = int(np.argmax(np.abs(gap)))
+        if abs(gap[k]) < noise.spike:
             break
-        bad.append(k + 2)
-        y[k + 2] -= gap[k]
-        for near in range(max(k - 2, 0), min(k + 3, len(gap))):
-            gap[near] = weights[near] @ y[near:near + 5] if known[near] else 0.0
+        # of the five samples, the one whose error would explain most
+        j, size = max((_error_of(j, weights, gap) for j in range(k, k + 5)), key=lambda e: e[2])[:2]
+        bad.append(j)
+        y[j] -= size
+        for near in range(max(j - 4, 0), min(j + 1, len(gap))):
+            gap[near] = weights[near] @ y[near:near + 5]
     if not bad or len(bad) > noise.most_outliers * len(y):
         return recording, 0
     values = channel.values.copy()
     values[seen[bad]] = np.nan
     return recording.with_channels(replace(channel, values=values)), len(bad)
+
+
+def _error_of(j: int, weights: np.ndarray, gap: np.ndarray) -> tuple[int, float, float]:
+    """A sample, the error of it that explains the gaps of its neighbourhoods best, and how much of
+    their squares that takes away.
+    """
+    rows = np.arange(max(j - 4, 0), min(j + 1, len(gap)))
+    a, b = weights[rows, j - rows], gap[rows]
+    square = max(float(a @ a), 1e-300)
+    return j, float(a @ b) / square, float(a @ b) ** 2 / square
 
 
 def from_inputs(recording: Recording, t: np.ndarray, y: np.ndarray, inputs: Sequence[str],

@@ -174,6 +174,8 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
     inputs = fit.fitted_model.input_names
     records, count = without_lone(records, [(*key, f.t, f.residual) for key, f in fits.items()],
                                   inputs)
+    samples = sum(len(f.t) for f in fit.fits)
+    freedom = max(samples - len(fit.theta), 1) / max(samples, 1)
     levels = []
     for r, (recording, found) in enumerate(zip(records.recordings, records.levels, strict=True)):
         new = {}
@@ -185,7 +187,7 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
             # what still follows the inputs is misfit, however fast
             left -= from_inputs(recording, f.t, left, inputs, records.settings)
             again = refined(level, recording[name], f.t[kept], left[kept], rate, quiet,
-                            records.settings, explained)
+                            records.settings, explained, freedom)
             new[name] = loud_enough(again, recording[name])
         levels.append(new)
     return replace(records, levels=tuple(levels)), count

@@ -267,14 +267,14 @@ class DiagnosisData:
 
     @property
     def _confirmed_on(self) -> str:
-        met, later = "on the held-out recording", self.held_out.not_met if self.held_out else ()
-        if all(e.once for e in self.hypotheses[0].effects):
-            return f"as what happened once, and not {met}, which is predicted without it"
-        if not later:
-            return met
+        effects, met = self.hypotheses[0].effects, "on the held-out recording"
+        later = self.held_out.not_met if self.held_out else ()
+        if once := [e.name for e in effects if e.once]:
+            return f"{met}, {listed(once)} as what happened once" if len(once) < len(effects) else (
+                f"as what happened once, and not {met}, which is predicted without it")
         again = "where the recording meets it again: the held-out one does not"
-        everything = len(later) == len(self.hypotheses[0].effects)
-        return again if everything else f"{met}, and {listed(later)} {again}"
+        return met if not later else again if len(later) == len(effects) else (
+            f"{met}, and {listed(later)} {again}")
 
 
 def _first(titles: Sequence[str]) -> str:

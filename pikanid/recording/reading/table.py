@@ -16,8 +16,9 @@ from pikanid.formula import units
 from pikanid.recording.channel import Array
 
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
+_UNIT_IN_HEADER = re.compile(r"[\[(][^\[\]()]+[\])]\s*$")
 _BRACKETS = re.compile(r"^[\[(](.*)[\])]$")
-_DATE = re.compile(r"\s*\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\b")
+_DATE = re.compile(r"\s*\d{1,4}[./-]\d{1,2}[./-]\d{1,4}(?!\d)")
 _EMPTY = frozenset(["", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"])
 
 
@@ -116,7 +117,8 @@ def from_rows(where: str, rows: Sequence[Sequence[object]], numbers: list[int],
         raise errors.BadRecording(errors.no_rows(where))
     if not headed:
         headers = [str(k + 1) for k in range(len(rows[0]))]
-    own = _units(body[:2], decimal) if headed else None
+    bare = headed and not any(map(_UNIT_IN_HEADER.search, headers))
+    own = _units(body[:2], decimal) if bare else None
     notes: tuple[str, ...] = ()
     if own is not None:
         notes = (f"'{where}', row {shown[0]}: taken for the columns' units.",)
