@@ -56,11 +56,16 @@ Rules were added after rounds 1 to 3: a weak set of many or beside a law of no c
 force that happens once, and a size that may be nothing beside a bound are not confirmed. After the
 first three sets of round 4 (cascaded_tanks, and thermal_rc at 0.5 %) had been answered with those,
 rivals were fitted from the place of the best explanation, and a formula beside another law was no
-longer confirmed. Round 4 as reported is by that code throughout. Of the others it has answered
-cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at 0.5 % of round 3, thermal_rc
-at 5 %, two_mass_drive at 0.5 % and cart_pole_upright at 0.5 % of round 2, all of them because
-answers of older code had been wrong there; the rest is by the code before those rules. So the count
-of wrong answers over all rounds flatters, and that of round 4 does not."""
+longer confirmed. The last two sets of round 4 (two_mass_drive and cart_pole_upright at 5 %) came
+after that and were answered blindly first: four of 60 wrong, all on the drive. One of these, an
+oscillation left by "another initial state" that had passed for a colour of the noise, went away
+once tests allowed for noise no louder than what a fit leaves; both sets are reported with that.
+
+Of the other rounds, today's code has answered two_mass_drive at 0.5 % of round 3 and
+cart_pole_upright at 0.5 % of round 2; the code before that cascaded_tanks at 5 % of round 1 and at
+0.5 % of round 2, dc_motor at 0.5 % of round 3, thermal_rc at 5 % and two_mass_drive at 0.5 % of
+round 2. All of these were chosen because answers of older code had been wrong there; the rest is by
+older code. So the count of wrong answers over all rounds flatters."""
 
 
 def main(folder: str, *names: str) -> None:

@@ -51,3 +51,17 @@ def test_headers_with_units_have_no_row_of_them(tmp_path: Path) -> None:
     """Which of both is meant is for the file's author to say."""
     with pytest.raises(BadRecording, match="row 2, column"):
         Recording.read(written(tmp_path, "t [ms],y [mm]\ns,m\n0,1\n100,2\n200,4\n"))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_times_counted_since_1970_are_in_their_unit(tmp_path: Path, factor: float, unit: str
+                                                    ) -> None:
+    """As seconds they would lie thousands of years ahead; seconds, and what has a unit, stay."""
+    lines = "".join(f"{(1.7118498e9 + k) * factor:.0f},{k}\n" for k in range(4))
+    rec = Recording.read(written(tmp_path, "timestamp,y\n" + lines))
+    assert np.diff(rec.t).tolist() == pytest.approx([1.0, 1.0, 1.0])
+    assert any(f"read as {unit} since 1970" in note for note in rec.notes)
+    for head in ("timestamp [s]", "y2"):
+        rec = Recording.read(written(tmp_path, f"{head},y\n" + lines), rate=None if "[s]" in head
+                             else 1.0)
+        assert not rec.notes

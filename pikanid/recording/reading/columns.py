@@ -108,6 +108,8 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
         else:
             unreadable[key] = defect
     notes = tuple(f"Column '{key}' is left out: {why}" for key, why in unreadable.items())
+    notes += tuple(f"Times of '{found.name}' are read as {found.unit} since 1970."
+                   for found in bases.clocks() if found.counted)
     if not made and not partly:
         soft = [unreadable[k] for k, found, _ in signals if not found.column.text]
         soft += [missing(name, available, where) for name in request.also if not every]

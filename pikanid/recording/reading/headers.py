@@ -6,7 +6,9 @@ import difflib
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pikanid import errors
 from pikanid.formula import units
@@ -17,6 +19,8 @@ from pikanid.recording.reading.table import Column
 _HEADER = re.compile(
     r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>(?:[^()]|\([^()]*\))*)\))")
 
+EPOCHS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # definition: counts a second
+YEARS = (3.15e8, 4.1e9)  # limit: seconds from 1970 to 1980 and 2100
 TIME_NAMES = ("t", "time", "times", "timestamp", "timestamps", "zeit")
 
 # What test benches write and units are not called, or where it would be read as another one: "Grad"
@@ -30,11 +34,15 @@ _BENCH = {"Nm": "N*m", "mNm": "mN*m", "kNm": "kN*m", "Ncm": "N*cm", "Nms": "N*m*
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    """A column under the name that its channel has unless the caller maps it."""
+    """A column under the name that its channel has unless the caller maps it.
+
+    `counted` are times without a unit that can only be counted since 1970, in `unit`.
+    """
 
     name: str
     unit: str
     column: Column
+    counted: bool = False
 
 
 def named(columns: Iterable[Column], where: str) -> list[Named]:
@@ -51,11 +59,22 @@ def named(columns: Iterable[Column], where: str) -> list[Named]:
         if count > 1:
             raise errors.BadRecording(errors.header_twice(where, header))
     bare = Counter(name for name, *_ in split)
-    return [
-        Named(name if bare[name] == 1 else column.header,
-              unit if column.unit is None else _normal(column.unit), column)
-        for name, unit, column in split
-    ]
+    return [_counted(Named(name if bare[name] == 1 else column.header,
+                           unit if column.unit is None else _normal(column.unit), column))
+            for name, unit, column in split]
+
+
+def _counted(found: Named) -> Named:
+    """The column; times without a unit that as seconds would lie thousands of years ahead, and as
+    another count between 1980 and 2100, have that one.
+    """
+    if found.unit or found.column.is_clock or not are_times([(found.name, None)])[0]:
+        return found
+    values = found.column.values[np.isfinite(found.column.values)][:1]
+    for unit, count in EPOCHS.items():
+        if np.all((values / count > YEARS[0]) & (values / count < YEARS[1])) and len(values):
+            return replace(found, unit=unit, counted=True)
+    return found
 
 
 def are_times(calls: Sequence[tuple[str, str | None]]) -> list[bool]:
