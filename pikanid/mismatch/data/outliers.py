@@ -22,6 +22,7 @@ from pikanid.problem.inputs_past import explained
 from pikanid.recording import Recording
 
 MOST, NORMAL = 0.9, 1.645  # definition: a probability, and what normal noise stays below by it
+UNEVEN = 0.1  # numerical: share of neighbourhoods whose middle sample does not weigh most
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
@@ -54,15 +55,19 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
         weights[far] /= max(1.0, float(np.quantile(np.abs(gap[far]), MOST)) / NORMAL)
         weights[lengths > LONGEST * np.median(lengths)] = 0.0
         gap = np.sum(weights * np.lib.stride_tricks.sliding_window_view(y, 5), axis=1)
+    uneven = np.mean(np.abs(weights).max(axis=1) > np.abs(weights[:, 2])) > UNEVEN
     bad: list[int] = []
     while len(bad) <= noise.most_outliers * len(y):
         k = int(np.argmax(np.abs(gap)))
         if abs(gap[k]) < noise.spike:
             break
-        # of the five samples, the one whose error would explain most
-        j, size = max((_error_of(j, weights, gap) for j in range(k, k + 5)), key=lambda e: e[2])[:2]
+        j, error = k + 2, gap[k] / weights[k, 2]
+        if uneven:
+            # of uneven neighbours the one whose error would explain most
+            j, error = max((_error_of(j, weights, gap) for j in range(k, k + 5)),
+                           key=lambda found: found[2])[:2]
         bad.append(j)
-        y[j] -= size
+        y[j] -= error
         for near in range(max(j - 4, 0), min(j + 1, len(gap))):
             gap[near] = weights[near] @ y[near:near + 5]
     if not bad or len(bad) > noise.most_outliers * len(y):
