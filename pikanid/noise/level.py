@@ -166,19 +166,18 @@ def difference_noise(values: Array, time: Array | None = None,
     >>> bool(abs(difference_noise(noisy) - 0.1) < 0.01)
     True
     """
+    return difference_noise_and_freedom(values, time, rounding)[0]
+
+
+def difference_noise_and_freedom(values: Array, time: Array | None = None,
+                                 rounding: RoundingSettings = ROUNDING) -> tuple[float, float]:
+    """The same, and the degrees of freedom of its power: 2 over its squared relative error."""
     if len(values) < 5:
-        return float(np.std(values))
+        return float(np.std(values)), 1.0
     differences = beside_neighbours(
         np.arange(float(len(values))) if time is None else time, values)
-    return max(_spread(differences), rounding_noise(values, rounding))
-
-
-def difference_freedom(values: Array, time: Array | None = None) -> float:
-    """Degrees of freedom of the power that `difference_noise` tells: 2 over its squared error."""
-    if len(values) < 5:
-        return 1.0
-    time = np.arange(float(len(values))) if time is None else time
-    return 2 / known_by(beside_neighbours(time, values)) ** 2
+    sigma = max(_spread(differences), rounding_noise(values, rounding))
+    return sigma, 2 / known_by(differences) ** 2
 
 
 def _spread(differences: Array) -> float:

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pikanid.noise.level import difference_freedom, difference_noise
+from pikanid.noise.level import difference_noise_and_freedom
 from pikanid.objective.settings import USUAL, AdequacySettings
 
 LEAST = 3.0  # limit: degrees of freedom of a noise, below which its ratio to another has no mean
@@ -79,11 +79,11 @@ def judge(residuals: Sequence[np.ndarray], sigmas: Sequence[np.ndarray | None],
     value, threshold, told = 0.0, 0.0, []
     where: Sequence[np.ndarray | None] = [None] * len(data) if times is None else times
     for r, s, y, t in zip(residuals, sigmas, data, where, strict=True):
-        noise = difference_noise(y, t) if s is None else s
+        noise, known = difference_noise_and_freedom(y, t) if s is None else (s, np.inf)
         floor = 1e-9 * max(float(np.ptp(y)), 1e-300)
         own = float(np.sum((r / np.maximum(noise, floor)) ** 2))
         value, threshold = value + own, threshold + len(r)
-        told.append((own, np.inf if s is not None else max(difference_freedom(y, t), LEAST)))
+        told.append((own, max(known, LEAST)))
     p = _p_value(told, dof)
     if not any(s is not None or len(r) >= settings.samples
                for r, s in zip(residuals, sigmas, strict=True)):

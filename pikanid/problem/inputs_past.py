@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from pikanid.noise.autoregressive import fit, innovations
+from pikanid.noise.level import NORMAL
 from pikanid.noise.projection import orthonormal
 from pikanid.problem.held import HeldInput
 
@@ -20,7 +21,6 @@ CLIPPED = 3.0  # numerical: standard deviations beyond which a deviation counts 
 SMOOTH = 0.01  # numerical: of an input's spread: gaps below say nothing that a misfit could not
 ROUNDS = 10  # numerical: of a fit that gross errors must not lead
 ROWS = 10  # numerical: samples a column from which on those are told from noise
-NORMAL = 0.6745  # definition: median absolute value of a unit Gaussian
 
 
 def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[HeldInput], lags: int, chance: float
