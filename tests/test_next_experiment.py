@@ -13,8 +13,14 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.cli import main
 from pikanid.mismatch.design.next_experiment import d_optimal, next_experiment
-from pikanid.mismatch.design.profiles import Bounds, motion, profiles, scaled
-from pikanid.mismatch.design.response import Watched, joined, natural_frequency, response
+from pikanid.mismatch.design.profiles import profiles
+from pikanid.mismatch.design.response import (
+    Watched,
+    decay_rate,
+    joined,
+    natural_frequency,
+    response,
+)
 from pikanid.mismatch.design.separation import distance, mean_precision, refitted, unexplained
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model, Parameter, systems
@@ -32,70 +38,6 @@ def friction(c: float) -> Model:
 def drag(q: float) -> Model:
     return systems.sloshing().with_term(
         "theta_dot", "-q*abs(theta_dot)*theta_dot", [Parameter("q", q, bounds=POSITIVE)])
-
-
-# --- profiles ----------------------------------------------------------------------------------
-
-
-def test_motion_is_that_of_piecewise_constant_acceleration() -> None:
-    u, dt = np.array([2.0, 2.0, -1.0, 0.0, 0.0]), 0.5
-    velocity, position = motion(u, dt)
-    assert velocity == pytest.approx([0.0, 1.0, 2.0, 1.5, 1.5])
-    # x = v t + a t²/2 over each step
-    assert position == pytest.approx([0.0, 0.25, 1.0, 1.875, 2.625])
-
-
-@pytest.mark.parametrize("bounds", [Bounds(), Bounds(4.0, 1.0, 0.5), Bounds(0.3, np.inf, np.inf)])
-def test_profiles_keep_to_the_drive_s_bounds(bounds: Bounds) -> None:
-    kinds = set()
-    for profile in profiles(2.35, bounds, seed=1):
-        u, t = profile["u_x"].values, profile.t
-        velocity, position = motion(u, 0.01)
-        assert np.all(u[t < 2.0] == 0)
-        assert np.max(np.abs(u)) <= bounds.acceleration
-        assert np.max(np.abs(velocity)) <= bounds.velocity
-        assert np.ptp(position) <= bounds.stroke
-        assert abs(velocity[-1]) < 2e-3
-        kinds.add(profile.name.split(",")[0])
-        if "full" in profile.name:  # nothing is given away
-            shares = [np.max(np.abs(u)) / bounds.acceleration,
-                      np.max(np.abs(velocity)) / bounds.velocity, np.ptp(position) / bounds.stroke]
-            assert max(shares) == pytest.approx(1.0, abs=1e-3)
-    assert len(kinds) == 7
-
-
-def test_profiles_are_the_same_for_a_seed_and_differ_between_draws() -> None:
-    first, again, other = (profiles(2.35, seed=s, draws=2) for s in (0, 0, 1))
-    assert all(np.array_equal(a["u_x"].values, b["u_x"].values)
-               for a, b in zip(first, again, strict=True))
-    assert not np.array_equal(first[4]["u_x"].values, other[4]["u_x"].values)
-    assert len({p.name for p in first}) == len(first)
-
-
-@pytest.mark.parametrize("wrong", [
-    {"duration": 2.5}, {"duration": 3.4}, {"frequency": 12.0}, {"frequency": 0.0}, {"quiet": 19.9}])
-def test_profiles_that_cannot_be(wrong: dict[str, float]) -> None:
-    with pytest.raises(errors.BadSetting, match="profile"):
-        profiles(**{"frequency": 2.35, **wrong})  # type: ignore[arg-type]
-    with pytest.raises(errors.BadSetting, match="velocity"):
-        Bounds(velocity=0.0)
-
-
-def test_the_shortest_profiles_hold_all_kicks() -> None:
-    for duration in np.arange(3.0, 5.0, 0.05):
-        try:
-            made = profiles(2.35, duration=duration, draws=1)
-        except errors.BadSetting:
-            assert duration < 3.55
-        else:
-            kicks = next(p for p in made if "kicks of three sizes" in p.name)["u_x"].values
-            assert len({round(abs(u), 9) for u in kicks} - {0.0}) == 3
-
-
-def test_scaled_profile_is_smaller() -> None:
-    profile = profiles(2.35, seed=3)[6]
-    smaller = scaled(profile, 1 / 3)
-    assert np.all(np.abs(smaller["u_x"].values) <= np.abs(profile["u_x"].values) / 3 + 1e-6)
 
 
 # --- distances ---------------------------------------------------------------------------------
@@ -203,6 +145,7 @@ def test_natural_frequency() -> None:
         "name": "decay", "states": {"x": {"initial": 1.0}}, "parameters": {"k": {"guess": 0.5}},
         "equations": {"x": "-k*x"}, "outputs": {"x": {"expression": "x"}}})
     assert natural_frequency(decay) is None
+    assert decay_rate(decay) == pytest.approx(0.5)
 
 
 # --- the next experiment -----------------------------------------------------------------------

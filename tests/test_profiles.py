@@ -1,93 +1,95 @@
-"""Input profiles: what goes forth comes back, and the seed decides what is random."""
+"""Profiles keep to the bounds of a drive, and are as fast and long as a model asks for."""
 
 from __future__ import annotations
-
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import pikanid as pk
-from pikanid.cli import main
-from pikanid.errors import BadSetting
-from pikanid.mismatch.design.profiles import Bounds, _pulses, profiles, profiles_for, scaled
-from pikanid.model import systems
+from pikanid import errors
+from pikanid.mismatch.design.profiles import Bounds, motion, profiles, profiles_for, scaled
+from pikanid.mismatch.design.response import decay_rate, natural_frequency
+from pikanid.model import Model, systems
 
 
-def test_every_pulse_has_its_counterpart() -> None:
-    for seed in range(5):
-        u = _pulses(np.random.default_rng(seed), 1800, 2.0, 0.01)
-        assert np.abs(u).max() <= 1.0 and np.count_nonzero(u) > 100
-        assert abs(u.sum()) < 1e-9
-        edges = np.flatnonzero(np.diff(np.concatenate([[0.0], u, [0.0]])))
-        assert len(edges) >= 8
+def test_motion_is_that_of_piecewise_constant_acceleration() -> None:
+    u, dt = np.array([2.0, 2.0, -1.0, 0.0, 0.0]), 0.5
+    velocity, position = motion(u, dt)
+    assert velocity == pytest.approx([0.0, 1.0, 2.0, 1.5, 1.5])
+    # x = v t + a t²/2 over each step
+    assert position == pytest.approx([0.0, 0.25, 1.0, 1.875, 2.625])
 
 
-def test_profiles_are_as_random_as_their_seed() -> None:
-    def values(seed: int) -> list[np.ndarray]:
-        made = profiles_for({"one": systems.sloshing()}, None, 10.0, 0.02, seed)
-        return [r["u_x"].values for r in made]
-
-    once, again, other = values(1), values(1), values(2)
-    assert all(np.isfinite(u).all() and np.ptp(u) > 0.0 for u in once)
-    assert all(map(np.array_equal, once, again))
-    assert not all(map(np.array_equal, once, other))
-    names = [r.name for r in profiles(2.35, duration=10.0, draws=1)]
-    assert len(set(names)) == len(names)
-
-
-EXCHANGER = pk.Model.from_dict({
-    "name": "exchanger",
-    "states": {"Th": {"unit": "degC", "initial": 40.0}, "Tc": {"unit": "degC", "initial": 20.0}},
-    "inputs": {"Fh": {"unit": "kg/s", "hold": "zero"}, "Fc": {"unit": "kg/s", "hold": "zero"}},
-    "parameters": {"k": {"unit": "kg/s", "guess": 0.1, "bounds": [0.01, 2.0]}},
-    "equations": {"Th": "(Fh*(80 - Th) - k*(Th - Tc))/2", "Tc": "(Fc*(15 - Tc) + k*(Th - Tc))/2"},
-    "outputs": {"Th": {"unit": "degC", "expression": "Th"}}})
+@pytest.mark.parametrize("bounds", [Bounds(), Bounds(4.0, 1.0, 0.5), Bounds(0.3, np.inf, np.inf)])
+def test_profiles_keep_to_the_drive_s_bounds(bounds: Bounds) -> None:
+    kinds = set()
+    for profile in profiles(2.35, bounds, seed=1):
+        u, t = profile["u_x"].values, profile.t
+        velocity, position = motion(u, 0.01)
+        assert np.all(u[t < 2.0] == 0)
+        assert np.max(np.abs(u)) <= bounds.acceleration
+        assert np.max(np.abs(velocity)) <= bounds.velocity
+        assert np.ptp(position) <= bounds.stroke
+        assert abs(velocity[-1]) < 2e-3
+        kinds.add(profile.name.split(",")[0])
+        if "full" in profile.name:  # nothing is given away
+            shares = [np.max(np.abs(u)) / bounds.acceleration,
+                      np.max(np.abs(velocity)) / bounds.velocity, np.ptp(position) / bounds.stroke]
+            assert max(shares) == pytest.approx(1.0, abs=1e-3)
+    assert len(kinds) == 7
 
 
-def flows(low: float = 30.0, high: float = 300.0) -> pk.Recording:
-    """Both in g/s, every two seconds, with a temperature."""
-    t, rng = 2.0 * np.arange(300), np.random.default_rng(0)
-    return pk.Recording.from_arrays(
-        t, {"Fh": rng.uniform(low, high, 300), "Fc": rng.uniform(low, high, 300),
-            "Th": 40.0 + np.sin(t)}, {"Fh": "g/s", "Fc": "g/s", "Th": "degC"})
+def test_profiles_are_the_same_for_a_seed_and_differ_between_draws() -> None:
+    first, again, other = (profiles(2.35, seed=s, draws=2) for s in (0, 0, 1))
+    assert all(np.array_equal(a["u_x"].values, b["u_x"].values)
+               for a, b in zip(first, again, strict=True))
+    assert not np.array_equal(first[4]["u_x"].values, other[4]["u_x"].values)
+    assert len({p.name for p in first}) == len(first)
 
 
-def test_an_input_that_is_no_acceleration_keeps_to_its_range() -> None:
-    """As recorded, in the model's unit, at the rate of what was recorded; every input moves."""
-    offered = profiles_for({"one": EXCHANGER}, None, 400.0, None, 0, {"Fc": (0.1, 0.2)}, [flows()])
-    for profile in offered:
-        assert np.allclose(np.diff(profile.t), 2.0)
-        for name, low, high in (("Fh", 0.03, 0.3), ("Fc", 0.1, 0.2)):
-            values = profile[name].values
-            assert low <= values.min() < values.max() <= high
-            assert values[0] == pytest.approx((low + high) / 2, abs=1e-3)
-    whole = [p for p in offered if "full" in p.name]
-    assert all(np.ptp(p["Fh"].values) > 0.45 * (0.3 - 0.03) for p in whole)
-    # less of it is closer to where it rests
-    half = scaled(whole[0], 0.5)["Fh"].values
-    assert np.allclose(half - half[0], (whole[0]["Fh"].values - half[0]) / 2, atol=1e-6)
+@pytest.mark.parametrize("wrong", [
+    {"duration": 2.5}, {"duration": 3.4}, {"frequency": 12.0}, {"frequency": 0.0}, {"quiet": 19.9}])
+def test_profiles_that_cannot_be(wrong: dict[str, float]) -> None:
+    with pytest.raises(errors.BadSetting, match="profile"):
+        profiles(**{"frequency": 2.35, **wrong})  # type: ignore[arg-type]
+    with pytest.raises(errors.BadSetting, match="velocity"):
+        Bounds(velocity=0.0)
 
 
-def test_a_range_that_nobody_has_said_is_asked_for() -> None:
-    for ranges, recorded, said in (
-            (None, [], "input 'Fh' go, in kg/s? Say it (--range Fh=LOW:HIGH"),
-            ({"Fh": (0.0, 1.0)}, [], "input 'Fc' go"), (None, [flows(50.0, 50.0)], "input 'Fh' go"),
-            ({"Fh": (1.0, 0.0)}, [], "cannot go from 1 to 0"),
-            ({"F": (0.0, 1.0)}, [], "'F', which drives nothing (inputs: Fh, Fc)")):
-        with pytest.raises(BadSetting, match=re.escape(said)):
-            profiles_for({"one": EXCHANGER}, None, 400.0, 1.0, 0, ranges, recorded)
-    # the bounds of a drive hold for whatever they are given
-    assert profiles_for({"one": EXCHANGER}, Bounds(0.1, np.inf, np.inf), 400.0, 1.0, 0)
-    motor = ["design", "dc_motor", "--sigma", "2rad/s", "--out", "next.csv"]
-    assert main(motor) == 2 and main([*motor, "--range", "u=6"]) == 2
+def test_the_shortest_profiles_hold_all_kicks() -> None:
+    for duration in np.arange(3.0, 5.0, 0.05):
+        try:
+            made = profiles(2.35, duration=duration, draws=1)
+        except errors.BadSetting:
+            assert duration < 3.55
+        else:
+            kicks = next(p for p in made if "kicks of three sizes" in p.name)["u_x"].values
+            assert len({round(abs(u), 9) for u in kicks} - {0.0}) == 3
 
 
-def test_the_command_takes_a_range_with_a_unit(tmp_path: Path) -> None:
-    out = tmp_path / "next.csv"
-    assert main(["design", "dc_motor", "--sigma", "2rad/s", "--range", "u=0:6000mV", "--duration",
-                 "5", "--rate", "50", "--out", str(out), "--quiet"]) == 0
-    u = pk.Recording.read(out)["u"]
-    assert 0 <= u.values.min() < u.values.max() <= 6 and u.unit == "V"
-    assert np.allclose(np.diff(u.time), 0.02)
+def test_scaled_profile_is_smaller() -> None:
+    profile = profiles(2.35, seed=3)[6]
+    smaller = scaled(profile, 1 / 3)
+    assert np.all(np.abs(smaller["u_x"].values) <= np.abs(profile["u_x"].values) / 3 + 1e-6)
+
+
+@pytest.mark.parametrize("equations", [
+    {"x": "-20*x + b*u"}, {"x": "-1e-5*x + b*u"},  # time constants of 50 ms and of a day
+    {"x": "v", "v": "-9e4*x - 30*v + b*u"},  # rings at 48 Hz
+    {"x": "v", "v": "-9e-6*x - 1e-4*v + b*u"}])  # and every 35 min
+def test_profiles_are_as_fast_and_as_long_as_the_model_asks_for(equations: dict[str, str]) -> None:
+    model = Model.from_dict({
+        "name": "rig", "states": {name: {"initial": 0.0} for name in equations},
+        "inputs": {"u": {}}, "parameters": {"b": {"guess": 1.0}}, "equations": equations,
+        "outputs": {"x": {"expression": "x"}}})
+    slowest = natural_frequency(model) or decay_rate(model)
+    assert slowest is not None
+    for profile in profiles_for({"rig": model}, None, None, None, 0, {"u": (-1.0, 1.0)}):
+        t = profile["u"].time
+        assert len(t) <= 10_001 and not profile.notes
+        assert t[1] - t[0] <= 0.051 / slowest and t[-1] >= 4.9 / slowest
+
+
+def test_a_rate_that_cannot_follow_the_model_is_told() -> None:
+    model = systems.sloshing()
+    coarse = profiles_for({"rig": model}, None, 60.0, 0.05, 0)
+    assert all("at 47" in p.notes[0] and "--rate" in p.notes[0] for p in coarse)

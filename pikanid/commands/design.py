@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pikanid.commands.grouped import grouped
-from pikanid.commands.options import Quiet, Sigma, assignments, quantity
+from pikanid.commands.options import Quiet, Sigma, assignments, quantity, seconds
 from pikanid.commands.outputs import check_outputs
 from pikanid.commands.reading import Recorded, every_source
 from pikanid.commands.simulate import sigmas
@@ -59,7 +59,8 @@ def design(
         metavar="NAME=VALUE", show_default=False,
         help="largest value that an output may reach, as theta=15deg")] = [],  # noqa: B006
     duration: Annotated[float | None, typer.Option(
-        metavar="S", help="of the profile; by default that of --recorded, or 20 s")] = None,
+        metavar="TIME", parser=seconds,
+        help="of the profile; by default that of --recorded, or 20 s")] = None,
     rate: Annotated[float | None, typer.Option(
         metavar="HZ", help="its sampling rate; that of --recorded, or 100 Hz, by default")] = None,
     *,

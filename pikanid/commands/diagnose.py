@@ -15,7 +15,7 @@ from pikanid.commands.options import (
     Sigma,
     Values,
     adjusted,
-    quantity,
+    seconds,
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.commands.reading import Reading, every_source, files_read
@@ -48,8 +48,8 @@ def diagnose(
     report: Annotated[str | None, typer.Option(
         metavar="FILE.html", help="write a page for people")] = None,
     sigma: Sigma = [],  # noqa: B006
-    quiet_until: Annotated[str | None, typer.Option(
-        metavar="TIME", help="nothing moves before, as 2s")] = None,
+    quiet_until: Annotated[float | None, typer.Option(
+        metavar="TIME", parser=seconds, help="nothing moves before, as 2s")] = None,
     settings: Annotated[str | None, typer.Option(
         metavar="FILE.toml", show_default=False,
         help="error rates, thresholds, budgets: fields of pikanid.Settings")] = None,
@@ -82,7 +82,7 @@ def diagnose(
     stretch = None
     if quiet_until is not None:
         begin = min(r.start for r in records)
-        stretch = (begin, begin + quantity(quiet_until, "s", "--quiet-until"))
+        stretch = (begin, begin + quiet_until)
     with working("diagnosing", 8, quiet) as step:
         dx = run(chosen, records, others or None,
                  settings=taken, quiet=stretch, tell=step, workers=workers)

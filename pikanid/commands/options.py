@@ -15,6 +15,30 @@ from pikanid.recording.excitation import EXCITATIONS
 if TYPE_CHECKING:
     from pikanid.model import Model
 
+
+def seconds(text: str | float) -> float:
+    """A time of the command line: a number in seconds, or with a unit.
+
+    Raises:
+        BadSetting: If it is neither.
+
+    >>> seconds("2.5"), seconds("300 ms")
+    (2.5, 0.3)
+    """
+    return text if isinstance(text, float) else quantity(text, "s", "a time")
+
+
+def quantity(text: str, unit: str, where: str, difference: bool = False) -> float:
+    """A number in `unit`, as `pikanid.formula.quantity.quantity` reads it.
+
+    >>> quantity("45 mm", "m", "l_theta")
+    0.045
+    """
+    from pikanid.formula import quantity as units_quantity
+
+    return units_quantity.quantity(text, unit, where, difference)
+
+
 ModelName = Annotated[str, typer.Option(
     "--model", "-m", metavar="NAME|FILE.toml", help="a ready-made model, or a model file",
     show_default=False)]
@@ -40,9 +64,9 @@ FileRate = Annotated[float | None, typer.Option(
 Sheet = Annotated[str | None, typer.Option(
     "--sheet", metavar="NAME", help="sheet of a workbook, by name or number from 0")]
 Start = Annotated[float | None, typer.Option(
-    "--from", metavar="S", help="start", show_default=False)]
+    "--from", metavar="TIME", help="start, as 2 or 300ms", show_default=False, parser=seconds)]
 Stop = Annotated[float | None, typer.Option(
-    "--to", metavar="S", help="end", show_default=False)]
+    "--to", metavar="TIME", help="end, as 10 or 5min", show_default=False, parser=seconds)]
 OwnTimes = Annotated[bool, typer.Option(
     "--own-times", help="take the times of files joined by + as they stand, whatever their dates")]
 Stride = Annotated[int, typer.Option(
@@ -52,7 +76,7 @@ Excitation = Annotated[str, typer.Option(
     help=f"what drives the model: {', '.join(EXCITATIONS)}, or a recording of its inputs (files "
     "joined by + are one)")]
 Duration = Annotated[float, typer.Option(
-    "--duration", metavar="S", help="of a built-in excitation")]
+    "--duration", metavar="TIME", help="of a built-in excitation", parser=seconds)]
 Rate = Annotated[float | None, typer.Option(
     "--rate", metavar="HZ", show_default=False,
     help="sampling rate of a built-in excitation, 100 by default, or of a file without times")]
@@ -80,17 +104,6 @@ def assignments(option: str, texts: Sequence[str], example: str) -> dict[str, st
             raise errors.BadSetting(errors.named_twice(option, name.strip()))
         found[name.strip()] = value.strip()
     return found
-
-
-def quantity(text: str, unit: str, where: str, difference: bool = False) -> float:
-    """A number in `unit`, as `pikanid.formula.quantity.quantity` reads it.
-
-    >>> quantity("45 mm", "m", "l_theta")
-    0.045
-    """
-    from pikanid.formula import quantity as units_quantity
-
-    return units_quantity.quantity(text, unit, where, difference)
 
 
 def by_output(model: Model, texts: Sequence[str]) -> dict[str, str]:

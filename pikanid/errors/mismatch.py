@@ -52,6 +52,12 @@ def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: flo
             "ten samples a period.")
 
 
+def profile_too_slow(frequency: float, dt: float, resolved: float) -> str:
+    return (f"Samples every {dt:.3g} s can follow {resolved / dt:.3g} Hz, the model moves at "
+            f"{frequency:.3g} Hz: at {frequency / resolved:.3g} Hz (--rate) or more the profile "
+            "would reach it.")
+
+
 def not_in_catalogue(effect: str, known: Iterable[str]) -> str:
     return f"The experiment could not show an effect '{short(effect)}' (known: {listed(known)})."
 

@@ -134,6 +134,12 @@ def note_gap(names: Sequence[str], start: float, stop: float, more: int) -> str:
             "are held or interpolated there.")
 
 
+def note_sentinels(name: str, values: Sequence[float], number: int) -> str:
+    said = listed([f"{value:.12g}" for value in values])
+    what = f"1 sample of '{name}' is" if number == 1 else f"{number} samples of '{name}' are"
+    return f"{what} {said} and read as missing."
+
+
 def note_undated(names: Sequence[str]) -> str:
     return ("Times are taken as they stand, each from the zero of its own file: when "
             f"{listed(names)} began is not known.")

@@ -108,13 +108,14 @@ class NextExperiment:
         if self.purpose == "separate":
             verdict = "tells them apart" if self.value >= self.separated else (
                 f"does not tell them apart yet ({self.separated:g} σ are needed)")
-            return (f"Next experiment: {name}. The closest two hypotheses are {self.value:.3g} σ "
-                    f"apart afterwards ({self.before:.3g} σ now): it {verdict}.")
+            return " ".join((f"Next experiment: {name}. The closest two hypotheses are "
+                             f"{self.value:.3g} σ apart afterwards ({self.before:.3g} σ now): it "
+                             f"{verdict}.", *self.profile.notes))
         otherwise = ("if the last recording were repeated" if self.before > 0
                      else "with the median profile")
         bounds = ", ".join(f"{key} ± {std:.2g}" for key, std in self.std.items())
-        return (f"Next experiment: {name}. Standard errors of {bounds}; "
-                f"{self.gain:.3g} times smaller on average than {otherwise}.")
+        return " ".join((f"Next experiment: {name}. Standard errors of {bounds}; {self.gain:.3g} "
+                         f"times smaller on average than {otherwise}.", *self.profile.notes))
 
 
 def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
@@ -133,9 +134,10 @@ def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recordin
         candidates: Profiles to choose from; by default those of `profiles`.
         bounds: Of the drive, for the default candidates; by default those of a planar motor for
             inputs that are accelerations.
-        duration: Of the default candidates [s]; by default that of the longest recording, 20 s
-            without any.
-        dt: Their sampling interval [s]; by default that of what was recorded, else 0.01 s.
+        duration: Of the default candidates [s]; by default that of the longest recording, without
+            any 20 s, or five periods or time constants of the first model.
+        dt: Their sampling interval [s]; by default that of what was recorded, else 0.01 s or what
+            these ask for.
         limits: Output -> largest |value| that the experiment may reach; profiles are made smaller
             until every hypothesis keeps to it.
         seed: Of the default candidates.

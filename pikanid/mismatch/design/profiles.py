@@ -13,7 +13,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.design.ranges import Range, ranges_of, within
-from pikanid.mismatch.design.response import natural_frequency
+from pikanid.mismatch.design.response import decay_rate, natural_frequency
 from pikanid.model import Model
 from pikanid.recording import Recording
 from pikanid.recording.channel import Array
@@ -38,7 +38,8 @@ LEAST = 3.5  # limit: periods of motion in a profile: kicks of three sizes take 
 FEWEST = 5.0  # limit: periods in a profile as long as a recording
 MOST = 10_000  # limit: samples of one: each of several dozen is simulated
 LONG = 20.0  # definition: [s] of a profile where nothing was recorded before
-EVERY = 0.01  # definition: [s] between samples where nothing was recorded before
+EVERY = 0.01  # definition: [s] between samples where nothing was recorded and motion is not faster
+ROUNDING = 1e-9  # numerical: of a frequency that was computed from the sampling interval
 DIGITS = 6  # numerical: of a profile's values: a file of decimals is run as it was designed
 
 
@@ -132,7 +133,8 @@ def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: f
                  dt: float | None, seed: int, ranges: Mapping[str, Range] | None = None,
                  recorded: Sequence[Recording] = ()) -> list[Recording]:
     """Profiles for the first input, and others at the same time for all further ones; by default as
-    long as the longest recording, if that makes 5 periods and 10,000 samples, and sampled as often.
+    long as the longest recording, if that makes 5 periods and 10,000 samples, and sampled as often;
+    where nothing was recorded, as the slowest motion or decay of the first model asks for.
 
     Raises:
         BadSetting: If the models have no input, the range of one is not known, or as for
@@ -142,22 +144,29 @@ def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: f
     if not inputs:
         raise errors.BadSetting(errors.nothing_to_drive(", ".join(models)))
     known = ranges_of(inputs.values(), ranges, recorded, bounds is not None)
-    dt = dt or _interval(inputs, recorded) or EVERY
     first, *others = inputs.values()
-    natural = natural_frequency(next(iter(models.values())))
+    model = next(iter(models.values()))
+    natural, decay = natural_frequency(model), decay_rate(model)
+    dt = dt or _interval(inputs, recorded)
+    own = natural or (None if recorded else decay)
+    if not dt:
+        dt = min(max(EVERY, FEWEST / own / MOST), RESOLVED / own) if own else EVERY
     if duration is None:
         longest = min(max((r.stop - r.start for r in recorded), default=LONG), MOST * dt)
-        duration = max(longest, FEWEST / min(natural or np.inf, RESOLVED / dt))
-    frequency = natural or PERIODS / duration
-    # A hypothesis that rings faster than the profile can follow is driven at the fastest it can.
-    frequency = min(frequency, RESOLVED / dt)
+        duration = max(longest, FEWEST / min(own or np.inf, RESOLVED / dt))
+    frequency = natural or max(decay or 0.0, PERIODS / duration)
+    notes: tuple[str, ...] = ()
+    if frequency * dt > RESOLVED * (1.0 + ROUNDING):
+        notes = (errors.profile_too_slow(frequency, dt, RESOLVED),)
+        frequency = RESOLVED / dt
     made = {i.name: profiles(
         frequency, bounds, duration, dt, min(REST[0], REST[1] * duration), i.name, i.unit,
         seed=seed, span=known.get(i.name)) for i in (first, *others)}
     count = len(made[first.name])
-    return [profile.with_channels(*(
+    return [replace(profile.with_channels(*(
         made[other.name][(k + 2 * shift) % count][other.name]
-        for shift, other in enumerate(others, 1))) for k, profile in enumerate(made[first.name])]
+        for shift, other in enumerate(others, 1))), notes=notes)
+        for k, profile in enumerate(made[first.name])]
 
 
 def _interval(inputs: Iterable[str], recorded: Sequence[Recording]) -> float:

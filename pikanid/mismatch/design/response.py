@@ -193,16 +193,34 @@ def natural_frequency(model: Model) -> float | None:
     >>> round(natural_frequency(systems.sloshing()), 2)
     2.35
     """
+    slowest = _slowest(_eigenvalues(model).imag)
+    return None if slowest is None else slowest / (2 * np.pi)
+
+
+def decay_rate(model: Model) -> float | None:
+    """That of the slowest decay around the initial state of a model [1/s]; None if none.
+
+    >>> from pikanid.model import systems
+    >>> round(decay_rate(systems.sloshing()), 3)
+    0.25
+    """
+    return _slowest(_eigenvalues(model).real)
+
+
+def _slowest(parts: Array) -> float | None:
+    rates = np.abs(parts)
+    some = rates[rates > SLOW * max(float(rates.max(initial=0.0)), 1e-12)]
+    return float(some.min()) if len(some) else None
+
+
+def _eigenvalues(model: Model) -> Array:
+    """Of the linearised right-hand side [1/s]; none where that is not a number."""
     problem = Problem(model, _nothing(model), need_outputs=False)
     p = problem.parameters(problem.guess, 0)
     x = problem.experiments[0].initial(p)[None, :]
     u = np.zeros((1, len(model.inputs)))
     jacobian = VectorField(model).rhs_jacobians(np.zeros(1), x, u, p)[0][0]
-    if not np.all(np.isfinite(jacobian)):
-        return None
-    rates = np.abs(np.linalg.eigvals(jacobian).imag)
-    ringing = rates[rates > SLOW * max(float(rates.max(initial=0.0)), 1e-12)]
-    return float(ringing.min()) / (2 * np.pi) if len(ringing) else None
+    return np.linalg.eigvals(jacobian) if np.all(np.isfinite(jacobian)) else np.zeros(0)
 
 
 def _nothing(model: Model) -> Recording:

@@ -19,6 +19,7 @@ from pikanid.recording.reading.headers import (
     missing,
     named,
 )
+from pikanid.recording.reading.sentinels import without_sentinels
 from pikanid.recording.reading.table import Table
 
 OWN_TIME = "t:"  # "t:theta" holds the times of theta alone
@@ -94,6 +95,7 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
             and not found.name.startswith((OWN_TIME, OWN_SIGMA))
         ]
     made: list[Channel] = []
+    sentinels: list[str] = []
     unreadable: dict[str, str] = {}
     for key, found, is_mapped in signals:
         defect, strict = _defect(table, where, found), not request.columns
@@ -102,7 +104,9 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
             time, defect, is_gap = bases.times(found)
             strict = strict and not is_gap
         if time is not None:
-            made.append(_channel(key, found, time, request, available))
+            channel, note = without_sentinels(_channel(key, found, time, request, available))
+            made.append(channel)
+            sentinels += [note] if note else []
         elif is_mapped or (strict and not found.column.text and not found.column.path):
             raise errors.BadRecording(defect)
         else:
@@ -121,8 +125,8 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
             errors.missing_channel(where, key, [channel.name for channel in made]))
     used = [found for _, found, _ in signals] + bases.clocks()
     others = tuple(found.column.path or found.name for found in available if found not in used)
-    return Result(tuple(made), (*table.notes, *notes, *note_gaps(made)), unreadable, bases.began(),
-                  others)
+    notes += (*sentinels, *note_gaps(made))
+    return Result(tuple(made), (*table.notes, *notes), unreadable, bases.began(), others)
 
 
 def _defect(table: Table, where: str, found: Named) -> str:
