@@ -166,7 +166,8 @@ def test_two_models_are_told_apart_only_where_they_differ(recorded: pk.Recording
     assert found.ranking[-1] == "wrong"
     significant = {(p.better, p.worse) for p in found.significant()}
     assert {("right", "wrong"), ("same", "wrong")} == significant
-    assert "may be chance" in found.sentence()
+    p_value, = (p.p_value for p in found.pairs if {p.better, p.worse} == {"right", "same"})
+    assert f"is not significant (p = {p_value:.2g}, below 0.01 would be)" in found.sentence()
     assert found.pairs == pk.validate({"wrong": wrong, "same": same, "right": right}, recorded,
                                       baseline=False).pairs
 

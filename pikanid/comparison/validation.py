@@ -83,7 +83,11 @@ class Validation:
         if beaten:
             words += f", significantly better than {_and(beaten)}"
         if equal:
-            words += f"{';' if beaten else ','} its lead over {_and(equal)} may be chance"
+            least = min((p.p_value for p in self.pairs if p.better == first and p.worse in equal),
+                        default=1.0)
+            words += (f"{';' if beaten else ','} its lead over {_and(equal)} is not significant "
+                      f"(p {'=' if len(equal) == 1 else '>='} {least:.2g}, below {self.alpha:g} "
+                      "would be)")
         return words + "."
 
     def left(self) -> tuple[tuple[str, bool], ...]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pikanid.model import Model
 from pikanid.objective.adequacy import Adequacy
+from pikanid.optimise.box import met
 from pikanid.problem.problem import FreeParameter
 
 
@@ -72,3 +73,9 @@ class EstimateData:
     approximator: Any = None
 
     # --- parameters ------------------------------------------------------------------------------
+
+    @property
+    def at_bound(self) -> np.ndarray:
+        """(n_free,) which parameters ended at a bound: how far they would go is not known."""
+        low, high = (np.array([f.bounds[k] for f in self.free], float) for k in (0, 1))
+        return met(self.theta, low, high)

@@ -41,8 +41,8 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
             recording, count = without_outliers(
                 recording.with_channels(channel), output.name, settings, model.input_names)
             if count:
-                notes.append(f"Recording '{recording.name}': {count} outliers of "
-                             f"'{output.name}' are left out.")
+                what = "1 outlier" if count == 1 else f"{count} outliers"
+                notes.append(f"Recording '{recording.name}': {what} of '{output.name}' left out.")
             again = repeated(recording[output.name].values, settings.rounding)
             if together > 1:
                 recording = recording.with_channels(averaged(recording[output.name], together))

@@ -112,5 +112,7 @@ def _entry(v: Value) -> dict[str, Any]:
 
 def _parameters(estimate: Estimate) -> dict[str, Any]:
     std = np.sqrt(np.diag(estimate.covariance))
-    return {f.label: {"value": float(v), "std": float(s) if np.isfinite(s) else None}
-            for f, v, s in zip(estimate.free, estimate.theta, std, strict=True)}
+    return {f.label: {"value": float(v), "std": float(s) if np.isfinite(s) else None,
+                      "at_bound": bool(ends)}
+            for f, v, s, ends in zip(estimate.free, estimate.theta, std, estimate.at_bound,
+                                     strict=True)}

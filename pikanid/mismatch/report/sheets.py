@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pikanid.estimate import Estimate
 from pikanid.estimate.rounding import rounded
 from pikanid.figures import unit_text
 from pikanid.mismatch.report.findings import DiagnosisData
@@ -29,9 +30,16 @@ def held_out(dx: DiagnosisData) -> Sheet:
 
 def parameters(dx: DiagnosisData) -> Sheet:
     """Of the nominal model, before and after."""
-    before, after = ({f.label: rounded(float(v), float(found.covariance[k, k]) ** 0.5)
-                      for k, (f, v) in enumerate(zip(found.free, found.theta, strict=True))}
-                     for found in (dx.before, dx.after))
+    before, after = (_estimates(found) for found in (dx.before, dx.after))
     return Sheet(("parameter", "before", "after", "unit"), tuple(
         (f.label, before[f.label], after[f.label], unit_text(f.unit) or "-")
         for f in dx.after.free if f.label in before))
+
+
+def _estimates(found: Estimate) -> dict[str, str]:
+    """Each free parameter by its label: with its standard error, or that it ended at a bound."""
+    return {f.label: f"its bound {v:.6g}" if ends
+            else rounded(float(v), float(found.covariance[k, k]) ** 0.5)
+            for k, (f, v, ends) in enumerate(zip(
+                found.free, found.theta, found.at_bound, strict=True))}
+

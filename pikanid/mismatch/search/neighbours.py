@@ -16,6 +16,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.screen import Screen, as_strong
 
 WIDER = (0.3, 1.0, 3.0)  # numerical: of the last parameter of a wider law, where fits of it begin
+LIKE = 0.5  # numerical: share of what a law does, from which on an open shape is tried
 Job = tuple[Sequence[Candidate], Sequence[Start | Mapping[str, float]]]
 
 
@@ -121,6 +122,22 @@ def with_next_sign(h: Hypothesis, candidates: Sequence[Candidate],
                 yield (*_rest(h, effect), other), starts
 
 
+def with_open_shape(h: Hypothesis, candidates: Sequence[Candidate],
+                    fits: Mapping[frozenset[str], Hypothesis]) -> Iterator[Job]:
+    """With an entry's law whose shape is left open in the place of another law of the same
+    equation, if the ideal one does half of what that does: rounded, it may do all of it.
+    """
+    for effect in (e for e in h.effects if e.channel == "dynamics"):
+        rest = h.key - {effect.key}
+        for other in candidates:
+            ideal = other.ids[0] + other.site.suffix
+            known, without = fits.get(rest | {ideal}), fits.get(rest)
+            if (other.refines and other.site.v == effect.site.v and known and without
+                    and not {other.key, ideal} & h.key and known.minimum.chi2 < without.minimum.chi2
+                    - LIKE * (without.minimum.chi2 - h.minimum.chi2)):
+                yield _wider(known, next(e for e in known.effects if e.key == ideal), other, ideal)
+
+
 def with_other_form(h: Hypothesis, candidates: Sequence[Candidate],
                     fits: Mapping[frozenset[str], Hypothesis]) -> Iterator[Job]:
     """With what keeps the name of one of its effects away, if that acts instead, in its place."""
@@ -128,6 +145,7 @@ def with_other_form(h: Hypothesis, candidates: Sequence[Candidate],
     yield from with_cousins(h, candidates)
     yield from with_next_form(h, candidates)
     yield from with_next_sign(h, candidates, fits)
+    yield from with_open_shape(h, candidates, fits)
 
 
 def with_parts(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
