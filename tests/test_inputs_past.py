@@ -135,3 +135,48 @@ def test_a_slow_input_far_from_zero_explains_nothing_by_itself(offset: float) ->
     part = explained(t, y + 0.1 * rng.standard_normal(400),
                      [HeldInput("P", t, heat, "zero"), room], 5, 1e-6)
     assert np.std(part - y) < 0.15 * np.std(y)
+
+
+def oven(seed: int) -> Recording:
+    """A heater switched every 300 s, seen at uneven times: it bends, but never jumps."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.integers(1, 9, 1200)).astype(float)
+    heat = rng.uniform(0.0, 400.0, 20)[np.minimum(t // 300, 19).astype(int)]
+    y = np.empty(len(t))
+    y[0] = 20.0
+    for k, step in enumerate(np.diff(t)):
+        rest = 20.0 + 0.6 * heat[k]
+        y[k + 1] = rest + (y[k] - rest) * np.exp(-step / 40.0)
+    y += 0.4 * rng.standard_normal(len(t))
+    return Recording.from_arrays(t, {"P": heat, "T": y}, {"P": "W", "T": "degC"},
+                                 hold={"P": "zero"})
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_corners_of_a_slow_rig_between_uneven_samples_are_no_outliers(seed: int) -> None:
+    run = oven(seed)
+    assert without_outliers(run, "T", DEFAULTS, ("P",))[1] == 0
+    values = run["T"].values.copy()
+    values[[200, 700]] += (8.0, -8.0)
+    clean, count = without_outliers(
+        run.with_channels(replace(run["T"], values=values)), "T", DEFAULTS, ("P",))
+    assert count == 2 and np.flatnonzero(np.isnan(clean["T"].values)).tolist() == [200, 700]
+
+
+def test_a_mode_that_rings_as_fast_as_it_is_sampled_is_no_outlier() -> None:
+    """After each step of the input, for longer than its past is asked; errors by chance are."""
+    t, u = 0.004 * np.arange(3000), np.repeat(np.random.default_rng(6).uniform(-1, 1, 24), 125)
+    rng, y = np.random.default_rng(7), np.zeros(3000)
+    for k in range(1, 24):
+        since = t[125 * k:] - t[125 * k]
+        y[125 * k:] += (u[125 * k] - u[125 * k - 1]) * np.exp(-20 * since) * np.cos(
+            2 * np.pi * 74 * since)
+    y += 0.01 * rng.standard_normal(3000)
+    run = Recording.from_arrays(t, {"u": u, "p": y}, hold={"u": "zero"})
+    assert without_outliers(run, "p", DEFAULTS, ("u",))[1] == 0
+    plain = 0.01 * rng.standard_normal(3000)
+    bad = rng.choice(3000, 60, replace=False)
+    plain[bad] += rng.choice([-1, 1], 60)
+    run = run.with_channels(replace(run["p"], values=plain))
+    found = np.isnan(without_outliers(run, "p", DEFAULTS, ("u",))[0]["p"].values)
+    assert found[bad].mean() > 0.95 and found.sum() < 64

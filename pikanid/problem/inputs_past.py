@@ -13,12 +13,15 @@ from scipy.special import fdtrc
 
 from pikanid.noise.autoregressive import fit, innovations
 from pikanid.noise.level import NORMAL
+from pikanid.noise.neighbours import LONGEST, neighbour_weights
 from pikanid.noise.projection import orthonormal
 from pikanid.problem.held import HeldInput
 
-GAP = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0  # numerical: by which it is left
 CLIPPED = 3.0  # numerical: standard deviations beyond which a deviation counts as so much only
 SMOOTH = 0.01  # numerical: of an input's spread: gaps below say nothing that a misfit could not
+LEAST = 5  # definition: samples of a neighbourhood
+ALIKE = 1.2  # numerical: times the shortest one that neighbourhoods last on an even grid
+UNEVEN = 0.1  # numerical: share of them that last longer, where samples are lost now and then
 ROUNDS = 10  # numerical: of a fit that gross errors must not lead
 ROWS = 10  # numerical: samples a column from which on those are told from noise
 
@@ -47,8 +50,11 @@ def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[HeldInput], lags: i
     >>> bool(np.ptp(part - y) < 1e-9)
     True
     """
-    X = _past(t, inputs, lags)
     nothing = np.zeros(len(y))
+    if len(y) < LEAST:
+        return nothing
+    weights, lengths = neighbour_weights(t)
+    X, moves = _past(t, inputs, lags, bool(np.mean(lengths > ALIKE * lengths.min()) > UNEVEN))
     if not X.shape[1] or len(y) < ROWS * X.shape[1]:
         return nothing
     own = fit(y - y.mean())
@@ -56,11 +62,14 @@ def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[HeldInput], lags: i
     _, p_value = _robust(innovations(y - y.mean(), own), seen)
     if not p_value < chance:
         return nothing
-    gaps = np.stack([np.convolve(x, GAP, "valid") for x in X.T], axis=1)
-    sharp = gaps.std(axis=0) > SMOOTH * X.std(axis=0)
-    said, _ = _robust(np.convolve(y, GAP, "valid"), gaps[:, sharp])
-    weights = np.linalg.lstsq(gaps[:, sharp], said, rcond=None)[0]
-    return np.asarray((X - X.mean(axis=0))[:, sharp] @ weights)
+    weights /= np.sqrt(np.sum(weights**2, axis=1))[:, None]
+    weights[lengths > LONGEST * np.median(lengths)] = 0.0  # across a gap a motion does anything
+    gaps, gap = (np.einsum("nw,n...w->n...", weights, np.lib.stride_tricks.sliding_window_view(
+        values, 5, axis=0)) for values in (X, y))
+    sharp = gaps.std(axis=0) > SMOOTH * moves
+    said, _ = _robust(gap, gaps[:, sharp])
+    sizes = np.linalg.lstsq(gaps[:, sharp], said, rcond=None)[0]
+    return np.asarray((X - X.mean(axis=0))[:, sharp] @ sizes)
 
 
 def _robust(wanted: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
@@ -79,13 +88,30 @@ def _robust(wanted: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]
     return said, float(fdtrc(k, freedom, float(said @ said) / k * freedom / left)) if k else 1.0
 
 
-def _past(t: np.ndarray, inputs: Sequence[HeldInput], lags: int) -> np.ndarray:
-    """Columns (N, k): every input that moves, one interval ago and more.
+def _past(t: np.ndarray, inputs: Sequence[HeldInput], lags: int, uneven: bool
+          ) -> tuple[np.ndarray, np.ndarray]:
+    """Columns (N, k), and how far each moves in an interval (k,): every input that moves, one
+    interval ago and more; between `uneven` samples its integral as well, which has the corners of
+    a slow rig where they are.  Between even ones the past has them, and the two would be alike.
 
     At the same instant an input may know the output's noise, where a controller drives it.
     """
     step = float(np.median(np.diff(t)))
-    moving = [u for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0]
-    columns = [x for u in moving for k in range(1, lags + 1)
-               if np.ptp(x := u.at(t, k * step)) > 0]
-    return np.stack(columns, axis=1) if columns else np.empty((len(t), 0))
+    columns, moves = [np.empty((len(t), 0))], [np.empty(0)]
+    for u in (u for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0):
+        own = np.stack([u.at(t, k * step) for k in range(1, lags + 1)], axis=1)
+        own = own[:, np.ptp(own, axis=0) > 0]
+        columns.append(own)
+        moves.append(own.std(axis=0))
+        if uneven:
+            columns.append(_integral(u, t)[:, None])
+            moves.append(np.array([step * float(np.std(u.values))]))
+    return np.concatenate(columns, axis=1), np.concatenate(moves)
+
+
+def _integral(u: HeldInput, t: np.ndarray) -> np.ndarray:
+    """(N,) from the first of the times t (N,)."""
+    every = np.union1d(t, u.time[(u.time > t[0]) & (u.time < t[-1])])
+    middle = 0.5 * (every[1:] + every[:-1])
+    whole = np.concatenate([[0.0], np.cumsum(u.at(middle) * np.diff(every))])
+    return np.asarray(whole[np.searchsorted(every, t)])

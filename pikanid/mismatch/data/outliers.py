@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import binom
 
 from pikanid import errors
 from pikanid.mismatch.data.whitened import Records
@@ -23,6 +24,8 @@ from pikanid.recording import Recording
 
 MOST, NORMAL = 0.9, 1.645  # definition: a probability, and what normal noise stays below by it
 UNEVEN = 0.1  # numerical: share of neighbourhoods whose middle sample does not weigh most
+NEAR = 10  # numerical: samples, within which errors that happen by chance seldom follow another
+BY_CHANCE = 1e-3  # limit: that errors lie so closely
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
@@ -31,7 +34,8 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
     """The recording without samples that leave the cubic through their neighbours, where they lie
     in time, and how many.
 
-    The worst goes first: beside a spike its neighbours look bad as well.
+    The worst goes first: beside a spike its neighbours look bad as well.  None goes where they
+    cluster.
     """
     channel, noise = recording[output], settings.noise
     seen = np.flatnonzero(np.isfinite(channel.values))
@@ -70,11 +74,20 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
         y[j] -= error
         for near in range(max(j - 4, 0), min(j + 1, len(gap))):
             gap[near] = weights[near] @ y[near:near + 5]
-    if not bad or len(bad) > noise.most_outliers * len(y):
+    if not bad or len(bad) > noise.most_outliers * len(y) or _cluster(bad, len(y)):
         return recording, 0
     values = channel.values.copy()
     values[seen[bad]] = np.nan
     return recording.with_channels(replace(channel, values=values)), len(bad)
+
+
+def _cluster(bad: Sequence[int], count: int) -> bool:
+    """Whether samples, of so many, are closer together than errors that happen by chance would be:
+    a motion that is faster than its sampling shows, as it rings after a step, follows none.
+    """
+    gaps = np.diff(np.sort(bad))
+    near = 1.0 - (1.0 - len(bad) / count) ** NEAR
+    return bool(binom.sf(np.sum(gaps <= NEAR) - 1, len(gaps), near) < BY_CHANCE)
 
 
 def _error_of(j: int, weights: np.ndarray, gap: np.ndarray) -> tuple[int, float, float]:
