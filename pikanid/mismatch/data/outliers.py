@@ -81,11 +81,13 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
     return recording.with_channels(replace(channel, values=values)), len(bad)
 
 
-def _cluster(bad: Sequence[int], count: int) -> bool:
+def _cluster(bad: Sequence[int] | np.ndarray, count: int) -> bool:
     """Whether samples, of so many, are closer together than errors that happen by chance would be:
     a motion that is faster than its sampling shows, as it rings after a step, follows none.
     """
     gaps = np.diff(np.sort(bad))
+    if len(gaps) == 0:
+        return False
     near = 1.0 - (1.0 - len(bad) / count) ** NEAR
     return bool(binom.sf(np.sum(gaps <= NEAR) - 1, len(gaps), near) < BY_CHANCE)
 
@@ -144,7 +146,8 @@ def with_humps(residual: np.ndarray, kept: np.ndarray, together: int) -> np.ndar
 
 def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np.ndarray]],
                  inputs: Sequence[str] = ()) -> tuple[Records, int]:
-    """Records without the samples that are alone in residuals, and how many.
+    """Records without the samples that are alone in residuals, and how many; of a residual where
+    they cluster none.
 
     Args:
         records: Any.
@@ -160,10 +163,10 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
                 len(kept) > (1 - noise.most_outliers) * len(t)):
             kept = kept[~bad]
         kept = with_humps(residual, kept, noise.together)
-        if len(kept) < len(t):
+        gone = np.setdiff1d(np.arange(len(t)), kept)
+        if len(gone) and not _cluster(gone, len(t)):
             channel = recordings[r][name]
-            gone = np.isin(channel.time, np.delete(t, kept))
-            recordings[r] = recordings[r].with_channels(replace(
-                channel, values=np.where(gone, np.nan, channel.values)))
-            count += len(t) - len(kept)
+            recordings[r] = recordings[r].with_channels(replace(channel, values=np.where(
+                np.isin(channel.time, t[gone]), np.nan, channel.values)))
+            count += len(gone)
     return replace(records, recordings=tuple(recordings)), count

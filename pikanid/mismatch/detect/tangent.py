@@ -232,6 +232,7 @@ class Tangent:
 
         h = np.diff(self.t)
         A = np.stack([fx for fx, _ in self.thirds])
+        A = np.where(np.isfinite(A), A, 0.0)  # beyond all numbers nothing follows of a motion
         every = max(len(h) // 50, 1)
         few = h[::every, None, None] * A[0, ::every]
         fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))

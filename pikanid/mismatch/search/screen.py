@@ -103,7 +103,9 @@ def _taken(about: Hypothesis, D: np.ndarray) -> np.ndarray:
     norms = np.linalg.norm(M, axis=0)
     norms[norms < UNSEEN] = np.inf
     wanted = np.vstack([D, np.zeros((len(M) - len(D), D.shape[1]))])
-    return np.asarray(np.linalg.lstsq(M / norms, wanted, SPANNED)[0] / norms[:, None])
+    with np.errstate(over="ignore"):
+        found = np.linalg.lstsq(M / norms, wanted, SPANNED)[0] / norms[:, None]
+    return np.where(np.isfinite(found), found, 0.0)  # beyond all numbers there is no way to go
 
 
 class Screen:
