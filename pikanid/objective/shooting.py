@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from pikanid import errors
 from pikanid.noise.level import difference_noise
 from pikanid.objective.adequacy import Adequacy, judge
 from pikanid.objective.settings import USUAL, AdequacySettings
@@ -15,6 +16,7 @@ from pikanid.problem.problem import Problem, Samples
 from pikanid.simulation.simulator import MethodChoice, Response, Simulator, Steps
 
 Accuracy = Literal["coarse", "fine"]
+AWAY = 10.0  # limit: ranges of an output that a simulation may miss it by before it is lost
 HURRY = 16.0  # limit: how many times shorter steps another start may take
 REFUSED = 1e10  # numerical: residuals of a trajectory that cannot be finished
 
@@ -57,7 +59,7 @@ class Shooting:
         output has a tolerance of its own, in its own unit.  Coarse steps may be `passed`: none but
         the finer ones that follow from them are used.
         """
-        old, self.steps = self.steps, []
+        old, new = self.steps, list[Steps]()
         for r, simulator in enumerate(self.simulators):
             p = self.problem.parameters(theta, r)
             scale, coarse = self._tolerances[r]
@@ -70,9 +72,9 @@ class Shooting:
                 # half of what is passed is often fine
                 return self._trial(theta, r, steps, likely != passed)
 
-            self.steps.append(
+            new.append(
                 simulator.choose_steps(p, tolerance, method, known, finest, trial, scale))
-        self._at = b""
+        self._at, self.steps = b"", new
         return [(s.method, s.longest) for s in old] != [
             (s.method, s.longest) for s in self.steps]
 
@@ -168,6 +170,16 @@ class Shooting:
             row += len(d)
         return judge(own, self.known, self.data, len(theta), self.settings,
                      self.times)
+
+    def runs_away(self, theta: np.ndarray) -> bool:
+        """Whether a simulation at θ leaves the finite numbers, or what was measured far behind."""
+        try:
+            self.choose_steps(theta, "coarse")
+        except errors.SimulationFailed:
+            return True
+        left = self.residual(theta) / self.weights
+        own = np.concatenate([np.full(len(d), np.ptp(d)) for d in self.data if len(d)])
+        return bool(np.max(np.abs(left) / np.maximum(own, 1e-300), initial=0.0) > AWAY)
 
     def undefined(self, theta: np.ndarray) -> str:
         """Where a recording begins with a rate that is no number, in words; empty where none does.

@@ -175,7 +175,9 @@ class Problem:
             owners: Sequence[int | None] = (
                 [None] if p.scope == "shared" else range(len(self.experiments)))
             if p.free:
-                free += [FreeParameter(p.name, r, p.value, p.bounds, p.unit) for r in owners]
+                free += [FreeParameter(p.name, r, p.value if r is None else
+                                       self.recordings[r].begins.get(p.name, p.value),
+                                       p.bounds, p.unit) for r in owners]
         return tuple(free)
 
     @property

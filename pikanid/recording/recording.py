@@ -34,6 +34,8 @@ class Recording(Entering):
             raises that sentence.
         began: POSIX time [s] of t = 0, where the file tells it.
         others: What else its file holds, for messages.
+        begins: Guesses of parameters that a model estimates for each recording, by name, in the
+            model's units: those of an initial state, where the samples tell it.
 
     >>> rec = Recording.from_arrays([0.0, 0.1, 0.2], {"theta": [0.0, 1.0, 0.5]}, {"theta": "deg"})
     >>> rec["theta"].unit, rec.names, rec.stop
@@ -46,6 +48,7 @@ class Recording(Entering):
     unreadable: Mapping[str, str] = field(default_factory=dict)
     began: float | None = None
     others: tuple[str, ...] = ()
+    begins: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         given: object = self.channels
@@ -57,6 +60,7 @@ class Recording(Entering):
             raise errors.BadRecording(errors.no_channels(self.name))
         object.__setattr__(self, "channels", MappingProxyType(channels))
         object.__setattr__(self, "unreadable", MappingProxyType(dict(self.unreadable)))
+        object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))
         object.__setattr__(self, "notes", tuple(self.notes))
 
     @classmethod
@@ -129,7 +133,7 @@ class Recording(Entering):
     def __reduce__(self) -> tuple[type[Recording], tuple[object, ...]]:
         # A read-only mapping cannot be sent to another process; what it shows can.
         return Recording, (dict(self.channels), self.name, self.notes, dict(self.unreadable),
-                           self.began, self.others)
+                           self.began, self.others, dict(self.begins))
 
     @property
     def t(self) -> Array:

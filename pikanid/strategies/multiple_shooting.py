@@ -20,6 +20,7 @@ from pikanid.objective.shooting import Shooting
 from pikanid.optimise.minpack import minimise
 from pikanid.problem.problem import Experiment, Problem, Samples
 from pikanid.simulation.simulator import Simulator, Steps
+from pikanid.strategies.nodes import state_near
 
 CLOSING = (1.0, 10.0, 100.0)  # numerical: weights of the gaps, relative to a typical sample's
 
@@ -89,26 +90,10 @@ def _cut(problem: Problem, model: Model, count: int) -> tuple[list[Segment], np.
                 firsts[:-1], masks, strict=True)])
             node = None if k == 0 else len(nodes)
             if k:
-                nodes.append(_node(problem.model, e, low))
+                nodes.append(state_near(problem.model, e, low)[0])
             segments.append(Segment(Simulator(owner, piece), rows, r, node))
         offset = int(firsts[-1])
     return segments, np.array(nodes).reshape(len(nodes), len(model.states))
-
-
-def _node(model: Model, e: Experiment, t: float) -> np.ndarray:
-    """A first guess of the state at time t from the samples around it."""
-    known = e.initial(np.array(list(model.values.values()))).copy()
-    for s in e.samples:
-        expr = model.outputs[s.output].expression
-        near = np.argsort(np.abs(s.t - t))[:11]
-        if not expr.is_Symbol or expr.name not in model.state_names or len(near) < 5:
-            continue
-        cubic = np.polynomial.Polynomial.fit(s.t[near] - t, s.y[near], 3)
-        known[model.state_names.index(expr.name)] = cubic(0.0)
-        slope = model.equations[expr.name]
-        if slope.is_Symbol and slope.name in model.state_names:
-            known[model.state_names.index(slope.name)] = cubic.deriv()(0.0)
-    return known
 
 
 class _Residuals:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -26,6 +27,7 @@ from pikanid.optimise.shooting_fit import fit_shooting
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.settings import changed
+from pikanid.strategies import segments
 from pikanid.strategies.finish import finish
 from pikanid.strategies.multiple_shooting import multiple_shooting
 from pikanid.strategies.starts import starting_points
@@ -84,7 +86,10 @@ class NLS:
             SimulationFailed: No starting point can be simulated.
         """
         begun = time.perf_counter()
-        problem = Problem(model, recordings)
+        return self._fit(Problem(model, recordings), begun, whole=True)
+
+    def _fit(self, problem: Problem, begun: float, whole: bool = False) -> Estimate:
+        """From the problem's guess on; `whole` recordings are cut where they cannot be followed."""
         shooting = Shooting(problem, self.method, self.adequacy)
         history: list[dict[str, float]] = []
         best: Optimum | None = None
@@ -92,7 +97,14 @@ class NLS:
         starts = starting_points(problem, self.starts, self.protocol, self.seed, self.extra)
         content = self.starts == "auto" and self.protocol == "default"
         for k, start in enumerate(starts):
-            found = self.one_start(shooting, start)
+            away = whole and k == 0 and shooting.runs_away(start)
+            found = None if away else self.one_start(shooting, start)
+            if whole and k == 0 and (found is None or not shooting.explains(found.theta)):
+                grown = segments.growth(problem, problem.guess)
+                if any(grown):
+                    return segments.fit_in_segments(
+                        problem, grown, partial(replace(self, starts=1)._fit, begun=begun))
+                found = self.one_start(shooting, start) if away else found
             if found is None:
                 continue
             history.append({"start": float(k), "cost": found.cost,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from pikanid.mismatch.detect.residual_tests import (
     unit_columns,
 )
 from pikanid.mismatch.detect.tangent import directions
+from pikanid.problem.problem import Samples
 
 
 def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
@@ -58,20 +60,59 @@ def lines(whitened: Whitened, rate: float, more: int,
     asks = whitened.settings.detection
     blocks: list[list[np.ndarray]] = []
     pasts: list[np.ndarray] = []
-    for experiment in whitened.problem.experiments:
-        held = [(h.time, h.values) for h in experiment.held if len(h.time) > 1]
-        for s in experiment.samples:
-            blocks.append(frequency_bands(s.t, rate, asks))
-            pasts.append(past_inputs(s.t, held, rate, asks))
-    count = min(len(b) for b in blocks)
-    bands = [short(_stacked([b[k] for b in blocks], more)) for k in range(count)]
-    return bands, short(_stacked(pasts, more))
+    rows = _rows(whitened)
+    for stretch, _ in rows:
+        t = np.concatenate([s.t for s in stretch.samples])
+        blocks.append(frequency_bands(t, rate, asks))
+        pasts.append(past_inputs(t, stretch.held, rate, asks))
+    count, total = min(len(b) for b in blocks), whitened.rows + more
+    where = [own for _, own in rows]
+    bands = [short(_scattered([b[k] for b in blocks], where, total)) for k in range(count)]
+    return bands, short(_scattered(pasts, where, total))
 
 
-def _stacked(blocks: list[np.ndarray], more: int) -> np.ndarray:
-    from scipy.linalg import block_diag
+@dataclass
+class _Stretch:
+    """What is seen of an output without a break, and the inputs' times and values: segments that a
+    recording was cut into are one.
+    """
 
-    return _above(block_diag(*blocks), more)
+    samples: list[Samples]
+    held: list[tuple[np.ndarray, np.ndarray]]
+
+
+def _rows(whitened: Whitened) -> list[tuple[_Stretch, np.ndarray]]:
+    """Each stretch of an output, and its rows."""
+    problem = whitened.problem
+    found: list[tuple[_Stretch, list[np.ndarray]]] = []
+    row, ended, before, current = 0, -np.inf, "", dict[int, int]()
+    for recording, e in zip(problem.recordings, problem.experiments, strict=True):
+        if not (recording.begins and e.name == before and e.t0 >= ended):
+            current = {}
+        held = [(h.time, h.values) for h in e.held if len(h.time) > 1]
+        for s in e.samples:
+            own = np.arange(row, row := row + len(s.t))
+            if s.output not in current:
+                current[s.output] = len(found)
+                found.append((_Stretch([s], held), [own]))
+                continue
+            stretch, rows = found[current[s.output]]
+            stretch.samples.append(s)
+            rows.append(own)
+            stretch.held = [(np.append(t, later), np.append(v, more)) for (t, v), (later, more)
+                            in zip(stretch.held, held, strict=True)]
+        ended, before = e.t0, e.name
+    return [(stretch, np.concatenate(rows)) for stretch, rows in found]
+
+
+def _scattered(blocks: list[np.ndarray], where: list[np.ndarray], rows: int) -> np.ndarray:
+    """Columns (rows, K) of blocks (N, k) that stand in rows (N,) of their own."""
+    placed = np.zeros((rows, sum(b.shape[1] for b in blocks)))
+    column = 0
+    for block, own in zip(blocks, where, strict=True):
+        placed[own, column:column + block.shape[1]] = block
+        column += block.shape[1]
+    return placed
 
 
 def _above(rows: np.ndarray, more: int) -> np.ndarray:

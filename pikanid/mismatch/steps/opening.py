@@ -15,6 +15,7 @@ from pikanid.mismatch.catalogue.bound_effects import (
 )
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.data.pieces import in_pieces
 from pikanid.mismatch.data.preparation import (
     beginnings,
     check_freedom,
@@ -104,7 +105,12 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
             held, proves = None, False
             excuse = (f"the held-out recording has {count} usable samples, and at least {needed} "
                       "are needed to confirm anything")
-    again = repeats(nominal, records, held if proves else None)
+    again = None
+    if before.settings["segments"] > 1:
+        nominal, records, held = in_pieces(before, records, held, nls)
+        notes.append(next(w for w in before.warnings if "segments" in w))
+    else:
+        again = repeats(nominal, records, held if proves else None)
     if again is not None:
         notes += again.notes
         records = records.with_levels(again.levels)
@@ -114,7 +120,8 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     own = bound_to(effects, found, records.recordings, motion)
     found = reserved(found, own)
     listed = catalogue_of(found, own)
-    records = replace(records, guess={n: model.parameter(n).value for n in model.free_names})
+    records = replace(records, guess={
+        n: model.parameter(n).value for n in model.free_names if n in nominal.free_names})
     search = Search(nominal, records, listed, tell)
     base = search.base()
     alone = tuple(c for c in listed if c.suits())
