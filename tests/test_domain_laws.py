@@ -79,6 +79,18 @@ def test_a_load_of_constant_power_is_told_from_a_rounded_dry_one(
     assert named(FILTER, filtered(lost, 1), filtered(lost, 2)) == {wanted}
 
 
+def test_a_coil_whose_core_saturates() -> None:
+    def run(seed: int) -> pk.Recording:
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.uniform(-12, 12, 40), 10)
+        return recording(lambda _, x, u: [
+            (u - 0.7 * x[0] - x[1]) / 1.5e-3 * (1.0 + (x[0] / 5.0) ** 2),
+            (x[0] - 0.08 * x[1]) / 2.5e-4], [0.0, 0.0], 2e-4 * np.arange(400), u, ["i", "v"], 0.02,
+            seed, {"u": "V", "v": "V", "i": "A"})
+
+    assert named(FILTER, run(1), run(2)) == {"saturation"}
+
+
 def test_cells_that_grow_after_a_lag() -> None:
     def run(seed: int, s_0: float) -> pk.Recording:
         t = 3600.0 * np.linspace(0.0, 14.0, 60)

@@ -13,6 +13,7 @@ from pikanid.comparison.predictions import BASELINE, Prediction, Protocol
 from pikanid.comparison.residual_analysis import ResidualAnalysis
 from pikanid.comparison.scores import Score
 from pikanid.figures import unit_text
+from pikanid.pieces.sentences import enumerated
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -81,11 +82,11 @@ class Validation:
         if first == BASELINE:
             words = f"No model beats the linear baseline: best is '{first}'"
         if beaten:
-            words += f", significantly better than {_and(beaten)}"
+            words += f", significantly better than {_quoted(beaten)}"
         if equal:
             least = min((p.p_value for p in self.pairs if p.better == first and p.worse in equal),
                         default=1.0)
-            words += (f"{';' if beaten else ','} its lead over {_and(equal)} is not significant "
+            words += (f"{';' if beaten else ','} its lead over {_quoted(equal)} is not significant "
                       f"(p {'=' if len(equal) == 1 else '>='} {least:.2g}, below {self.alpha:g} "
                       "would be)")
         return words + "."
@@ -163,6 +164,5 @@ class Validation:
                 f"{tabled(Sheet(*self.rows(), NUMBERS))}{notes}")
 
 
-def _and(names: list[str]) -> str:
-    quoted = [f"'{n}'" for n in names]
-    return quoted[0] if len(quoted) == 1 else ", ".join(quoted[:-1]) + f" and {quoted[-1]}"
+def _quoted(names: list[str]) -> str:
+    return enumerated([f"'{name}'" for name in names])

@@ -16,7 +16,7 @@ from pikanid.model.lookup import Lookup
 # volts as well; nor does a length, which may be a level or a place.
 STATES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l"), ("l",)),
-    "electrical": (("A",), ("V",)), "hydraulics": (("Pa",), ("l", "l/s"))}
+    "electrical": (("A",), ("V", "C")), "hydraulics": (("Pa",), ("l", "l/s"))}
 
 
 def catalogues_of(model: Lookup) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from pikanid.optimise.box import met
 from pikanid.optimise.propagation import propagated
 from pikanid.problem.problem import Problem
 from pikanid.storage.version import __version__
+from pikanid.strategies.segments import growth
 from pikanid.uncertainty.information import Directions, undetermined_warnings
 from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 
@@ -45,14 +46,20 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     for f, stuck in zip(problem.free, at_bound, strict=True):
         if stuck:
             notes.append(f"'{f.label}' ended at its bound; its standard error is not known.")
-    if adequacy.verdict == "misfit":
+    grown = max(growth(problem, theta)) if adequacy.verdict == "misfit" else 0.0
+    if grown:
+        notes.append(f"The plant is unstable: errors grow by e^{grown:.0f} along the recording, "
+                     "which no simulation from one start follows. So neither the verdict nor the "
+                     "standard errors say anything of these estimates; NLS follows it in segments.")
+    elif adequacy.verdict == "misfit":
         notes.append("The model, simulated at these estimates, does not explain the recording: "
                      "they are biased or make up for missing physics, and standard errors mean "
                      "little.")
     # what a bound holds may be what nothing else determines
     whole = Directions.of(jacobian, np.ones(len(theta), bool)) if at_bound.any() else shown
-    notes += whole.warnings(problem.free, uncertainty)
-    notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
+    if not grown:
+        notes += whole.warnings(problem.free, uncertainty)
+        notes += undetermined_warnings(problem.free, theta, cov, uncertainty)
     held = [e.held for e in problem.experiments for _ in e.samples]
     notes += filter(None, map(outlying_warning, fits, held))
     notes += filter(None, map(loose_warning, fits))

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import binom
 
 from pikanid import errors
+from pikanid.mismatch.data.stretches import as_one, stretches
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
@@ -155,8 +156,13 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
         inputs: Of the model.
     """
     recordings, count, noise = list(records.recordings), 0, records.settings.noise
-    for r, name, t, left in seen:
-        residual = left - from_inputs(recordings[r], t, left, inputs, records.settings)
+    of = {(r, name): (t, left) for r, name, t, left in seen}
+    names = list(dict.fromkeys(name for _, name in of))
+    for own, name in ((own, name) for own in stretches(recordings) for name in names):
+        t, left = (np.concatenate([of[r, name][k] for r in own if (r, name) in of] or [np.empty(0)])
+                   for k in (0, 1))
+        residual = left - from_inputs(
+            as_one([recordings[r] for r in own]), t, left, inputs, records.settings)
         kept = np.arange(len(t))
         # two that are neighbours hide each other: the second shows when the first has gone
         while (bad := lone(residual[kept], noise)).any() and (
@@ -165,8 +171,9 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
         kept = with_humps(residual, kept, noise.together)
         gone = np.setdiff1d(np.arange(len(t)), kept)
         if len(gone) and not _cluster(gone, len(t)):
-            channel = recordings[r][name]
-            recordings[r] = recordings[r].with_channels(replace(channel, values=np.where(
-                np.isin(channel.time, t[gone]), np.nan, channel.values)))
+            for r in own:
+                channel = recordings[r][name]
+                recordings[r] = recordings[r].with_channels(replace(channel, values=np.where(
+                    np.isin(channel.time, t[gone]), np.nan, channel.values)))
             count += len(gone)
     return replace(records, recordings=tuple(recordings)), count

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.data.stretches import stretches
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import (
     Detection,
@@ -84,25 +85,21 @@ class _Stretch:
 def _rows(whitened: Whitened) -> list[tuple[_Stretch, np.ndarray]]:
     """Each stretch of an output, and its rows."""
     problem = whitened.problem
-    found: list[tuple[_Stretch, list[np.ndarray]]] = []
-    row, ended, before, current = 0, -np.inf, "", dict[int, int]()
-    for recording, e in zip(problem.recordings, problem.experiments, strict=True):
-        if not (recording.begins and e.name == before and e.t0 >= ended):
-            current = {}
-        held = [(h.time, h.values) for h in e.held if len(h.time) > 1]
-        for s in e.samples:
-            own = np.arange(row, row := row + len(s.t))
-            if s.output not in current:
-                current[s.output] = len(found)
-                found.append((_Stretch([s], held), [own]))
-                continue
-            stretch, rows = found[current[s.output]]
-            stretch.samples.append(s)
-            rows.append(own)
-            stretch.held = [(np.append(t, later), np.append(v, more)) for (t, v), (later, more)
-                            in zip(stretch.held, held, strict=True)]
-        ended, before = e.t0, e.name
-    return [(stretch, np.concatenate(rows)) for stretch, rows in found]
+    firsts = np.cumsum([0, *(len(s.t) for e in problem.experiments for s in e.samples)])
+    at = iter(firsts.tolist())
+    begin = [[next(at) for _ in e.samples] for e in problem.experiments]
+    found = []
+    for own in stretches(problem.recordings):
+        pieces = [problem.experiments[r] for r in own]
+        held = [(np.concatenate([h.time for h in same]), np.concatenate([h.values for h in same]))
+                for same in zip(*(e.held for e in pieces), strict=True)]
+        for k in range(len(pieces[0].samples)):
+            samples = [e.samples[k] for e in pieces]
+            rows = [np.arange(begin[r][k], begin[r][k] + len(s.t))
+                    for r, s in zip(own, samples, strict=True)]
+            found.append((_Stretch(samples, [h for h in held if len(h[0]) > 1]),
+                          np.concatenate(rows)))
+    return found
 
 
 def _scattered(blocks: list[np.ndarray], where: list[np.ndarray], rows: int) -> np.ndarray:

@@ -18,8 +18,10 @@ from pikanid.mismatch.judge.verdict import Verdict
 from pikanid.mismatch.report.part import SHOWN, Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
+from pikanid.pieces.sentences import enumerated
 from pikanid.pieces.time_unit import spans
 
+UNLIKELY = 0.05  # layout: probability below which a guess is no answer
 TOLD = 3  # layout: explanations in the sentence; all of them stand below it
 
 
@@ -58,7 +60,7 @@ class Explanation:
     @property
     def title(self) -> str:
         """In words."""
-        return listed([e.name for e in self.effects] or ["nothing"])
+        return enumerated([e.name for e in self.effects] or ["nothing"])
 
 
 @dataclass(frozen=True)
@@ -258,10 +260,12 @@ class DiagnosisData:
         if self.verdict == "partial" and self.remainder is not None:
             more = ", and something else" if self.remainder.p_value < self.settings.adequate else ""
             sure = sorted(self.present, key=lambda p: bool(p.or_family))
-            return head + f"surely {listed([p.title for p in sure])}{more}. " \
+            return head + f"surely {enumerated([p.title for p in sure])}{more}. " \
                 f"{self.remainder.sentence()}."
         if self.verdict == "unconfirmed":
-            return head + f"perhaps {_first(titles)}, not confirmed" + (
+            likely = self.hypotheses[0].probability >= UNLIKELY
+            return head + ("" if likely else "nothing in the catalogue explains it; closest comes "
+                           ) + f"{'perhaps ' * likely}{_first(titles)}, not confirmed" + (
                 f": {self.doubt}." if self.doubt else " on other data.")
         return head + "nothing in the catalogue explains it."
 
@@ -270,27 +274,18 @@ class DiagnosisData:
         effects, met = self.hypotheses[0].effects, "on the held-out recording"
         later = self.held_out.not_met if self.held_out else ()
         if once := [e.name for e in effects if e.once]:
-            return f"{met}, {listed(once)} as what happened once" if len(once) < len(effects) else (
-                f"as what happened once, and not {met}, which is predicted without it")
+            if len(once) == len(effects):
+                return f"as what happened once, and not {met}, which is predicted without it"
+            return f"{met}, {enumerated(once)} as what happened once"
         again = "where the recording meets it again: the held-out one does not"
         return met if not later else again if len(later) == len(effects) else (
-            f"{met}, and {listed(later)} {again}")
+            f"{met}, and {enumerated(later)} {again}")
 
 
 def _first(titles: Sequence[str]) -> str:
     more = len(titles) - TOLD
     others = [f"one of {more} other explanations"] if more > 1 else titles[TOLD:]
     return "; or ".join([*titles[:TOLD], *others])
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names in a sentence.
-
-    >>> listed(["drag", "a delay", "a tilt"])
-    'drag, a delay and a tilt'
-    """
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def titles_apart(given: Sequence[Explanation]) -> list[str]:

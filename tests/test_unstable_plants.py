@@ -1,0 +1,123 @@
+"""Plants that a controller holds where they would not stay: followed in segments."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import pikanid as pk
+from pikanid.mismatch.data.stretches import as_one, stretches
+from pikanid.model import Model, systems
+from pikanid.problem.problem import Problem
+from pikanid.strategies.segments import growth, in_segments
+
+K, M, G = 6.5e-5, 0.068, 9.81
+
+# A ball below a magnet: it falls, or jumps there
+MAGLEV: dict[str, Any] = {
+    "name": "magnetic levitation",
+    "states": {"z": {"unit": "m", "initial": "z_0"}, "v": {"unit": "m/s", "initial": 0.0}},
+    "inputs": {"i": {"unit": "A", "hold": "zero"}},
+    "parameters": {"C": {"unit": "N*m^2/A^2", "guess": 6e-5, "bounds": [1e-6, 1e-3]},
+                   "z_0": {"unit": "m", "guess": 0.01, "scope": "recording"},
+                   "m": {"unit": "kg", "value": M}, "g": {"unit": "m/s^2", "value": G}},
+    "equations": {"z": "v", "v": "g - C/m*(i/z)**2"},
+    "outputs": {"z": {"unit": "m", "expression": "z"}}}
+SIGMA = 2e-5  # m
+
+
+def levitated(seed: int, seconds: float = 4.0, drag: float = 0.0) -> pk.Recording:
+    """Held by a controller about set points of 7.5 to 12.5 mm, at 500 Hz; `drag` in N s/m."""
+    rng = np.random.default_rng(seed)
+    count, step = round(500 * seconds), 0.002
+    wanted = np.repeat(rng.uniform(0.0075, 0.0125, count // 200 + 1), 200)[:count]
+    x, seen, current = np.array([0.01, 0.0]), np.empty(count), np.empty(count)
+    rest = 0.01 * np.sqrt(M * G / K)
+    for k in range(count):
+        seen[k] = x[0]
+        current[k] = np.clip(rest + 520 * (x[0] - wanted[k]) + 14 * x[1]
+                             + 0.05 * rest * np.sin(20 * k * step), 0.05, 5 * rest)
+        x = solve_ivp(lambda _, x, i: [x[1], G - K / M * (i / x[0]) ** 2 - drag / M * x[1]],
+                      (0.0, step), x, "DOP853", args=(current[k],), rtol=1e-9,
+                      atol=1e-12).y[:, -1]
+    t = step * np.arange(count)
+    return pk.Recording.from_arrays(t, {"i": current, "z": seen + SIGMA * rng.standard_normal(
+        count)}, units={"i": "A", "z": "m"}, hold={"i": "zero"}, name=f"run {seed}")
+
+
+@pytest.fixture(scope="module")
+def run() -> pk.Recording:
+    return levitated(1)
+
+
+def test_errors_grow_as_the_linearised_plant_says(run: pk.Recording) -> None:
+    """By sqrt(2 g/z) about rest at z: 44 /s at 10 mm."""
+    problem = Problem(Model.from_dict(MAGLEV), run)
+    grown, = growth(problem, problem.guess)
+    rates = np.sqrt(2 * G / run["z"].values)
+    assert grown == pytest.approx(float(rates.mean()) * 4.0, rel=0.1)
+
+
+def test_a_stable_rig_and_a_chaotic_one_are_followed_in_one_go() -> None:
+    for model, drive in ((systems.sloshing(), pk.excitation.two_pulse()),
+                         (systems.pendulum(), None)):
+        recording = pk.simulate(model, drive or pk.Recording.from_arrays(
+            np.linspace(0, 60, 1200), {"none": np.zeros(1200)}), sigma=1e-3, seed=0)
+        problem = Problem(model, recording)
+        assert growth(problem, problem.guess) == (0.0,)
+
+
+@pytest.mark.parametrize("guess", [5.5e-5, 6e-5, 7.5e-5])
+def test_nls_finds_the_force_of_a_magnet(run: pk.Recording, guess: float) -> None:
+    """In one go a fit ends at C = 0.00015, with a residual of metres."""
+    model = Model.from_dict(MAGLEV).with_values(C=guess)
+    found = pk.NLS().fit(model, run)
+    assert abs(found.value("C") - K) < 4 * found.std("C") < 4e-3 * K
+    assert found.ok and found.rmse == pytest.approx(SIGMA, rel=0.08)
+    assert [f.label for f in found.free] == ["C", "z_0[0]"]
+    assert "unstable" in found.warnings[0] and found.settings["segments"] > 10
+    assert len(found.fits) == 1 and len(found.fits[0].t) == len(run.t)
+    assert found.model.parameter_names == model.parameter_names
+
+
+def test_several_recordings_are_cut_each(run: pk.Recording) -> None:
+    found = pk.NLS().fit(Model.from_dict(MAGLEV), [run, levitated(2, 2.0)])
+    assert abs(found.value("C") - K) < 4 * found.std("C")
+    assert [f.label for f in found.free] == ["C", "z_0[0]", "z_0[1]"]
+    assert [(f.recording, len(f.t)) for f in found.fits] == [("run 1", 2000), ("run 2", 1000)]
+
+
+def test_segments_hold_every_sample_once_and_the_input_from_their_start(run: pk.Recording) -> None:
+    problem = Problem(Model.from_dict(MAGLEV), run)
+    pieces, owners = in_segments(problem, growth(problem, problem.guess), 2.0)
+    assert set(owners) == {0} and len(pieces) > 50
+    assert stretches(pieces) == [list(range(len(pieces)))]
+    whole = as_one(pieces)
+    np.testing.assert_array_equal(whole["z"].values, run["z"].values)
+    for piece in pieces:
+        assert piece["i"].time[0] <= piece["z"].time[0]
+        at = np.searchsorted(run.t, piece["i"].time[0], "right") - 1
+        assert piece["i"].values[0] == run["i"].values[at]
+
+
+@pytest.mark.slow
+def test_what_an_unstable_plant_lacks_is_named(run: pk.Recording) -> None:
+    """And nothing where nothing is."""
+    model = Model.from_dict(MAGLEV)
+    assert pk.diagnose(model, run, levitated(2), workers=1).verdict == "none"
+    found = pk.diagnose(model, levitated(3, drag=0.5), levitated(4, drag=0.5), workers=1)
+    assert found.verdict == "named", str(found)
+    effect, = found.hypotheses[0].effects
+    assert "linear_drag" in effect.ids
+    value, = effect.parameters.values()
+    assert abs(value.value - 0.5 / M) < 4 * value.std
+
+
+def test_what_a_simulation_in_one_go_cannot_judge_is_said(run: pk.Recording) -> None:
+    found = pk.IPDA().fit(Model.from_dict(MAGLEV), run)
+    assert found.value("C") == pytest.approx(K, rel=5e-3)
+    assert any("NLS follows it in segments" in w for w in found.warnings)
+    assert not any("do not determine" in w for w in found.warnings)
