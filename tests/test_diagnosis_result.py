@@ -35,7 +35,8 @@ def explanation(name: str, expression: str, probability: float = 0.5) -> Explana
 
 
 def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:
-    nothing = cast(Estimate, SimpleNamespace(model=sloshing(), free=(), theta=(), covariance=()))
+    nothing = cast(Estimate, SimpleNamespace(
+        model=sloshing(), free=(), theta=(), covariance=(), at_bound=()))
     return Diagnosis(verdict, 1e-9, DEFAULTS, Where(("dynamics",), "v", (), (), None), given, (),
                      nothing, nothing, None)
 
@@ -62,7 +63,7 @@ def test_parameters_of_the_model_are_told_before_and_after() -> None:
         free = [SimpleNamespace(label=f"k_{n}", unit="1/s^2") for n in range(len(values))]
         return cast(Estimate, SimpleNamespace(
             model=sloshing(), free=free, theta=np.array(values),
-            covariance=1e-4 * np.eye(len(values))))
+            covariance=1e-4 * np.eye(len(values)), at_bound=[False] * len(values)))
 
     one = diagnosis("named", explanation("drag", "-q*v"))
     said = str(replace(one, before=estimate(2.0, 5.0), after=estimate(3.0, 5.5)))

@@ -12,11 +12,11 @@ from pikanid.problem.problem import Problem
 from pikanid.recording import Channel, Recording
 from pikanid.strategies.multiple_shooting import (
     _cut,
-    _node,
     _open_ended,
     _Residuals,
     multiple_shooting,
 )
+from pikanid.strategies.nodes import state_near
 
 T = np.linspace(0.0, 4.0, 41)
 THETA = np.array([9.0, 0.3, 0.5, 0.8])  # k, d, x0 of each recording
@@ -110,7 +110,8 @@ def test_gaps_count_relative_to_the_size_of_a_state_and_to_their_weight() -> Non
 def test_nodes_start_from_the_data() -> None:
     """A state that is measured from a cubic about the node, its rate from the cubic's slope."""
     given = problem()
-    node = _node(model(), given.experiments[1], 1.37)
+    node, told = state_near(model(), given.experiments[1], 1.37)
+    assert told.all()
     assert node[0] == pytest.approx(motion(np.array([1.37]), 0.8)[0], abs=0.02)
     assert node[1] == pytest.approx(rate(np.array([1.37]), 0.8)[0], abs=0.15)
 

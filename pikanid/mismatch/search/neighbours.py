@@ -124,17 +124,14 @@ def with_next_sign(h: Hypothesis, candidates: Sequence[Candidate],
 
 def with_open_shape(h: Hypothesis, candidates: Sequence[Candidate],
                     fits: Mapping[frozenset[str], Hypothesis]) -> Iterator[Job]:
-    """With an entry's law whose shape is left open in the place of another law of the same
-    equation, if the ideal one does half of what that does: rounded, it may do all of it.
-    """
+    """With a law of open shape in another's place, if the ideal law does half of what that does."""
     for effect in (e for e in h.effects if e.channel == "dynamics"):
-        rest = h.key - {effect.key}
-        for other in candidates:
+        without = fits.get(rest := h.key - {effect.key})
+        for other in (c for c in candidates if c.refines and c.site.v == effect.site.v):
             ideal = other.ids[0] + other.site.suffix
-            known, without = fits.get(rest | {ideal}), fits.get(rest)
-            if (other.refines and other.site.v == effect.site.v and known and without
-                    and not {other.key, ideal} & h.key and known.minimum.chi2 < without.minimum.chi2
-                    - LIKE * (without.minimum.chi2 - h.minimum.chi2)):
+            known = fits.get(rest | {ideal})
+            if known and without and not {other.key, ideal} & h.key and known.minimum.chi2 < (
+                    LIKE * h.minimum.chi2 + (1 - LIKE) * without.minimum.chi2):
                 yield _wider(known, next(e for e in known.effects if e.key == ideal), other, ideal)
 
 

@@ -11,7 +11,7 @@ from pikanid import errors
 from pikanid.recording.channel import Channel
 
 NINES = re.compile(r"-?9{3,}(\.0|\.9+)?")  # definition: the customary ones, as they are printed
-ENDS = {-(2.0**15), 2.0**15 - 1, 2.0**16 - 1, -(2.0**31), 2.0**31 - 1, 2.0**32 - 1}  # definition
+ENDS = {-(2.0**15), 2.0**15 - 1, 2.0**16 - 1, -(2.0**31), 2.0**31 - 1}  # definition: of integers
 BEYOND = 3.0  # limit: ranges of all other samples, and sizes, that such a number lies beyond them
 FEWEST = 3  # limit: other values; of fewer, it is one of the levels that a signal has
 
