@@ -127,6 +127,13 @@ def test_a_model_keeps_forms(tanks: pk.Model, tmp_path: Path) -> None:
     assert again.to_dict() == model.to_dict()
 
 
+FILTER = pk.Model.from_dict({
+    "name": "filter", "domain": "electrical",
+    "states": {"i": {"unit": "A"}, "v": {"unit": "V"}}, "inputs": {"u": {"unit": "V"}},
+    "parameters": {"L": {"unit": "H", "guess": 1.0}, "R": {"unit": "ohm", "guess": 1.0},
+                   "C": {"unit": "F", "guess": 1.0}},
+    "equations": {"i": "(u - R*i - v)/L", "v": "i/C"},
+    "outputs": {"i": {"unit": "A", "expression": "i"}, "v": {"unit": "V", "expression": "v"}}})
 SUITABLE = {"hydraulics": ["cascaded_tanks"], "thermal": ["thermal_rc"], "electrical": ["dc_motor"],
             "kinetics": ["batch_reactor", "one_compartment", "sir"],
             "populations": ["lotka_volterra", "sir"],
@@ -137,7 +144,8 @@ SUITABLE = {"hydraulics": ["cascaded_tanks"], "thermal": ["thermal_rc"], "electr
 def test_the_catalogues_suit_their_models(name: str) -> None:
     """Every form of each, bound in all ways: symbols and units are those of the models."""
     used = set()
-    for model in map(pk.systems.find, SUITABLE[name]):
+    models = [*map(pk.systems.find, SUITABLE[name]), *[FILTER] * (name == "electrical")]
+    for model in models:
         for effect in read_effects(name):
             assert isinstance(effect, EffectForm)
             for one in bound(effect, around(model, {"ambient": model.states[0].unit})):

@@ -62,6 +62,7 @@ class Surroundings:
             "coordinate": [q for q, v in rates.items() if v in self.states],
             "angle": [q for q, v in rates.items() if v in self.states
                       and self.unit(q) and units.convertible(self.unit(q), "rad")],
+            "current": self._measured_in("A"), "voltage": self._measured_in("V"),
             "its rate": [rates[first]] if first in rates else [],
             "output": [n for n in self.model.output_names if n in self.seen],
             "input": inputs,
@@ -70,6 +71,9 @@ class Surroundings:
             "signal like it": [*like, *level],
             "parameter": [p for p in self.model.free_names if first in self.model.equations
                           and symbol(p) in self.model.equations[first].free_symbols]}[kind]
+
+    def _measured_in(self, unit: str) -> list[str]:
+        return [x for x in self.states if self.unit(x) and units.convertible(self.unit(x), unit)]
 
     @property
     def rates(self) -> dict[str, str]:
