@@ -203,3 +203,16 @@ def test_at_any_times_the_wrong_sample_is_blamed_and_no_other(draw: str) -> None
         kept += not gone[150]
         lost += int(gone.sum()) - gone[150]
     assert kept <= 1 and lost == 0
+
+
+def test_glitches_of_two_samples_do_not_keep_the_others() -> None:
+    """Neighbours of a pair look bad as well; none of that is a motion."""
+    rng = np.random.default_rng(9)
+    t, y = np.arange(3000) * 0.01, 0.01 * rng.standard_normal(3000)
+    alone = rng.choice(np.arange(100, 2900, 40), 15, replace=False)
+    pairs = np.array([520, 521, 1320, 1321, 2120, 2121])
+    y[alone] += 1.0
+    y[pairs] += 1.0
+    found = np.isnan(without_outliers(
+        Recording.from_arrays(t, {"y": y}), "y", DEFAULTS)[0]["y"].values)
+    assert found[alone].all() and found[pairs].all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ def test_nls_finds_the_force_of_a_magnet(run: pk.Recording, guess: float) -> Non
     assert abs(found.value("C") - K) < 4 * found.std("C") < 4e-3 * K
     assert found.ok and found.rmse == pytest.approx(SIGMA, rel=0.08)
     assert [f.label for f in found.free] == ["C", "z_0[0]"]
-    assert "unstable" in found.warnings[0] and found.settings["segments"] > 10
+    assert "unstable" in found.warnings[0] and found.settings["pieces"] > 10
     assert len(found.fits) == 1 and len(found.fits[0].t) == len(run.t)
     assert found.model.parameter_names == model.parameter_names
 
@@ -121,3 +122,81 @@ def test_what_a_simulation_in_one_go_cannot_judge_is_said(run: pk.Recording) -> 
     assert found.value("C") == pytest.approx(K, rel=5e-3)
     assert any("NLS follows it in segments" in w for w in found.warnings)
     assert not any("do not determine" in w for w in found.warnings)
+
+
+def changed(**tables: Any) -> Model:
+    """The model with other entries in its tables."""
+    return Model.from_dict({**MAGLEV, **{
+        name: {**MAGLEV[name], **table} for name, table in tables.items()}})
+
+
+@pytest.mark.parametrize("kind", ["gap", "coarse", "ends early", "input later", "slow output"])
+def test_recordings_that_are_not_whole_are_followed(run: pk.Recording, kind: str) -> None:
+    model, z, t = Model.from_dict(MAGLEV), run["z"], run.t
+    if kind == "gap":
+        run = run.with_channels(replace(z, values=np.where((t > 1) & (t < 1.2), np.nan, z.values)))
+    elif kind == "coarse":
+        run = run.with_channels(replace(z, values=np.round(z.values / 1e-4) * 1e-4))
+    elif kind == "ends early":
+        run = run.with_channels(replace(z, time=z.time[:-150], values=z.values[:-150]))
+    elif kind == "input later":
+        run = run.with_channels(replace(
+            run["i"], time=run["i"].time[3:], values=run["i"].values[3:]))
+    else:
+        model = changed(outputs={"w": {"unit": "m/s", "expression": "v"}})
+        speed = np.gradient(z.values, t)[::5]
+        run = run.with_channels(pk.Channel("w", t[::5], speed, "m/s", 0.01))
+        run = run.with_sigma({"z": SIGMA})
+    found = pk.NLS().fit(model, run)
+    assert "pieces" in found.settings and found.value("C") == pytest.approx(K, rel=2e-3)
+
+
+@pytest.mark.parametrize("guess", [2e-5, 2e-4])
+def test_a_guess_three_times_off(run: pk.Recording, guess: float) -> None:
+    found = pk.NLS().fit(Model.from_dict(MAGLEV).with_values(C=guess), run)
+    assert "pieces" in found.settings and found.value("C") == pytest.approx(K, rel=1e-3)
+
+
+def test_multiple_shooting_and_bounds_of_a_start_are_no_hindrance(run: pk.Recording) -> None:
+    model = changed(parameters={"z_0": {
+        "unit": "m", "guess": 0.011, "bounds": [0.0105, 0.02], "scope": "recording"}})
+    found = pk.NLS(segments=4).fit(model, run)
+    assert found.value("C") == pytest.approx(K, rel=1e-3) and found.settings["segments"] == 4
+    assert found.fitted_model.parameter("z_0").value == 0.0105
+
+
+@pytest.mark.parametrize("tables", [
+    {"inputs": {"i": {"unit": "A", "delay": "tau"}},
+     "parameters": {"tau": {"unit": "s", "guess": 0.003, "bounds": [0, 0.02]}}},
+    {"equations": {"v": "g + f - C/m*(i/z)**2"},
+     "parameters": {"f": {"unit": "m/s^2", "guess": 0.0, "scope": "recording"}}},
+    {"equations": {"v": "g - C/m*(i/(z + 0.1*(z - z_0)))**2"}}])
+def test_what_segments_would_not_tell_is_not_cut(tables: dict[str, Any], run: pk.Recording) -> None:
+    """The past of an input, and what is a recording's own."""
+    problem = Problem(changed(**tables), run)
+    assert growth(problem, problem.guess) == (0.0,)
+
+
+@pytest.mark.parametrize(("guess", "count"), [(2.0, 50), (1e5, 500)])
+def test_a_guess_that_explodes_on_a_rig_at_rest_ends(guess: float, count: int) -> None:
+    model = Model.from_dict({
+        "name": "decay", "states": {"x": {"initial": 1.0}},
+        "parameters": {"a": {"guess": guess}}, "equations": {"x": "a*x"},
+        "outputs": {"x": {"expression": "x"}}})
+    t = np.linspace(0, 20, count)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(count)
+    recording = pk.Recording.from_arrays(t, {"x": np.exp(-0.2 * t) + noise})
+    problem = Problem(model, recording)
+    assert growth(problem, problem.guess) in [(0.0,), (pytest.approx(40.0, rel=0.1),)]
+
+
+def test_a_stable_rig_with_an_unstable_guess_is_fitted_in_one_go() -> None:
+    model = Model.from_dict({
+        "name": "swing", "states": {"x": {"initial": 0.5}, "v": {"initial": 0.0}},
+        "parameters": {"k": {"guess": 30.0}, "d": {"guess": -3.0}},
+        "equations": {"x": "v", "v": "-k*x - d*v"}, "outputs": {"x": {"expression": "x"}}})
+    recording = pk.simulate(model.with_values(k=32.0, d=0.4), pk.Recording.from_arrays(
+        np.linspace(0, 20, 1000), {"none": np.zeros(1000)}), sigma=1e-3, seed=0)
+    found = pk.NLS().fit(model, recording)
+    assert "pieces" not in found.settings and found.ok
+    assert abs(found.value("d") - 0.4) < 4 * found.std("d")

@@ -47,10 +47,11 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         if stuck:
             notes.append(f"'{f.label}' ended at its bound; its standard error is not known.")
     grown = max(growth(problem, theta)) if adequacy.verdict == "misfit" else 0.0
+    advice = "" if strategy == "nls" else "; NLS follows it in segments"
     if grown:
         notes.append(f"The plant is unstable: errors grow by e^{grown:.0f} along the recording, "
                      "which no simulation from one start follows. So neither the verdict nor the "
-                     "standard errors say anything of these estimates; NLS follows it in segments.")
+                     f"standard errors say anything about these estimates{advice}.")
     elif adequacy.verdict == "misfit":
         notes.append("The model, simulated at these estimates, does not explain the recording: "
                      "they are biased or make up for missing physics, and standard errors mean "

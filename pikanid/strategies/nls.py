@@ -52,7 +52,8 @@ class NLS:
         max_evaluations: Simulations allowed a start.
         seed: Of the starting points.
         method: Integration method, see `pikanid.simulate`.
-        segments: With more than one, every start is first led to a basin by multiple shooting.
+        segments: With more than one, every start is first led to a basin by multiple shooting.  An
+            unstable plant is followed in segments by itself: `settings["pieces"]` says in how many.
         extra: Starting points that "auto" adds.
         adequacy: When a fit explains the recording.
         uncertainty: When a parameter counts as not determined.
@@ -100,11 +101,11 @@ class NLS:
             away = whole and k == 0 and shooting.runs_away(start)
             found = None if away else self.one_start(shooting, start)
             if whole and k == 0 and (found is None or not shooting.explains(found.theta)):
-                grown = segments.growth(problem, problem.guess)
-                if any(grown):
-                    return segments.fit_in_segments(
-                        problem, grown, partial(replace(self, starts=1)._fit, begun=begun))
-                found = self.one_start(shooting, start) if away else found
+                cut = self._in_segments(problem, start if found is None else found.theta, begun)
+                if isinstance(cut, Estimate):
+                    return cut
+                if away or cut is not None:
+                    found = self.one_start(shooting, start if cut is None else cut)
             if found is None:
                 continue
             history.append({"start": float(k), "cost": found.cost,
@@ -131,6 +132,25 @@ class NLS:
         return finish(
             self.name, problem, shooting, best.theta, converged=best.converged, history=history,
             settings=settings, seed=self.seed, begun=begun, uncertainty=self.uncertainty)
+
+    def _in_segments(self, problem: Problem, other: np.ndarray, begun: float
+                     ) -> Estimate | np.ndarray | None:
+        """The estimate of an unstable plant; where only the guess made it one, what was found for
+        θ to go on from; None where it is stable, or cannot be followed in segments.
+        """
+        for theta in (problem.guess, other):
+            if any(grown := segments.growth(problem, theta)):
+                found = segments.fit_in_segments(problem, theta, grown, partial(
+                    replace(self, starts=1, segments=1)._fit, begun=begun))
+                if found is None:
+                    continue
+                at = {f.label: float(v) for f, v in zip(found.free, found.theta, strict=True)}
+                led = np.array([at.get(f.label, f.guess) for f in problem.free])
+                if not any(segments.growth(problem, led)):
+                    return led
+                return replace(found, settings={
+                    **found.settings, "starts": self.starts, "segments": self.segments})
+        return None
 
     def one_start(self, shooting: Shooting, start: np.ndarray) -> Optimum | None:
         """One local fit from θ = start: coarse steps first, then steps fine enough to finish.

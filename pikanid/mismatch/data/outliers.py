@@ -25,8 +25,9 @@ from pikanid.recording import Recording
 
 MOST, NORMAL = 0.9, 1.645  # definition: a probability, and what normal noise stays below by it
 UNEVEN = 0.1  # numerical: share of neighbourhoods whose middle sample does not weigh most
-NEAR = 10  # numerical: samples, within which errors that happen by chance seldom follow another
-BY_CHANCE = 1e-3  # limit: that errors lie so closely
+TOUCHING = 5  # numerical: samples, within which a sample makes others look bad
+GLITCH = 12  # numerical: samples that a glitch of a few may make look bad
+NEAR = 15  # numerical: samples, within which errors that happen by chance seldom follow another
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 
 
@@ -75,22 +76,27 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
         y[j] -= error
         for near in range(max(j - 4, 0), min(j + 1, len(gap))):
             gap[near] = weights[near] @ y[near:near + 5]
-    if not bad or len(bad) > noise.most_outliers * len(y) or _cluster(bad, len(y)):
+    if not bad or len(bad) > noise.most_outliers * len(y) or _cluster(bad, len(y), noise.clustered):
         return recording, 0
     values = channel.values.copy()
     values[seen[bad]] = np.nan
     return recording.with_channels(replace(channel, values=values)), len(bad)
 
 
-def _cluster(bad: Sequence[int] | np.ndarray, count: int) -> bool:
+def _cluster(bad: Sequence[int] | np.ndarray, count: int, by_chance: float) -> bool:
     """Whether samples, of so many, are closer together than errors that happen by chance would be:
     a motion that is faster than its sampling shows, as it rings after a step, follows none.
+
+    Of a glitch its neighbours look bad as well: those are one event.  One that lasts longer than
+    that is a motion, if it is not the only one.
     """
-    gaps = np.diff(np.sort(bad))
-    if len(gaps) == 0:
-        return False
-    near = 1.0 - (1.0 - len(bad) / count) ** NEAR
-    return bool(binom.sf(np.sum(gaps <= NEAR) - 1, len(gaps), near) < BY_CHANCE)
+    at = np.sort(bad)
+    events = np.split(at, np.flatnonzero(np.diff(at) > TOUCHING) + 1)
+    if sum(e[-1] - e[0] > GLITCH for e in events) > 1:
+        return True
+    gaps = np.diff([e[0] for e in events])
+    near = 1.0 - (1.0 - len(events) / count) ** NEAR
+    return bool(len(gaps) and binom.sf(np.sum(gaps <= NEAR) - 1, len(gaps), near) < by_chance)
 
 
 def _error_of(j: int, weights: np.ndarray, gap: np.ndarray) -> tuple[int, float, float]:
@@ -170,7 +176,7 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
             kept = kept[~bad]
         kept = with_humps(residual, kept, noise.together)
         gone = np.setdiff1d(np.arange(len(t)), kept)
-        if len(gone) and not _cluster(gone, len(t)):
+        if len(gone) and not _cluster(gone, len(t), noise.clustered):
             for r in own:
                 channel = recordings[r][name]
                 recordings[r] = recordings[r].with_channels(replace(channel, values=np.where(

@@ -23,7 +23,8 @@ def stretches(recordings: Sequence[Recording]) -> list[list[int]]:
     for r, recording in enumerate(recordings):
         before = recordings[r - 1] if r else None
         if (before is not None and recording.begins and before.begins
-                and recording.name == before.name and recording.start >= before.stop):
+                and recording.name == before.name
+                and 0 <= recording.start - before.stop < 0.5 * (before.stop - before.start)):
             found[-1].append(r)
         else:
             found.append([r])

@@ -151,6 +151,7 @@ def profiles_for(models: Mapping[str, Model], bounds: Bounds | None, duration: f
     own = natural or (None if recorded else decay)
     if not dt:
         dt = min(max(EVERY, FEWEST / own / MOST), RESOLVED / own) if own else EVERY
+        dt = max(dt, (duration or 0.0) / MOST)
     if duration is None:
         longest = min(max((r.stop - r.start for r in recorded), default=LONG), MOST * dt)
         duration = max(longest, FEWEST / min(own or np.inf, RESOLVED / dt))

@@ -33,6 +33,8 @@ class NoiseSettings:
             every output of every recording, several times.
         least_alone: Samples of which some can be alone: neighbours say nothing in fewer.
         most_outliers: Share of the samples: where more are alone, nothing is.
+        clustered: Rate at which errors that happen by chance lie so closely that they are taken for
+            a fast motion, and stay.
         freedom: Samples beyond the free parameters: σ² read off n of them has a relative standard
             error of √(2/n), so that σ is 16 % uncertain at 20.
         aside: Share of a recording that is set aside where there is no held-out one.
@@ -61,6 +63,7 @@ class NoiseSettings:
     by_chance: Rate = 1e-6
     least_alone: Annotated[int, Range(7, whole=True)] = 20
     most_outliers: Share = 0.1
+    clustered: Rate = 1e-3
     freedom: Count = 20
     aside: Rate = 0.3
     least_aside: Count = 300

@@ -28,6 +28,7 @@ from pikanid.mismatch.data.preparation import (
     with_refined_noise,
     with_sigma,
 )
+from pikanid.mismatch.data.stretches import as_one, stretches
 from pikanid.mismatch.fitting.repeats import repeats
 from pikanid.mismatch.judge.beginning import begun
 from pikanid.mismatch.search.search import Search
@@ -106,9 +107,9 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
             excuse = (f"the held-out recording has {count} usable samples, and at least {needed} "
                       "are needed to confirm anything")
     again = None
-    if before.settings["segments"] > 1:
+    if "pieces" in before.settings:
         nominal, records, held = in_pieces(before, records, held, nls)
-        notes.append(next(w for w in before.warnings if "segments" in w))
+        notes.append(before.warnings[0])
     else:
         again = repeats(nominal, records, held if proves else None)
     if again is not None:
@@ -117,7 +118,9 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         held = None if held is None else held.with_levels(again.levels)
     motion = cache(lambda: motion_along(nominal, records))
     found = with_unseen_speeds(sites(nominal, records.recordings), motion)
-    own = bound_to(effects, found, records.recordings, motion)
+    whole = tuple(as_one([records.recordings[k] for k in own])
+                  for own in stretches(records.recordings))
+    own = bound_to(effects, found, whole, motion)
     found = reserved(found, own)
     listed = catalogue_of(found, own)
     records = replace(records, guess={

@@ -12,6 +12,7 @@ from pikanid.recording.channel import Channel
 
 NINES = re.compile(r"-?9{3,}(\.0|\.9+)?")  # definition: the customary ones, as they are printed
 ENDS = {-(2.0**15), 2.0**15 - 1, 2.0**16 - 1, -(2.0**31), 2.0**31 - 1}  # definition: of integers
+DIGITS = (".12", ".6")  # numerical: of double and of single precision
 BEYOND = 3.0  # limit: ranges of all other samples, and sizes, that such a number lies beyond them
 FEWEST = 3  # limit: other values; of fewer, it is one of the levels that a signal has
 
@@ -29,7 +30,8 @@ def without_sentinels(channel: Channel) -> tuple[Channel, str]:
     """
     values = channel.values
     known = values[np.isfinite(values)]
-    found = [float(v) for v in np.unique(known) if float(v) in ENDS or NINES.fullmatch(f"{v:.12g}")]
+    found = [float(v) for v in np.unique(known) if float(v) in ENDS or any(
+        NINES.fullmatch(f"{v:{digits}g}") for digits in DIGITS)]
     others = known[~np.isin(known, found)]
     if not found or len(np.unique(others)) < FEWEST:
         return channel, ""
