@@ -33,7 +33,7 @@ GROWN = (2.0, 4.0, 8.0)  # numerical: logarithms of how much they do in a segmen
 GROSS = 10.0  # limit: times what shorter segments leave, as which longer ones have lost their way
 PLACES = 60  # numerical: of a recording at which its rates are looked at first
 FINER = 4.0  # numerical: places for each time that errors grow by e
-LEAST = 8  # limit: samples of an output in a segment, for each state
+LEAST = 4  # limit: samples of an output in a segment, for each state
 
 
 def growth(problem: Problem, theta: np.ndarray) -> tuple[float, ...]:
