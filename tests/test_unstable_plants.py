@@ -130,7 +130,8 @@ def changed(**tables: Any) -> Model:
         name: {**MAGLEV[name], **table} for name, table in tables.items()}})
 
 
-@pytest.mark.parametrize("kind", ["gap", "coarse", "ends early", "input later", "slow output"])
+@pytest.mark.parametrize("kind", ["gap", *(pytest.param(kind, marks=pytest.mark.slow) for kind in (
+    "coarse", "ends early", "input later", "slow output"))])
 def test_recordings_that_are_not_whole_are_followed(run: pk.Recording, kind: str) -> None:
     model, z, t = Model.from_dict(MAGLEV), run["z"], run.t
     if kind == "gap":
@@ -151,7 +152,8 @@ def test_recordings_that_are_not_whole_are_followed(run: pk.Recording, kind: str
     assert "pieces" in found.settings and found.value("C") == pytest.approx(K, rel=2e-3)
 
 
-@pytest.mark.parametrize("guess", [2e-5, 1.2e-4])
+@pytest.mark.slow
+@pytest.mark.parametrize("guess", [2e-5, 2e-4])
 def test_a_guess_two_and_three_times_off(run: pk.Recording, guess: float) -> None:
     found = pk.NLS().fit(Model.from_dict(MAGLEV).with_values(C=guess), run)
     assert "pieces" in found.settings and found.value("C") == pytest.approx(K, rel=1e-3)

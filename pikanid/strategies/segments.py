@@ -29,7 +29,7 @@ from pikanid.strategies.nodes import state_near
 
 NODE = "_node"  # definition: ends the name of a state at the beginning of a segment
 HOPELESS = 25.0  # limit: logarithm of how much errors grow over what is followed in one go
-GROWN = (2.0, 4.0, 8.0)  # numerical: logarithms of how much they do in a segment, one after another
+GROWN = (1.0, 2.0, 4.0, 8.0)  # numerical: logarithms of how much they do in a segment, in turn
 GROSS = 10.0  # limit: times what shorter segments leave, as which longer ones have lost their way
 PLACES = 60  # numerical: of a recording at which its rates are looked at first
 FINER = 4.0  # numerical: places for each time that errors grow by e
@@ -81,8 +81,12 @@ def _growth(field: VectorField, e: Experiment, p: np.ndarray) -> float:
                 return 0.0  # no segment would be short enough
             size = float(np.linalg.norm(product, 2))
             total, product = total + float(np.log(size)), product / size
-    enough = samples / (LEAST * len(sizes)) >= total / GROWN[0]
+    enough = _most_segments(e, len(sizes)) >= total / GROWN[-1]
     return total if total > HOPELESS and enough else 0.0
+
+
+def _most_segments(e: Experiment, states: int) -> int:
+    return max(max(len(s.t) for s in e.samples) // (LEAST * states), 1)
 
 
 def _along(field: VectorField, e: Experiment, p: np.ndarray, count: int
@@ -148,7 +152,9 @@ def in_segments(problem: Problem, grown: Sequence[float], most: float,
     owners: list[int] = []
     for r, (recording, e, logarithm) in enumerate(zip(
             problem.recordings, problem.experiments, grown, strict=True)):
-        for low, high, last in _edges(e, int(np.ceil(max(logarithm / most, 1)))):
+        count = min(int(np.ceil(max(logarithm / most, 1))),
+                    _most_segments(e, len(problem.model.states)))
+        for low, high, last in _edges(e, count):
             x = (state_near(problem.model, e, low)[0] if motions is None else
                  [np.interp(low, motions[r].t, column) for column in motions[r].x.T])
             piece = recording.with_channels(*(
