@@ -57,11 +57,11 @@ def _can_be_cut(model: Model) -> bool:
     """
     formulas = [*model.equations.values(), *(o.expression for o in model.outputs)]
     used = {q.name for f in formulas for q in f.free_symbols}
-    first = {q.name for s in model.states for q in s.initial.free_symbols}
+    first = {q.name for s in model.states for q in s.initial.free_symbols} & {*model.free_names}
     own = {p.name for p in model.parameters if p.free and p.scope != "shared"}
     return (not any(i.shaped or i.delay != 0 or i.hold == "cubic" for i in model.inputs)
             and not any(o.delay != 0 for o in model.outputs)
-            and not used & (own | {n for n in first if model.parameter(n).free}))
+            and not used & (own | first))
 
 
 def _growth(field: VectorField, e: Experiment, p: np.ndarray) -> float:

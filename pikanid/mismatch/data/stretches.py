@@ -13,9 +13,9 @@ from pikanid.recording import Channel, Recording
 def stretches(recordings: Sequence[Recording]) -> list[list[int]]:
     """Numbers of the recordings that are segments of the same one, in order; most are alone.
 
-    >>> t = np.arange(4.0)
+    >>> t = np.arange(8.0)
     >>> one = Recording.from_arrays(t, {"y": t})
-    >>> pieces = [replace(one.window(a, a + 1), begins={"y_node": a}) for a in (0.0, 2.0)]
+    >>> pieces = [replace(one.window(a, a + 3), begins={"y_node": a}) for a in (0.0, 4.0)]
     >>> stretches([one, *pieces, one])
     [[0], [1, 2], [3]]
     """
