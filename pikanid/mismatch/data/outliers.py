@@ -90,13 +90,17 @@ def _cluster(bad: Sequence[int] | np.ndarray, count: int, by_chance: float) -> b
     Of a glitch its neighbours look bad as well: those are one event.  One that lasts longer than
     that is a motion, if it is not the only one.
     """
-    at = np.sort(bad)
-    events = np.split(at, np.flatnonzero(np.diff(at) > TOUCHING) + 1)
+    events = _events(np.sort(bad))
     if sum(e[-1] - e[0] > GLITCH for e in events) > 1:
         return True
     gaps = np.diff([e[0] for e in events])
     near = 1.0 - (1.0 - len(events) / count) ** NEAR
     return bool(len(gaps) and binom.sf(np.sum(gaps <= NEAR) - 1, len(gaps), near) < by_chance)
+
+
+def _events(at: np.ndarray) -> list[np.ndarray]:
+    """Samples (increasing), those together that touch."""
+    return np.split(at, np.flatnonzero(np.diff(at) > TOUCHING) + 1) if len(at) else []
 
 
 def _error_of(j: int, weights: np.ndarray, gap: np.ndarray) -> tuple[int, float, float]:
@@ -174,9 +178,11 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
         while (bad := lone(residual[kept], noise)).any() and (
                 len(kept) > (1 - noise.most_outliers) * len(t)):
             kept = kept[~bad]
-        kept = with_humps(residual, kept, noise.together)
+        alone, kept = kept, with_humps(residual, kept, noise.together)
         gone = np.setdiff1d(np.arange(len(t)), kept)
-        if len(gone) and not _cluster(gone, len(t), noise.clustered):
+        # where most of what looked alone was not, it is all of one misfit
+        most = len(_events(np.setdiff1d(kept, alone))) > len(_events(gone))
+        if len(gone) and not most and not _cluster(gone, len(t), noise.clustered):
             for r in own:
                 channel = recordings[r][name]
                 recordings[r] = recordings[r].with_channels(replace(channel, values=np.where(
