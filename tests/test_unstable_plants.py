@@ -10,7 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pikanid as pk
-from pikanid.mismatch.data.stretches import as_one, stretches
+from pikanid.mismatch.data.stretches import as_one
+from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model, systems
 from pikanid.problem.problem import Problem
 from pikanid.strategies.segments import growth, in_segments
@@ -95,7 +97,6 @@ def test_segments_hold_every_sample_once_and_the_input_from_their_start(run: pk.
     problem = Problem(Model.from_dict(MAGLEV), run)
     pieces, owners = in_segments(problem, growth(problem, problem.guess), 2.0)
     assert set(owners) == {0} and len(pieces) > 50
-    assert stretches(pieces) == [list(range(len(pieces)))]
     whole = as_one(pieces)
     np.testing.assert_array_equal(whole["z"].values, run["z"].values)
     for piece in pieces:
@@ -115,6 +116,14 @@ def test_what_an_unstable_plant_lacks_is_named(run: pk.Recording) -> None:
     assert "linear_drag" in effect.ids
     value, = effect.parameters.values()
     assert abs(value.value - 0.5 / M) < 4 * value.std
+
+
+def test_segments_stay_together_beside_other_recordings(run: pk.Recording) -> None:
+    cut = Records((run,) * 4, ({},) * 4, DEFAULTS, cut_from=(0, 0, 1, 1))
+    alone = Records((run,) * 2, ({},) * 2, DEFAULTS)
+    assert alone.stretches == [[0], [1]] and cut.stretches == [[0, 1], [2, 3]]
+    assert cut.beside(alone).stretches == [[0, 1], [2, 3], [4], [5]]
+    assert alone.beside(cut).beside(cut).stretches == [[0], [1], [2, 3], [4, 5], [6, 7], [8, 9]]
 
 
 def test_what_a_simulation_in_one_go_cannot_judge_is_said(run: pk.Recording) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,19 @@ class Fit:
     fitted: np.ndarray
     sigma: np.ndarray | None = None
     spread: np.ndarray | None = None
+
+    @classmethod
+    def joined(cls, fits: Sequence[Fit]) -> Fit:
+        """One of segments of a recording."""
+        def whole(parts: Sequence[np.ndarray | None]) -> np.ndarray | None:
+            known = [p for p in parts if p is not None]
+            return np.concatenate(known) if len(known) == len(parts) else None
+
+        return replace(
+            fits[0], t=np.concatenate([f.t for f in fits]),
+            measured=np.concatenate([f.measured for f in fits]),
+            fitted=np.concatenate([f.fitted for f in fits]),
+            sigma=whole([f.sigma for f in fits]), spread=whole([f.spread for f in fits]))
 
     @property
     def residual(self) -> np.ndarray:

@@ -26,8 +26,11 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
            converged: bool, history: Sequence[Mapping[str, float]], settings: Mapping[str, Any],
            seed: int | None, begun: float, warnings: Sequence[str] = (),
            approximator: Any = None, uncertainty: UncertaintySettings = USUAL,
-           covariance: np.ndarray | None = None) -> Estimate:
-    """Assemble the `Estimate` at θ; its `covariance`, unless given, is that of least squares."""
+           covariance: np.ndarray | None = None, stable: bool = False) -> Estimate:
+    """Assemble the `Estimate` at θ; its `covariance`, unless given, is that of least squares.
+
+    Whether errors grow along the recordings is looked at, unless they are known to be `stable`.
+    """
     jacobian = shooting.jacobian(theta)
     adequacy = shooting.adequacy(theta)
     scale = 1.0
@@ -46,13 +49,14 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     for f, stuck in zip(problem.free, at_bound, strict=True):
         if stuck:
             notes.append(f"'{f.label}' ended at its bound; its standard error is not known.")
-    grown = max(growth(problem, theta)) if adequacy.verdict == "misfit" else 0.0
+    misfit = adequacy.verdict == "misfit"
+    grown = max(growth(problem, theta)) if misfit and not stable else 0.0
     advice = "" if strategy == "nls" else "; NLS follows it in segments"
     if grown:
         notes.append(f"The plant is unstable: errors grow by e^{grown:.0f} along the recording, "
                      "which no simulation from one start follows. So neither the verdict nor the "
                      f"standard errors say anything about these estimates{advice}.")
-    elif adequacy.verdict == "misfit":
+    elif misfit:
         notes.append("The model, simulated at these estimates, does not explain the recording: "
                      "they are biased or make up for missing physics, and standard errors mean "
                      "little.")

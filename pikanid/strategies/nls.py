@@ -131,7 +131,8 @@ class NLS:
                 settings[name] = own
         return finish(
             self.name, problem, shooting, best.theta, converged=best.converged, history=history,
-            settings=settings, seed=self.seed, begun=begun, uncertainty=self.uncertainty)
+            settings=settings, seed=self.seed, begun=begun, uncertainty=self.uncertainty,
+            stable=not whole)
 
     def _in_segments(self, problem: Problem, other: np.ndarray, begun: float
                      ) -> Estimate | np.ndarray | None:

@@ -12,7 +12,7 @@ _LEAST = 5  # numerical: of which a cubic leaves one over
 
 
 def state_near(model: Model, e: Experiment, t: float, p: np.ndarray | None = None
-         ) -> tuple[np.ndarray, np.ndarray]:
+               ) -> tuple[np.ndarray, np.ndarray]:
     """A first guess of the state (n,) at time t, and which entries (n,) the samples tell.
 
     A measured state comes from a local cubic through the samples, its derivative where that is a

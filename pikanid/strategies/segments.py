@@ -37,11 +37,11 @@ LEAST = 4  # limit: samples of an output in a segment, for each state
 
 
 def growth(problem: Problem, theta: np.ndarray) -> tuple[float, ...]:
-    """Logarithm of how much errors grow along each recording's motion at parameters θ (n_free,):
-    of the largest singular value of the product of its transition matrices.
+    """Logarithm of how much errors grow along each recording's motion: of the largest singular
+    value of the product of its transition matrices, which parameters θ (n_free,) give.
 
-    The motion is read off the samples: it is known however wrong θ is.  Zero where errors grow by
-    less than e^25, where outputs show neither a state nor what it is the rate of, and where
+    The motion is read off the samples, so that no simulation need follow it.  Zero where errors
+    grow by less than e^25, where outputs show neither a state nor what it is the rate of, and where
     recordings cannot be cut into segments.
     """
     if not _can_be_cut(problem.model):
@@ -55,13 +55,17 @@ def _can_be_cut(model: Model) -> bool:
     """Whether a segment needs no past of its inputs, and no parameter of a recording's own but an
     initial state: each would be estimated for every segment.
     """
-    formulas = [*model.equations.values(), *(o.expression for o in model.outputs)]
-    used = {q.name for f in formulas for q in f.free_symbols}
     first = {q.name for s in model.states for q in s.initial.free_symbols} & {*model.free_names}
     own = {p.name for p in model.parameters if p.free and p.scope != "shared"}
     return (not any(i.shaped or i.delay != 0 or i.hold == "cubic" for i in model.inputs)
             and not any(o.delay != 0 for o in model.outputs)
-            and not used & (own | first))
+            and not _used(model) & (own | first))
+
+
+def _used(model: Model) -> set[str]:
+    """Names in equations and outputs, not those that only initial states need."""
+    formulas = [*model.equations.values(), *(o.expression for o in model.outputs)]
+    return {q.name for f in formulas for q in f.free_symbols}
 
 
 def _growth(field: VectorField, e: Experiment, p: np.ndarray) -> float:
@@ -204,9 +208,7 @@ def _cut(c: Channel, low: float, high: float, last: bool, model: Model) -> Chann
 
 def free_start(model: Model) -> Model:
     """With a free initial state; parameters that only the initial state needs are not estimated."""
-    needed = {q.name for formulas in (model.equations.values(),
-                                      [o.expression for o in model.outputs])
-              for f in formulas for q in f.free_symbols}
+    needed = _used(model)
     nodes = [Parameter(f"{s.name}{NODE}", 0.0, s.unit, free=True, scope="recording")
              for s in model.states]
     fixed = model.replace(parameters=tuple(
@@ -265,16 +267,5 @@ def _of_recordings(found: Estimate, owners: Sequence[int]
         trajectories.append(Trajectory(np.concatenate([p.t for p in pieces]),
                                        np.concatenate([p.x for p in pieces])))
         for j in range(len(outputs)):
-            some = [found.fits[k * len(outputs) + j] for k in mine]
-            fits.append(replace(
-                some[0], t=np.concatenate([f.t for f in some]),
-                measured=np.concatenate([f.measured for f in some]),
-                fitted=np.concatenate([f.fitted for f in some]),
-                sigma=_together([f.sigma for f in some]),
-                spread=_together([f.spread for f in some])))
+            fits.append(Fit.joined([found.fits[k * len(outputs) + j] for k in mine]))
     return tuple(fits), tuple(trajectories)
-
-
-def _together(parts: Sequence[np.ndarray | None]) -> np.ndarray | None:
-    known = [p for p in parts if p is not None]
-    return np.concatenate(known) if len(known) == len(parts) else None

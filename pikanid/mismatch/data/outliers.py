@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import binom
 
 from pikanid import errors
-from pikanid.mismatch.data.stretches import as_one, stretches
+from pikanid.mismatch.data.stretches import as_one
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
@@ -168,7 +168,7 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
     recordings, count, noise = list(records.recordings), 0, records.settings.noise
     of = {(r, name): (t, left) for r, name, t, left in seen}
     names = list(dict.fromkeys(name for _, name in of))
-    for own, name in ((own, name) for own in stretches(recordings) for name in names):
+    for own, name in ((own, name) for own in records.stretches for name in names):
         t, left = (np.concatenate([of[r, name][k] for r in own if (r, name) in of] or [np.empty(0)])
                    for k in (0, 1))
         residual = left - from_inputs(

@@ -36,4 +36,4 @@ def _cut(model: Model, records: Records, found: Estimate) -> Records:
     pieces, owners = in_segments(
         problem, growth(problem, problem.guess), MOST, found.trajectories)
     return replace(records, recordings=tuple(pieces),
-                   levels=tuple(records.levels[k] for k in owners))
+                   levels=tuple(records.levels[k] for k in owners), cut_from=tuple(owners))

@@ -9,9 +9,10 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.estimate import Estimate
+from pikanid.estimate.data import Fit
 from pikanid.mismatch.data.noise_level import first_level, refined
 from pikanid.mismatch.data.outliers import from_inputs, without_lone, without_outliers
-from pikanid.mismatch.data.stretches import as_one, stretches
+from pikanid.mismatch.data.stretches import as_one
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.budget import Budget
 from pikanid.mismatch.settings.noise import NoiseSettings
@@ -178,21 +179,17 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
     samples = sum(len(f.t) for f in fit.fits)
     freedom = max(samples - len(fit.theta), 1) / max(samples, 1)
     levels: list[dict[str, NoiseModel]] = []
-    for own in stretches(records.recordings):
+    for own in records.stretches:
         recording = as_one([records.recordings[r] for r in own])
         new = {}
         for name, level in records.levels[own[0]].items():
-            t, residual = (np.concatenate([getattr(fits[r, name], part) for r in own])
-                           for part in ("t", "residual"))
-            given = [fits[r, name].sigma for r in own]
-            sigma = np.concatenate([s for s in given if s is not None]) if all(
-                s is not None for s in given) else None
-            kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, t)])
+            f = Fit.joined([fits[r, name] for r in own])
+            kept = np.isfinite(recording[name].values[np.searchsorted(recording[name].time, f.t)])
             # of samples whose σ differ, what is left is compared as if all had the common one
-            left = residual * level.sigma / level.spreads(sigma, len(t))
+            left = f.residual * level.sigma / level.spreads(f.sigma, len(f.t))
             # what still follows the inputs is misfit, however fast
-            left -= from_inputs(recording, t, left, inputs, records.settings)
-            again = refined(level, recording[name], t[kept], left[kept], rate, quiet,
+            left -= from_inputs(recording, f.t, left, inputs, records.settings)
+            again = refined(level, recording[name], f.t[kept], left[kept], rate, quiet,
                             records.settings, explained, freedom)
             new[name] = loud_enough(again, recording[name])
         levels += [new] * len(own)

@@ -1,4 +1,4 @@
-"""Recordings that are segments of one: what is seen of them is seen without a break."""
+"""Segments of one recording put together again."""
 
 from __future__ import annotations
 
@@ -10,29 +10,14 @@ import numpy as np
 from pikanid.recording import Channel, Recording
 
 
-def stretches(recordings: Sequence[Recording]) -> list[list[int]]:
-    """Numbers of the recordings that are segments of the same one, in order; most are alone.
+def as_one(pieces: Sequence[Recording]) -> Recording:
+    """The recording that segments are of, in the order of time; of one, that.
 
     >>> t = np.arange(8.0)
-    >>> one = Recording.from_arrays(t, {"y": t})
-    >>> pieces = [replace(one.window(a, a + 3), begins={"y_node": a}) for a in (0.0, 4.0)]
-    >>> stretches([one, *pieces, one])
-    [[0], [1, 2], [3]]
+    >>> whole = Recording.from_arrays(t, {"y": t})
+    >>> as_one([whole.window(0, 3), whole.window(4, 7)])["y"].values
+    array([0., 1., 2., 3., 4., 5., 6., 7.])
     """
-    found: list[list[int]] = []
-    for r, recording in enumerate(recordings):
-        before = recordings[r - 1] if r else None
-        if (before is not None and recording.begins and before.begins
-                and recording.name == before.name
-                and 0 <= recording.start - before.stop < 0.5 * (before.stop - before.start)):
-            found[-1].append(r)
-        else:
-            found.append([r])
-    return found
-
-
-def as_one(pieces: Sequence[Recording]) -> Recording:
-    """Segments put together again."""
     if len(pieces) == 1:
         return pieces[0]
     return pieces[0].with_channels(*(

@@ -29,12 +29,25 @@ FINEST, COARSEST = 64, 16  # numerical: steps a sample, at most; of a motion tha
 class Records:
     """Recordings as they are judged: without outliers, each output with its noise level, by which
     settings, and what the nominal model's parameters were given as, which tells their sizes.
+    Of segments of longer recordings `cut_from` says which; empty, each is a recording of its own.
     """
 
     recordings: tuple[Recording, ...]
     levels: tuple[dict[str, NoiseModel], ...]
     settings: Settings
     guess: Mapping[str, float] = field(default_factory=dict)
+    cut_from: tuple[int, ...] = ()
+
+    @property
+    def owners(self) -> tuple[int, ...]:
+        """The longer recording that each one is a segment of."""
+        return self.cut_from or tuple(range(len(self.recordings)))
+
+    @property
+    def stretches(self) -> list[list[int]]:
+        """Numbers of the recordings that are segments of the same one; most are alone."""
+        return [[r for r, own in enumerate(self.owners) if own == owner]
+                for owner in dict.fromkeys(self.owners)]
 
     @property
     def spread(self) -> float:
@@ -67,6 +80,13 @@ class Records:
             moved = (min(r[o].changes_at, r.stop) for o in found)
             cut.append(_cut(r, max(float(t[int(share * (len(t) - 1))]), *moved)))
         return replace(self, recordings=tuple(cut))
+
+    def beside(self, later: Records) -> Records:
+        """With other recordings after these."""
+        first = max(self.owners) + 1
+        return replace(self, recordings=self.recordings + later.recordings,
+                       levels=self.levels + later.levels,
+                       cut_from=(*self.owners, *(first + own for own in later.owners)))
 
     def with_levels(self, levels: dict[str, NoiseModel]) -> Records:
         """The same with one noise level of each output for all recordings."""

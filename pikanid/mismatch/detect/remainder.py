@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.stretches import stretches
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import (
     Detection,
@@ -18,7 +16,6 @@ from pikanid.mismatch.detect.residual_tests import (
     unit_columns,
 )
 from pikanid.mismatch.detect.tangent import directions
-from pikanid.problem.problem import Samples
 
 
 def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
@@ -61,45 +58,34 @@ def lines(whitened: Whitened, rate: float, more: int,
     asks = whitened.settings.detection
     blocks: list[list[np.ndarray]] = []
     pasts: list[np.ndarray] = []
-    rows = _rows(whitened)
-    for stretch, _ in rows:
-        t = np.concatenate([s.t for s in stretch.samples])
+    where: list[np.ndarray] = []
+    for t, rows, held in _seen_at_once(whitened):
         blocks.append(frequency_bands(t, rate, asks))
-        pasts.append(past_inputs(t, stretch.held, rate, asks))
+        pasts.append(past_inputs(t, held, rate, asks))
+        where.append(rows)
     count, total = min(len(b) for b in blocks), whitened.rows + more
-    where = [own for _, own in rows]
     bands = [short(_scattered([b[k] for b in blocks], where, total)) for k in range(count)]
     return bands, short(_scattered(pasts, where, total))
 
 
-@dataclass
-class _Stretch:
-    """What is seen of an output without a break, and the inputs' times and values: segments that a
-    recording was cut into are one.
+def _seen_at_once(whitened: Whitened) -> Iterator[
+        tuple[np.ndarray, np.ndarray, list[tuple[np.ndarray, np.ndarray]]]]:
+    """Times of each output in each recording, of whose segments together, its rows, and times and
+    values of the inputs.
     """
-
-    samples: list[Samples]
-    held: list[tuple[np.ndarray, np.ndarray]]
-
-
-def _rows(whitened: Whitened) -> list[tuple[_Stretch, np.ndarray]]:
-    """Each stretch of an output, and its rows."""
     problem = whitened.problem
     firsts = np.cumsum([0, *(len(s.t) for e in problem.experiments for s in e.samples)])
     at = iter(firsts.tolist())
     begin = [[next(at) for _ in e.samples] for e in problem.experiments]
-    found = []
-    for own in stretches(problem.recordings):
+    for own in whitened.records.stretches:
         pieces = [problem.experiments[r] for r in own]
         held = [(np.concatenate([h.time for h in same]), np.concatenate([h.values for h in same]))
                 for same in zip(*(e.held for e in pieces), strict=True)]
         for k in range(len(pieces[0].samples)):
-            samples = [e.samples[k] for e in pieces]
-            rows = [np.arange(begin[r][k], begin[r][k] + len(s.t))
-                    for r, s in zip(own, samples, strict=True)]
-            found.append((_Stretch(samples, [h for h in held if len(h[0]) > 1]),
-                          np.concatenate(rows)))
-    return found
+            times = [e.samples[k].t for e in pieces]
+            rows = [np.arange(begin[r][k], begin[r][k] + len(t))
+                    for r, t in zip(own, times, strict=True)]
+            yield np.concatenate(times), np.concatenate(rows), [h for h in held if len(h[0]) > 1]
 
 
 def _scattered(blocks: list[np.ndarray], where: list[np.ndarray], rows: int) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from operator import lt
 
@@ -41,9 +40,7 @@ def fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, lef
         return None
     first = hypothesis.whitened
     count = len(first.records.recordings)
-    whitened = Whitened(hypothesis.model, replace(
-        first.records, recordings=first.records.recordings + later.records.recordings,
-        levels=first.records.levels + later.records.levels))
+    whitened = Whitened(hypothesis.model, first.records.beside(later.records))
     whitened.step_as(first, later)
     own = {(f.name, f.recording): v for f, v in zip(
         first.problem.free, hypothesis.minimum.theta, strict=True)}

@@ -21,7 +21,6 @@ from pikanid.model import Model
 from pikanid.pieces.sentences import enumerated
 from pikanid.pieces.time_unit import spans
 
-UNLIKELY = 0.05  # layout: probability below which a guess is no answer
 TOLD = 3  # layout: explanations in the sentence; all of them stand below it
 
 
@@ -263,10 +262,10 @@ class DiagnosisData:
             return head + f"surely {enumerated([p.title for p in sure])}{more}. " \
                 f"{self.remainder.sentence()}."
         if self.verdict == "unconfirmed":
-            likely = self.hypotheses[0].probability >= UNLIKELY
-            return head + ("" if likely else "nothing in the catalogue explains it; closest comes "
-                           ) + f"{'perhaps ' * likely}{_first(titles)}, not confirmed" + (
-                f": {self.doubt}." if self.doubt else " on other data.")
+            likely = self.hypotheses[0].probability >= self.settings.verdict.guessed
+            lead = "perhaps" if likely else "nothing in the catalogue explains it; closest comes"
+            doubt = f": {self.doubt}." if self.doubt else " on other data."
+            return f"{head}{lead} {_first(titles)}, not confirmed{doubt}"
         return head + "nothing in the catalogue explains it."
 
     @property

@@ -42,4 +42,3 @@ def _estimates(found: Estimate) -> dict[str, str]:
             else rounded(float(v), float(found.covariance[k, k]) ** 0.5)
             for k, (f, v, ends) in enumerate(zip(
                 found.free, found.theta, found.at_bound, strict=True))}
-

@@ -59,6 +59,7 @@ class VerdictSettings:
             before it slips.
         sensitive: Times the held-out RMSE with parameters moved within their errors: more is
             theirs, not a law's.
+        guessed: Probability from which on what is not confirmed is said to be perhaps so.
     """
 
     indistinct: Amount = 6.0
@@ -86,6 +87,7 @@ class VerdictSettings:
     open: Amount = 3.0
     narrow: Share = 0.03
     sensitive: Factor = 1.2
+    guessed: Rate = 0.05
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from pikanid.mismatch.data.preparation import (
     with_refined_noise,
     with_sigma,
 )
-from pikanid.mismatch.data.stretches import as_one, stretches
+from pikanid.mismatch.data.stretches import as_one
 from pikanid.mismatch.fitting.repeats import repeats
 from pikanid.mismatch.judge.beginning import begun
 from pikanid.mismatch.search.search import Search
@@ -118,8 +118,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         held = None if held is None else held.with_levels(again.levels)
     motion = cache(lambda: motion_along(nominal, records))
     found = with_unseen_speeds(sites(nominal, records.recordings), motion)
-    whole = tuple(as_one([records.recordings[k] for k in own])
-                  for own in stretches(records.recordings))
+    whole = tuple(as_one([records.recordings[k] for k in own]) for own in records.stretches)
     own = bound_to(effects, found, whole, motion)
     found = reserved(found, own)
     listed = catalogue_of(found, own)
