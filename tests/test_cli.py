@@ -35,6 +35,14 @@ def test_every_excitation_drives_every_model(run: Run, model: str, excitation: s
     assert (set(pk.Recording.read("a.csv").names) - {"theta", "phi", "x"}) <= names
 
 
+@pytest.mark.parametrize(("model", "short"), [("thermal_rc", True), ("dc_motor", False)])
+def test_an_excitation_that_ends_before_the_model_moves_is_told(run: Run, model: str,
+                                                                short: bool) -> None:
+    code, _, err = run("simulate", "-m", model, "-o", "a.csv")
+    assert code == 0 and ("The built-in excitation lasts 5 s" in err) == short
+    assert ("P stays at 0" in err) == (model == "thermal_rc")
+
+
 def test_simulate_with_recorded_inputs(run: Run, recorded: str) -> None:
     assert run("simulate", "-m", "sloshing", "-e", recorded, "-o", "again.csv")[0] == 0
     again, exact = pk.Recording.read("again.csv"), pk.simulate(

@@ -20,7 +20,7 @@ from pikanid.commands.options import (
 )
 from pikanid.commands.outputs import STDOUT, check_outputs, written
 from pikanid.commands.reading import Driven, every_source
-from pikanid.commands.simulate import excited, sigmas
+from pikanid.commands.simulate import excited, sigmas, tell_notes
 
 EXAMPLES = """Examples:
 
@@ -54,6 +54,7 @@ def confusable(
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
     drive = excited(chosen, excitation, duration, files)
+    tell_notes(drive, quiet)
     with working("looking", 28, quiet) as step:
         found = run(chosen, drive, sigmas(chosen, sigma) or None, strength=strength,
                     refit=not quick, tell=step)

@@ -20,7 +20,7 @@ from pikanid.commands.options import (
 )
 from pikanid.commands.outputs import check_outputs
 from pikanid.commands.reading import Driven, every_source
-from pikanid.commands.simulate import excited
+from pikanid.commands.simulate import excited, tell_notes
 from pikanid.figures import ENDINGS, save_figure
 
 AGREES = 0.1  # layout: difference of derivatives from which on "agrees" would be the wrong word
@@ -57,7 +57,9 @@ def effects(
     from pikanid.reporting.tables import row, table
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
-    shown = effects_shown(chosen, excited(chosen, excitation, duration, files))
+    drive = excited(chosen, excitation, duration, files)
+    tell_notes(drive, quiet)
+    shown = effects_shown(chosen, drive)
     if not shown:
         raise errors.BadModel(errors.no_effects(chosen.name))
     if plot is not None and not all(one.failure for one in shown):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -62,6 +64,7 @@ def simulate(
 
     chosen = adjusted(systems.find(model), set_)
     drive = excited(chosen, excitation, duration, files)
+    tell_notes(drive, quiet)
     made = run(chosen, drive, sigma=sigmas(chosen, sigma), seed=seed)
     if not chosen.inputs:
         made = made.without(*drive.names)
@@ -103,7 +106,27 @@ def excited(model: Model, name: str, duration: float, files: Driven) -> Recordin
     for item in required:
         if item.name in rec and item.unit:
             rec = rec.with_unit(item.name, item.unit)
-    return rec
+    still = [i.name for i in required if not rec[i.name].values.any()]
+    return replace(rec, notes=(
+        *too_short(model, rec),
+        *([errors.note_input_at_rest(name, still)] if 0 < len(still) < len(required) else ())))
+
+
+def too_short(model: Model, rec: Recording) -> tuple[str, ...]:
+    """A sentence where a built-in excitation ends before the model has moved."""
+    from pikanid.mismatch.design.response import decay_rate, natural_frequency
+
+    rate, lasts = natural_frequency(model) or decay_rate(model), rec.stop - rec.start
+    return (errors.note_excitation_short(lasts, 1 / rate),) if rate and lasts * rate < 1 else ()
+
+
+def tell_notes(rec: Recording, quiet: bool) -> None:
+    """What has to be said of an excitation, on standard error."""
+    from pikanid.reporting.console import console
+
+    if not quiet:
+        for note in rec.notes:
+            console(sys.stderr).print(f"Note: {note}", markup=False, soft_wrap=True)
 
 
 def sigmas(model: Model, texts: list[str]) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pikanid.errors.wording import short
+from pikanid.errors.wording import listed, short
 
 
 def left_out_as_slow() -> str:
@@ -77,3 +77,15 @@ def unforeseen(command: str, failure: str, place: str) -> str:
 
 def out_of_memory() -> str:
     return "There is not enough memory for this: shorten the recording, or thin it with --decimate."
+
+
+def note_excitation_short(seconds: float, needed: float) -> str:
+    return (f"The built-in excitation lasts {seconds:.3g} s, and the model moves over about "
+            f"{float(f'{needed:.2g}'):g} s: inputs that last longer (--excitation FILE; 'pikanid "
+            "design' makes some) would show more.")
+
+
+def note_input_at_rest(excitation: str, names: Sequence[str]) -> str:
+    return (f"The excitation {excitation} drives one input: {listed(names)} "
+            f"{'stays' if len(names) == 1 else 'stay'} at 0. A recording (--excitation FILE) can "
+            "hold all.")

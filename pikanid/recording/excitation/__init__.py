@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +51,7 @@ def built_in(name: str, duration: float, dt: float, channels: Sequence[str]) -> 
         name: One of `EXCITATIONS`.
         duration: [s].
         dt: Sampling interval [s].
-        channels: Inputs; an excitation of one input takes the first.
+        channels: Inputs; an excitation of one input drives the first, and the others stay at 0.
 
     Raises:
         BadSetting: If the excitation does not fit into `duration`, or `dt` is too coarse for it.
@@ -62,7 +63,9 @@ def built_in(name: str, duration: float, dt: float, channels: Sequence[str]) -> 
     many = "channels" in inspect.signature(function).parameters
     driven = {"channels": tuple(channels)} if many else {"channel": channels[0]}
     made: Recording = function(duration=duration, dt=dt, **driven)
-    return made
+    still = [replace(made[made.names[0]], name=c, values=0.0 * made.t, unit="")
+             for c in channels if c not in made]
+    return made.with_channels(*made.channels.values(), *still)
 
 
 def __getattr__(name: str) -> Any:
