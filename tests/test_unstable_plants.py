@@ -15,7 +15,8 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model, systems
 from pikanid.problem.problem import Problem
-from pikanid.strategies.segments import growth, in_segments
+from pikanid.strategies.cuts import counts_for, in_segments
+from pikanid.strategies.growth import growth
 
 K, M, G = 6.5e-5, 0.068, 9.81
 
@@ -81,7 +82,7 @@ def test_nls_finds_the_force_of_a_magnet(run: pk.Recording, guess: float) -> Non
     assert abs(found.value("C") - K) < 4 * found.std("C") < 4e-3 * K
     assert found.ok and found.rmse == pytest.approx(SIGMA, rel=0.08)
     assert [f.label for f in found.free] == ["C", "z_0[0]"]
-    assert "unstable" in found.warnings[0] and found.settings["pieces"] > 10
+    assert "unstable" in found.warnings[0] and found.settings["pieces"][0] > 10
     assert len(found.fits) == 1 and len(found.fits[0].t) == len(run.t)
     assert found.model.parameter_names == model.parameter_names
 
@@ -95,8 +96,10 @@ def test_several_recordings_are_cut_each(run: pk.Recording) -> None:
 
 def test_segments_hold_every_sample_once_and_the_input_from_their_start(run: pk.Recording) -> None:
     problem = Problem(Model.from_dict(MAGLEV), run)
-    pieces, owners = in_segments(problem, growth(problem, problem.guess), 2.0)
-    assert set(owners) == {0} and len(pieces) > 50
+    grown = growth(problem, problem.guess)
+    counts = counts_for(problem, grown, 2.0)
+    pieces, owners = in_segments(problem, counts, grown)
+    assert set(owners) == {0} and len(pieces) == counts[0] > 50
     whole = as_one(pieces)
     np.testing.assert_array_equal(whole["z"].values, run["z"].values)
     for piece in pieces:

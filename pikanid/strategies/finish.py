@@ -17,7 +17,7 @@ from pikanid.optimise.box import met
 from pikanid.optimise.propagation import propagated
 from pikanid.problem.problem import Problem
 from pikanid.storage.version import __version__
-from pikanid.strategies.segments import growth
+from pikanid.strategies.growth import growth
 from pikanid.uncertainty.information import Directions, undetermined_warnings
 from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 

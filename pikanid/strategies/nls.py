@@ -27,9 +27,10 @@ from pikanid.optimise.shooting_fit import fit_shooting
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.settings import changed
-from pikanid.strategies import segments
 from pikanid.strategies.finish import finish
+from pikanid.strategies.growth import LONGEST, growth
 from pikanid.strategies.multiple_shooting import multiple_shooting
+from pikanid.strategies.segments import Followed, followed, joined
 from pikanid.strategies.starts import starting_points
 from pikanid.uncertainty.settings import USUAL as UNCERTAINTY
 from pikanid.uncertainty.settings import UncertaintySettings
@@ -53,7 +54,8 @@ class NLS:
         seed: Of the starting points.
         method: Integration method, see `pikanid.simulate`.
         segments: With more than one, every start is first led to a basin by multiple shooting.  An
-            unstable plant is followed in segments by itself: `settings["pieces"]` says in how many.
+            unstable plant is followed in segments by itself: `settings["pieces"]` says in how many
+            of each recording.
         extra: Starting points that "auto" adds.
         adequacy: When a fit explains the recording.
         uncertainty: When a parameter counts as not determined.
@@ -140,18 +142,24 @@ class NLS:
         θ to go on from; None where it is stable, or cannot be followed in segments.
         """
         for theta in (problem.guess, other):
-            if any(grown := segments.growth(problem, theta)):
-                found = segments.fit_in_segments(problem, theta, grown, partial(
-                    replace(self, starts=1, segments=1)._fit, begun=begun))
-                if found is None:
+            if any(grown := growth(problem, theta)):
+                cut = self.followed(problem, theta, grown)
+                if cut is None:
                     continue
+                found = replace(joined(cut, problem, grown), seconds=time.perf_counter() - begun)
                 at = {f.label: float(v) for f, v in zip(found.free, found.theta, strict=True)}
                 led = np.array([at.get(f.label, f.guess) for f in problem.free])
-                if not any(segments.growth(problem, led)):
+                if not any(growth(problem, led)):
                     return led
                 return replace(found, settings={
                     **found.settings, "starts": self.starts, "segments": self.segments})
         return None
+
+    def followed(self, problem: Problem, theta: np.ndarray, grown: Sequence[float],
+                 most: float = LONGEST) -> Followed | None:
+        """Recordings of an unstable plant in segments; see `segments.followed`."""
+        return followed(problem, theta, grown, partial(
+            replace(self, starts=1, segments=1)._fit, begun=time.perf_counter()), most)
 
     def one_start(self, shooting: Shooting, start: np.ndarray) -> Optimum | None:
         """One local fit from θ = start: coarse steps first, then steps fine enough to finish.

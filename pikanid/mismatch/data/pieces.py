@@ -9,10 +9,11 @@ from pikanid.mismatch.data.preparation import with_sigma
 from pikanid.mismatch.data.whitened import Records
 from pikanid.model import Model
 from pikanid.problem.problem import Problem
+from pikanid.strategies.cuts import NODE, free_start, in_segments
+from pikanid.strategies.growth import growth
 from pikanid.strategies.nls import NLS
-from pikanid.strategies.segments import free_start, growth, in_segments
 
-MOST = 4.0  # numerical: logarithm of how much errors grow in a segment
+MOST = 4.0  # numerical: logarithm of how much errors grow in a segment, at most
 
 
 def in_pieces(before: Estimate, records: Records, held: Records | None, nls: NLS
@@ -23,17 +24,21 @@ def in_pieces(before: Estimate, records: Records, held: Records | None, nls: NLS
         before: Of the nominal model, from the records.
         records: To explain.
         held: To prove it on.
-        nls: By which the motion in the latter is found.
+        nls: By which they are followed.
     """
     model = before.fitted_model
-    later = held and _cut(model, held, replace(nls, starts=1).fit(
-        model, with_sigma(held, model)))
-    return free_start(model), _cut(model, records, before), later
+    return free_start(model), _cut(model, records, nls), held and _cut(model, held, nls)
 
 
-def _cut(model: Model, records: Records, found: Estimate) -> Records:
-    problem = Problem(model, records.recordings)
-    pieces, owners = in_segments(
-        problem, growth(problem, problem.guess), MOST, found.trajectories)
-    return replace(records, recordings=tuple(pieces),
+def _cut(model: Model, records: Records, nls: NLS) -> Records:
+    known = Problem(model, with_sigma(records, model))
+    grown = growth(known, known.guess)
+    found = nls.followed(known, known.guess, grown, MOST)
+    if found is None:
+        return records
+    pieces, owners = in_segments(Problem(model, records.recordings), found.counts, grown)
+    begun = [replace(piece, begins={f"{n}{NODE}": float(v) for n, v in zip(
+        model.state_names, motion.x[0], strict=True)})
+        for piece, motion in zip(pieces, found.estimate.trajectories, strict=True)]
+    return replace(records, recordings=tuple(begun),
                    levels=tuple(records.levels[k] for k in owners), cut_from=tuple(owners))

@@ -24,9 +24,19 @@ def as_one(pieces: Sequence[Recording]) -> Recording:
         _joined([p[name] for p in pieces]) for name in pieces[0].names))
 
 
+def once(time: np.ndarray) -> np.ndarray:
+    """Which instants (N,) of segments, one after the other, are later than all before: inputs of a
+    segment begin where those of the one before end, or earlier.
+
+    >>> once(np.array([0.0, 1, 2, 1, 2, 3]))
+    array([ True,  True,  True, False, False,  True])
+    """
+    return np.asarray(np.diff(np.maximum.accumulate(time), prepend=-np.inf) > 0)
+
+
 def _joined(parts: Sequence[Channel]) -> Channel:
     time = np.concatenate([c.time for c in parts])
-    kept = np.diff(time, prepend=-np.inf) > 0  # an input ends where it goes on
+    kept = once(time)
     sigmas = [c.sigma for c in parts]
     sigma = sigmas[0] if sigmas[0] is None or np.ndim(sigmas[0]) == 0 else np.concatenate(
         [np.asarray(s) for s in sigmas])[kept]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
+from pikanid.mismatch.data.stretches import once
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import (
     Detection,
@@ -79,13 +80,14 @@ def _seen_at_once(whitened: Whitened) -> Iterator[
     begin = [[next(at) for _ in e.samples] for e in problem.experiments]
     for own in whitened.records.stretches:
         pieces = [problem.experiments[r] for r in own]
-        held = [(np.concatenate([h.time for h in same]), np.concatenate([h.values for h in same]))
-                for same in zip(*(e.held for e in pieces), strict=True)]
+        inputs = [(np.concatenate([h.time for h in same]), np.concatenate([h.values for h in same]))
+                  for same in zip(*(e.held for e in pieces), strict=True)]
+        held = [(t[once(t)], u[once(t)]) for t, u in inputs if len(t) > 1]
         for k in range(len(pieces[0].samples)):
             times = [e.samples[k].t for e in pieces]
             rows = [np.arange(begin[r][k], begin[r][k] + len(t))
                     for r, t in zip(own, times, strict=True)]
-            yield np.concatenate(times), np.concatenate(rows), [h for h in held if len(h[0]) > 1]
+            yield np.concatenate(times), np.concatenate(rows), held
 
 
 def _scattered(blocks: list[np.ndarray], where: list[np.ndarray], rows: int) -> np.ndarray:
