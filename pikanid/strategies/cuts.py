@@ -13,11 +13,13 @@ from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.problem.problem import Experiment, Problem
 from pikanid.recording import Channel, Recording
+from pikanid.simulation.vectorfield import VectorField
 from pikanid.strategies.growth import most_segments, used_after_start
 from pikanid.strategies.nodes import state_near
 
 NODE = "_node"  # definition: ends the name of a state at the beginning of a segment
 LEAD = 1.0  # numerical: logarithm of how much errors grow before a segment's first sample
+STEPS = 12  # numerical: back over that, for a guess
 
 
 def free_start(model: Model) -> Model:
@@ -58,18 +60,44 @@ def in_segments(problem: Problem, counts: Sequence[int], grown: Sequence[float],
         driven = any(n in recording for n in problem.model.input_names)
         lead = LEAD * (e.t1 - e.t0) / logarithm if driven and logarithm else 0.0
         t = max((recording[e.model.outputs[s.output].name].time for s in e.samples), key=len)
-        for low, high, last in _edges(t, e, count):
-            start = max(float(t[np.searchsorted(t, low - lead)]), e.t0) if low > e.t0 else low
-            x = (state_near(problem.model, e, start)[0] if motions is None else
-                 [np.interp(start, motions[r].t, column) for column in motions[r].x.T])
+        edges = _edges(t, e, count)
+        lows = np.array([low for low, _, _ in edges])
+        starts = np.where(lows > e.t0, np.maximum(t[np.searchsorted(t, lows - lead)], e.t0), e.t0)
+        x = np.array([state_near(problem.model, e, low)[0] for low in lows]) if motions is None \
+            else np.column_stack([np.interp(lows, motions[r].t, c) for c in motions[r].x.T])
+        first = _before(problem, r, lows, x, starts)
+        for (low, high, last), start, begins in zip(edges, starts.tolist(), first, strict=True):
             piece = recording.with_channels(*(
                 _input_cut(c, start, high, problem.model) if c.name in problem.model.input_names
                 else _cut(c, low, high, last) for c in recording.channels.values()))
             pieces.append(replace(piece, begins={
                 f"{s.name}{NODE}": float(v)
-                for s, v in zip(problem.model.states, x, strict=True)}))
+                for s, v in zip(problem.model.states, begins, strict=True)}))
             owners.append(r)
     return pieces, owners
+
+
+def _before(problem: Problem, r: int, t: np.ndarray, x: np.ndarray, start: np.ndarray
+            ) -> np.ndarray:
+    """States (M, n) at times `start` (M,) of motions in recording r that are at x (M, n) at times t
+    (M,): a first guess, by Runge and Kutta's method.
+    """
+    field, e = VectorField(problem.model), problem.experiments[r]
+    p, h = problem.parameters(problem.guess, r), (start - t)[:, None] / STEPS
+    back = x
+    with np.errstate(all="ignore"):
+        for k in range(STEPS):
+            now = t + k * h[:, 0]
+            u = e.inputs(now + h[:, 0] / 2)
+
+            def rate(share: float, x: np.ndarray) -> np.ndarray:
+                return field.rhs(now + share * h[:, 0], x, u, p)  # noqa: B023
+
+            k1 = rate(0.0, back)
+            k2 = rate(0.5, back + h / 2 * k1)
+            k3 = rate(0.5, back + h / 2 * k2)
+            back = back + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(1.0, back + h * k3))
+    return np.where(np.isfinite(back).all(axis=1)[:, None], back, x)
 
 
 def _edges(t: np.ndarray, e: Experiment, count: int) -> list[tuple[float, float, bool]]:

@@ -78,7 +78,6 @@ def followed(problem: Problem, theta: np.ndarray, grown: Sequence[float],
     found: Followed | None = None
     shared = [f.name for f in problem.free if f.recording is None]
     known = {f.name: float(v) for f, v in zip(problem.free, theta, strict=True)}
-    model = free_start(problem.model)
     for longest in (g for g in GROWN if g <= most):
         counts = counts_for(problem, grown, longest)
         if found is not None:
@@ -86,11 +85,11 @@ def followed(problem: Problem, theta: np.ndarray, grown: Sequence[float],
                 continue
             known = dict(zip([f.name for f in found.estimate.free],
                              map(float, found.estimate.theta), strict=True))
-        begun = model.with_values({n: known[n] for n in shared if n in model.free_names})
+        begun = problem.model.with_values({n: known[n] for n in shared if n in known})
         try:
-            pieces, owners = in_segments(
-                problem, counts, grown, None if found is None else found.motions)
-            longer = fit(Problem(begun, pieces))
+            pieces, owners = in_segments(Problem(begun, problem.recordings), counts, grown,
+                                         None if found is None else found.motions)
+            longer = fit(Problem(free_start(begun), pieces))
         except (errors.BadRecording, errors.SimulationFailed):
             break
         if found and not (longer.converged and longer.cost < GROSS**2 * found.estimate.cost):
