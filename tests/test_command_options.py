@@ -9,6 +9,7 @@ import pytest
 from commandline import Run
 
 import pikanid as pk
+from pikanid.commands.design import ranges
 from pikanid.commands.options import adjusted, quantity
 from pikanid.commands.outputs import check_outputs, written
 
@@ -53,3 +54,10 @@ def test_json_goes_to_a_file_or_is_printed_and_has_no_nan(
         written({beside: b"y"}, str(tmp_path / "absent" / "a.json"), {})
     assert Path(beside).read_bytes() == b"x"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.txt"]
+
+
+@pytest.mark.parametrize(("text", "range_"), [
+    ("u=0:10V", (0.0, 10.0)), ("u=-500:500mV", (-0.5, 0.5)), ("u=-1V:200mV", (-1.0, 0.2)),
+    ("u=-1.5e3: 2e3 mV", (-1.5, 2.0)), ("u=-1:2", (-1.0, 2.0))])
+def test_a_range_has_the_unit_of_its_upper_end(text: str, range_: tuple[float, float]) -> None:
+    assert ranges(pk.systems.dc_motor(), [text]) == {"u": pytest.approx(range_)}

@@ -230,6 +230,16 @@ def test_noise_is_what_was_asked_for(motor_rig: Rig, tmp_path: Path) -> None:
     assert seen["omega"].unit == "rad/s"
 
 
+def test_inputs_count_in_the_models_units(motor_rig: Rig) -> None:
+    train = motor_rig.train
+    in_mV = pk.Recording.from_arrays(train.t, {"u": 1e3 * train["u"].values}, {"u": "mV"})
+    rig = Rig(MOTOR, in_mV, train, 0.005)
+    np.testing.assert_allclose(rig.train["u"].values, train["u"].values)
+    assert rig.train["u"].unit == "V"
+    with pytest.raises(errors.BadUnit):
+        Rig(MOTOR, pk.Recording.from_arrays([0, 1], {"u": [0, 1]}, {"u": "kg"}), train, 0.005)
+
+
 def test_what_happens_once_is_in_one_recording(motor_rig: Rig) -> None:
     once, lasting = (Hidden(law(motor_rig, key), {}) for key in ("disturbance", "coulomb_friction"))
     assert acting([once, lasting], "train") == [once, lasting]

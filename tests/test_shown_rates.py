@@ -43,6 +43,27 @@ def test_what_acts_on_a_state_acts_on_what_shows_its_rate(formula: str) -> None:
     assert shown_rates(slower) == {"acc": "v"}
 
 
+@pytest.mark.parametrize(("formula", "unit", "factor"), [
+    ("v'", "mm/s^2", 1e3), ("v' + g*sin(x/2)", "m/s^2", 1.0), ("0.5*v' - v*x", "", 0.5),
+    ("abs(v')", "m/s^2", None), ("x + m*derivative(v)/k", "m", 2.0 / 70.0)])
+def test_a_rate_that_is_written_follows_in_any_unit_and_beside_anything(
+        formula: str, unit: str, factor: float | None) -> None:
+    nominal = model(formula, unit)
+    assert shown_rates(nominal) == {"acc": "v"}
+    found = nominal.with_term("v", "-b*x**3", [pk.Parameter("b", 3.0, "1/(s^2*m^2)")])
+    again = pk.Model.from_dict(found.to_dict())
+    assert again.output("acc") == found.output("acc")
+    gone = found.map_output("acc", gain=2.0).with_term("v", "b*x**3").map_input("F", offset=0.0)
+    values = {symbol(n): p for n, p in found.values.items()}
+    at = {**values, symbol("x"): 0.7, symbol("v"): -0.2, symbol("F"): 3.0}
+    here, there, back = (float(m.output("acc").expression.subs(at)) for m in (nominal, found, gone))
+    assert back == pytest.approx(2 * here)
+    if factor is not None:
+        assert there - here == pytest.approx(-factor * 3.0 * 0.7**3)
+    else:
+        assert there != pytest.approx(here)
+
+
 @pytest.mark.parametrize("formula", ["x", "v", "(F - c*v)/m", "-k*x/m", "(k*x + c*v - F)/m"])
 def test_other_outputs_stay_as_they_are(formula: str) -> None:
     """A force in the equation is not the force in a spring, nor is a state the rate of another."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +19,7 @@ from pikanid.recording.formats import written_endings
 if TYPE_CHECKING:
     from pikanid.model import Model
 
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 EXAMPLES = """Examples:
 
   pikanid design sloshing --sigma 0.1deg --out next.csv --limit theta=15deg
@@ -98,7 +100,7 @@ def design(
         "recorded": past, "sigma": sigmas(first, sigma) or None, "candidates": offered,
         "bounds": Bounds(**given) if given else None, "duration": duration,
         "dt": None if rate is None else 1 / rate, "limits": limits, "seed": seed,
-        "ranges": _ranges(first, span)}
+        "ranges": ranges(first, span)}
     chosen = d_optimal(first, **asked) if len(found) == 1 else next_experiment(found, **asked)
     made = {out: content(chosen.profile.channels, out)}
     if plot is not None:
@@ -110,7 +112,7 @@ def design(
     return 0
 
 
-def _ranges(model: Model, texts: list[str]) -> dict[str, tuple[float, float]]:
+def ranges(model: Model, texts: list[str]) -> dict[str, tuple[float, float]]:
     """The texts of --range, in the units of the model's inputs."""
     from pikanid import errors
 
@@ -120,6 +122,8 @@ def _ranges(model: Model, texts: list[str]) -> dict[str, tuple[float, float]]:
         low, colon, high = text.partition(":")
         if not (colon and low.strip() and high.strip()):
             raise errors.BadSetting(errors.not_a_range(text, "u=0:10V"))
+        if NUMBER.fullmatch(low.strip()):  # 0:10V are volts both
+            low += NUMBER.sub("", high.strip(), count=1)
         least, most = (quantity(v, units.get(name, ""), f"--range {name}") for v in (low, high))
         found[name] = least, most
     return found

@@ -17,6 +17,7 @@ from pikanid.formula import functions as expression_functions
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Formula, Hold, Parameter, State
+from pikanid.model.shown_rates import showing
 
 M = TypeVar("M", bound=Operations)
 INPUT_MAPS = ("backlash", "rate_limit", "gain", "offset", "saturation", "dead_zone", "function",
@@ -91,8 +92,7 @@ def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
         states=states,
         inputs=tuple(changed if i.name == name else i for i in model.inputs),
         equations={**{n: e.xreplace(swap) for n, e in model.equations.items()}, **added},
-        outputs=tuple(dataclasses.replace(o, expression=o.expression.xreplace(swap))
-                      for o in model.outputs))
+        outputs=tuple(o.with_swapped(swap) for o in model.outputs))
 
 
 def map_output(model: M, name: str, parameters: Sequence[Parameter] = (), *,
@@ -116,12 +116,13 @@ def map_output(model: M, name: str, parameters: Sequence[Parameter] = (), *,
     def read(formula: Formula, what: str) -> sp.Expr:
         return model.formula(formula, f"the {what} of {where}", [name])
 
-    value = item.expression
+    value = item.formula
     if lag is not None:
         held = symbol(_fresh(model, f"{name}_lag"))
         start = {symbol(s.name): s.initial for s in model.states}
-        state = State(held.name, item.unit, value.xreplace({**start, TIME: sp.Integer(0)}))
-        model = model.with_state(state, (value - held) / read(lag, "lag"))
+        state = State(held.name, item.unit,
+                      item.expression.xreplace({**start, TIME: sp.Integer(0)}))
+        model = model.with_state(state, (item.expression - held) / read(lag, "lag"))
         value = held
     if gain is not None:
         value = read(gain, "gain") * value
@@ -136,7 +137,7 @@ def map_output(model: M, name: str, parameters: Sequence[Parameter] = (), *,
             raise errors.BadModel(errors.bad_value(f"The clip of {where}", clip, "[lo, hi]"))
         value = expression_functions.clip(value, read(clip[0], "clip"), read(clip[1], "clip"))
     changed = dataclasses.replace(
-        item, expression=value,
+        showing(item, value, model.equations),
         delay=item.delay if delay is None else item.delay + read(delay, "delay"))
     return model.replace(outputs=tuple(changed if o.name == name else o for o in model.outputs))
 

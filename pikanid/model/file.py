@@ -27,7 +27,7 @@ from pikanid.model.effects_file import from_table, to_table
 from pikanid.model.lookup import Lookup
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
-from pikanid.model.shown_rates import DERIVATIVE, in_states, with_derivatives
+from pikanid.model.shown_rates import DERIVATIVE, showing, with_derivatives
 from pikanid.model.with_effect import with_candidates
 from pikanid.storage.entries import Entry
 from pikanid.storage.limits import toml_content
@@ -109,7 +109,7 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
 
     def shown(value: Any, where: str) -> sp.Expr:
         text = with_derivatives(value) if isinstance(value, str) else value
-        return in_states(formula(text, where, (), DERIVATIVE), right, where)
+        return formula(text, where, (), DERIVATIVE)
 
     model = kind(
         name=content.get("name", Path(source).stem),
@@ -118,7 +118,7 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
                      for n, e in tables["inputs"].items()),
         parameters=tuple(parameters.values()),
         equations=right,
-        outputs=tuple(_output(n, e, shown, source) for n, e in tables["outputs"].items()),
+        outputs=tuple(_output(n, e, shown, right, source) for n, e in tables["outputs"].items()),
         splines=splines, domain=content.get("domain"))
     for name, entry in tables["inputs"].items():
         if maps := _maps(entry, INPUT_MAPS, f"of input '{name}'", formula, ()):
@@ -151,7 +151,7 @@ def to_dict(model: Lookup) -> dict[str, Any]:
             "description": p.description}) for p in model.parameters}
     content["equations"] = {n: to_text(e) for n, e in model.equations.items()}
     content["outputs"] = {o.name: _drop({
-        "unit": o.unit, "expression": to_text(o.expression), "sigma": o.sigma,
+        "unit": o.unit, "expression": to_text(o.formula), "sigma": o.sigma,
         "delay": None if o.delay == 0 else _plain(o.delay)}) for o in model.outputs}
     if model.splines:
         content["splines"] = {s.name: {"degree": s.degree, "knots": [float(k) for k in s.knots]}
@@ -247,11 +247,12 @@ def _state(name: str, entry: Mapping[str, Any], formula: Any) -> State:
     return State(name, entry.get("unit", ""), expr)
 
 
-def _output(name: str, entry: Mapping[str, Any], formula: Any, source: str) -> Output:
+def _output(name: str, entry: Mapping[str, Any], formula: Any, equations: Mapping[str, sp.Expr],
+            source: str) -> Output:
     if "expression" not in entry:
         raise errors.BadModel(errors.model_file_missing(source, f"output '{name}'", "'expression'"))
-    expression = formula(entry["expression"], f"output '{name}'")
-    return Output(name, expression, entry.get("unit", ""), entry.get("sigma"))
+    shown = formula(entry["expression"], f"output '{name}'")
+    return showing(Output(name, shown, entry.get("unit", ""), entry.get("sigma")), shown, equations)
 
 
 def _spline(name: str, entry: Mapping[str, Any], source: str) -> Spline:

@@ -93,8 +93,7 @@ class Operations(Lookup):
             swap[symbol(name)] = model.formula(text, f"the formula put for '{name}'")
         return model.replace(
             equations={n: e.xreplace(swap) for n, e in model.equations.items()},
-            outputs=tuple(dataclasses.replace(o, expression=o.expression.xreplace(swap))
-                          for o in model.outputs))
+            outputs=tuple(o.with_swapped(swap) for o in model.outputs))
 
     def with_spline(self, spline: Spline, unit: str = "", scale: float = 0.0) -> Self:
         """Declare a spline function and its coefficients (guess `scale`, free)."""

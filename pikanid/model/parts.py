@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import sympy as sp
@@ -69,13 +70,28 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Output:
-    """A measured quantity y = h(x, u, t; p), seen `delay` seconds late, with noise `sigma`."""
+    """A measured quantity y = h(x, u, t; p), seen `delay` seconds late, with noise `sigma`.
+
+    `written` is h with ``derivative(x)`` where it shows the rate of a state, whose equation stands
+    there in `expression`; None where it shows none.
+    """
 
     name: str
     expression: sp.Expr
     unit: str = ""
     sigma: float | None = None
     delay: sp.Expr = sp.S.Zero
+    written: sp.Expr | None = None
+
+    @property
+    def formula(self) -> sp.Expr:
+        """As it was written."""
+        return self.expression if self.written is None else self.written
+
+    def with_swapped(self, swap: Mapping[sp.Expr, sp.Expr]) -> Output:
+        """With formulas in the place of symbols."""
+        return replace(self, expression=self.expression.xreplace(swap),
+                       written=None if self.written is None else self.written.xreplace(swap))
 
 
 @dataclass(frozen=True)

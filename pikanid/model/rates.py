@@ -7,8 +7,6 @@ equations were written with.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import sympy as sp
 
 from pikanid.formula import units
@@ -17,6 +15,7 @@ from pikanid.formula.expressions import symbol
 from pikanid.model.effect import Effect
 from pikanid.model.model import Model
 from pikanid.model.parts import State
+from pikanid.model.shown_rates import rate_of
 
 
 def in_rates(model: Model) -> tuple[Model, list[str]]:
@@ -81,4 +80,5 @@ def _in_rate(model: Model, coordinate: State, moved: str, factor: sp.Expr) -> Mo
                      for s in model.states),
         equations={(name if n == moved else n): own if n == moved else equations[n]
                    for n in model.equations},
-        outputs=tuple(replace(o, expression=o.expression.xreplace(swap)) for o in model.outputs))
+        outputs=tuple(o.with_swapped(swap | {
+            rate_of(moved): rate_of(name) / factor}) for o in model.outputs))

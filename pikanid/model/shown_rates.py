@@ -1,7 +1,8 @@
 """Outputs that show the rate of a state: an accelerometer, a meter of a flow into a tank.
 
 What acts on a state acts on what shows its rate.  An output whose formula is the right-hand side of
-a state's equation, or that and a constant, stays so whatever the equation becomes.
+a state's equation, or that and a constant, stays so whatever the equation becomes; so does what is
+written with the rate of a state, whatever stands beside it and in whatever unit.
 """
 
 from __future__ import annotations
@@ -30,6 +31,22 @@ def with_derivatives(text: str) -> str:
     'derivative(v) + g'
     """
     return re.sub(r"\b([A-Za-z_]\w*)'", rf"{DERIVATIVE}(\1)", text)
+
+
+def rate_of(state: str) -> sp.Expr:
+    """The rate of a state, to stand in the formula of an output."""
+    return sp.Function(DERIVATIVE, real=True)(symbol(state))
+
+
+def showing(output: Output, formula: sp.Expr, equations: Mapping[str, sp.Expr]) -> Output:
+    """The output with a formula that may show rates.
+
+    Raises:
+        BadModel: If one is not that of a state.
+    """
+    expression = in_states(formula, equations, f"output '{output.name}'")
+    return replace(output, expression=expression,
+                   written=None if expression == formula else formula)
 
 
 def in_states(formula: sp.Expr, equations: Mapping[str, sp.Expr], where: str) -> sp.Expr:
@@ -63,9 +80,11 @@ def shown_rates(model: Lookup) -> dict[str, str]:
     """
     moving = frozenset((*map(symbol, (*model.state_names, *model.input_names)), TIME))
     # an output that is a state by itself, as most are, shows that
+    written = {o.name: str(rate.args[0]) for o in model.outputs if o.written is not None
+               for rate in o.written.atoms(AppliedUndef) if rate.func.__name__ == DERIVATIVE}
     found = {o.name: _shown(o.expression, tuple(model.equations.items()), moving)
              for o in model.outputs if not (o.expression.is_Symbol or o.expression.is_number)}
-    return {name: state for name, state in found.items() if state}
+    return {name: state for name, state in (found | written).items() if state}
 
 
 def followed(model: Lookup, outputs: Sequence[Output], equations: Mapping[str, sp.Expr]
@@ -75,6 +94,9 @@ def followed(model: Lookup, outputs: Sequence[Output], equations: Mapping[str, s
     before = {o.name: o.expression for o in model.outputs}
     made = []
     for output in outputs:
+        if output.written is not None:
+            made.append(showing(output, output.written, equations))
+            continue
         state = shown.get(output.name, "")
         old, new = model.equations.get(state), equations.get(state)
         if old is not None and isinstance(new, sp.Expr) and new != old:

@@ -16,6 +16,7 @@ from pikanid import errors
 from pikanid.formula.expressions import TIME, symbol, to_text
 from pikanid.formula.functions import abs_power, clip, signed_power
 from pikanid.model.parts import Parameter
+from pikanid.model.shown_rates import DERIVATIVE
 from pikanid.model.unit_algebra import (
     BARE,
     ONE,
@@ -80,7 +81,9 @@ class Conversion:
             return expr, BARE
         if isinstance(expr, AppliedUndef):
             first = self.known.get(f"{expr.func.__name__}_0")
-            inner, _ = self.walk(expr.args[0], where)
+            inner, unit = self.walk(expr.args[0], where)
+            if expr.func.__name__ == DERIVATIVE:
+                return expr, unit.times(SECOND, Fraction(-1))
             return expr.func(inner), declared(first.unit if first else "", expr.func.__name__)
         if expr.is_Add or isinstance(expr, _OF_ONE_UNIT):
             return self.meeting(expr, where, wanted)

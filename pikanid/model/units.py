@@ -24,6 +24,7 @@ from pikanid import errors
 from pikanid.formula import units
 from pikanid.model.lookup import Lookup
 from pikanid.model.parts import Input, Output, Parameter, State
+from pikanid.model.shown_rates import showing
 from pikanid.model.unit_algebra import SECOND, declared
 from pikanid.model.unit_conversion import Conversion
 
@@ -82,17 +83,17 @@ its numbers are used as they are: check the formula and its units.",)
 def _converted(model: Lookup, put: Callable[..., sp.Expr]) -> dict[str, Any]:
     """The fields of a model that hold formulas, each formula put into the unit of its place."""
     rates = {s.name: declared(s.unit, s.name).times(SECOND, Fraction(-1)) for s in model.states}
+    equations = {name: put(e, rates[name], f"The equation of '{name}'")
+                 for name, e in model.equations.items()}
     return {
-        "equations": {name: put(e, rates[name], f"The equation of '{name}'")
-                      for name, e in model.equations.items()},
+        "equations": equations,
         "states": tuple(dataclasses.replace(s, initial=put(
             s.initial, declared(s.unit), f"The initial value of '{s.name}'", open_=not s.unit))
             for s in model.states),
         "inputs": tuple(_input(i, put) for i in model.inputs),
-        "outputs": tuple(dataclasses.replace(
-            o, expression=put(o.expression, declared(o.unit), f"Output '{o.name}'",
-                              open_=not o.unit),
-            delay=put(o.delay, SECOND, f"The delay of output '{o.name}'"))
+        "outputs": tuple(showing(
+            dataclasses.replace(o, delay=put(o.delay, SECOND, f"The delay of output '{o.name}'")),
+            put(o.formula, declared(o.unit), f"Output '{o.name}'", open_=not o.unit), equations)
             for o in model.outputs)}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 from typing import TypeVar
 
@@ -52,8 +51,7 @@ def with_effect(model: M, effect: Effect, nominal: M | None = None) -> M:
             raise errors.BadModel(errors.not_in_model(
                 "symbol", name, names, difflib.get_close_matches(name, names, 1)))
     equations = {n: e.xreplace(swap) + terms.get(n, sp.S.Zero) for n, e in model.equations.items()}
-    outputs = tuple(dataclasses.replace(o, expression=o.expression.xreplace(swap))
-                    for o in model.outputs)
+    outputs = tuple(o.with_swapped(swap) for o in model.outputs)
     equations |= {n: model.formula(s.equation, f"equation of '{n}' in {where}", own)
                   for n, s in effect.states.items()}
     states = tuple(State(n, s.unit, model.formula(s.initial, f"start of '{n}' in {where}"))

@@ -46,8 +46,7 @@ def _with_parts(model: Model) -> Model:
     return model.replace(
         inputs=(*own, *added),
         equations={n: e.xreplace(swap) for n, e in model.equations.items()},
-        outputs=tuple(dataclasses.replace(o, expression=o.expression.xreplace(swap))
-                      for o in model.outputs))
+        outputs=tuple(o.with_swapped(swap) for o in model.outputs))
 
 
 def _fresh(model: Model, name: str) -> str:

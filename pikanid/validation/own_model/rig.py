@@ -26,7 +26,8 @@ class Rig:
 
     Attributes:
         model: Nominal, at values near those of the rig.
-        train, held_out: Experiments: the model's inputs, all on one time base each.
+        train, held_out: Experiments: the model's inputs, all on one time base each, which are put
+            into the model's units.
         noise: Of each output, as a share of the range that it covers without effects.
         own: Effects and forms of the user, which a diagnosis will know as well.
 
@@ -34,6 +35,7 @@ class Rig:
         BadRecording: An input that the model needs is missing, or the channels of an experiment
             have several time bases.
         BadSetting: A noise out of range.
+        BadUnit: The unit of an input does not fit the model's.
     """
 
     model: Model
@@ -45,7 +47,9 @@ class Rig:
     def __post_init__(self) -> None:
         if not 1e-6 <= self.noise <= 0.5:
             raise errors.BadSetting(errors.conceal_noise(self.noise))
-        for experiment in (self.train, self.held_out):
+        for part in ("train", "held_out"):
+            experiment = _in_units(getattr(self, part), self.model)
+            object.__setattr__(self, part, experiment)
             times = [experiment[n].time for n in experiment.names]
             if any(len(t) != len(times[0]) or np.any(t != times[0]) for t in times):
                 raise errors.BadRecording(errors.conceal_one_time_base(experiment.name))
@@ -98,6 +102,14 @@ class Rig:
             self.train[self.train.names[0]].interval)
         known = {e.key: e for e in (*candidates_of(self.model), *self.own)}
         return laws(nominal, around, tuple(known.values()))
+
+
+def _in_units(experiment: Recording, model: Model) -> Recording:
+    """With the model's inputs in the model's units."""
+    here = [i for i in model.inputs if i.name in experiment]
+    own = {i.name: experiment.as_input(
+        i.name, i.unit if i.unit and experiment[i.name].unit else None) for i in here}
+    return experiment.with_channels(*{**experiment.channels, **own}.values())
 
 
 def _equations(model: Model) -> tuple[str, ...]:
