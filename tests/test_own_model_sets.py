@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from pikanid.model import Effect
 from pikanid.model.effects_file import read_effects
 from pikanid.model.parts import Parameter
 from pikanid.validation.concealed.score import judge
-from pikanid.validation.own_model.case import Order, acting, make, met_by
+from pikanid.validation.own_model.case import Order, acting, make
 from pikanid.validation.own_model.generate import OwnSet, generate
 from pikanid.validation.own_model.hidden import Hidden, Workbench
 from pikanid.validation.own_model.law import Law
@@ -197,25 +196,6 @@ def test_the_place_of_the_answer_that_is_right_counts(given: list[tuple[str, str
         {"ids": ids.split("/"), "channel": channel, "equation": equation}]}
         for ids, channel, equation in given]}
     assert placed({"effects": [FORCE]}, answer) == right
-
-
-@pytest.mark.parametrize("signs", [1, 2])
-def test_a_gain_in_one_direction_is_a_gain_where_there_is_no_other(signs: int) -> None:
-    rng = np.random.default_rng(5)
-    u = np.repeat(rng.uniform(2.0 if signs == 1 else -6.0, 6.0, 20), 10)
-    run = pk.Recording.from_arrays(0.02 * np.arange(len(u)), {"u": u}, {"u": "V"})
-    model = MOTOR.replace(parameters=tuple(
-        replace(p, free=p.name == "b") for p in MOTOR.parameters))
-    rig = Rig(model, run, run, 0.005)
-    bench = Workbench(model, {"b": model.values["b"]}, rig.scene({}))
-    one_way = Hidden(law(rig, "one_way_gain"), {"e": 0.1})
-    truth = bench.seen([one_way])
-    alone = bench.fitted(truth, [], sure=True)
-    rival = bench.nearest(truth, [one_way], [alone], [law(rig, "input_gain")], rng)
-    assert alone.distance > 20
-    assert met_by(one_way, alone.distance, rival) == (("input_gain",) if signs == 1 else ())
-    known = Hidden(law(rig, "coulomb_friction"), {})
-    assert met_by(known, alone.distance, (("static_bias",), 0.0)) == ()
 
 
 def test_noise_is_what_was_asked_for(motor_rig: Rig, tmp_path: Path) -> None:

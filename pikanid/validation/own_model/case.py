@@ -17,7 +17,6 @@ from pikanid.validation.own_model.law import Law
 from pikanid.validation.own_model.rig import Rig
 
 ATTEMPTS = 60  # definition: draws until a law can be seen and the motion stays finite
-ALIKE = 1e-3  # definition: of what a law changes, that another one may miss and be the same
 CLASSES = ("nothing", "single", "pair", "outside")
 
 
@@ -73,26 +72,10 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
         "files": {key: f"{order.name}_{key}.csv" for key in ("train", "held_out")},
         "sha256": {n: hashlib.sha256(data).hexdigest() for n, data in recordings.items()},
         "base": {n: {"value": v} for n, v in values.items()},
-        "noise": dict(scene.sigma),
-        "effects": [_entry(h, met_by(h, distance, rival)) for h, distance in zip(
-            hidden, alone, strict=True)],
+        "noise": dict(scene.sigma), "effects": [_entry(h) for h in hidden],
         "visibility": {"nominal": nominal, "effects": alone, "best_rival": list(rival[0]),
                        "best_rival_distance": _finite(distance)},
         "nameable": nameable(hidden, nominal, distance)})
-
-
-def met_by(hidden: Hidden, alone: float, rival: tuple[tuple[str, ...], float]) -> tuple[str, ...]:
-    """Ids of the known law that does in these recordings all that one of no catalogue does.
-
-    A gain that acts in one direction only is a gain where the input never changes its sign.
-
-    Args:
-        hidden: The law.
-        alone: Distance without it [σ].
-        rival: Ids and distance of the best explanation that is not the truth.
-    """
-    ids, distance = rival
-    return ids if not hidden.law.known and len(ids) == 1 and distance < ALIKE * alone else ()
 
 
 def acting(hidden: Sequence[Hidden], part: str) -> list[Hidden]:
@@ -113,9 +96,9 @@ def _one(laws: Sequence[Law], wanted: str, rng: np.random.Generator) -> Law:
     return places[int(rng.integers(len(places)))]
 
 
-def _entry(hidden: Hidden, met: tuple[str, ...]) -> dict[str, object]:
+def _entry(hidden: Hidden) -> dict[str, object]:
     law, units = hidden.law, {p.name: p.unit for p in hidden.law.effect.parameters}
-    return {"id": law.id, "twins": [*law.twins, *met], "near": "", "families": sorted(law.families),
+    return {"id": law.id, "twins": list(law.twins), "near": "", "families": sorted(law.families),
             "variant": law.effect.variant, "expression": law.effect.expression,
             "where": {"channel": law.channel, "place": law.where, "places": [*law.places]},
             "parameters": {n: {"value": v, "unit": units[n]} for n, v in hidden.values.items()}}
