@@ -75,6 +75,7 @@ def _growth(field: VectorField, e: Experiment, p: np.ndarray) -> float:
 
 
 def most_segments(e: Experiment, states: int) -> int:
+    """Into how many a recording can be cut at most, for a model of so many states."""
     return max(max(len(s.t) for s in e.samples) // (LEAST * states), 1)
 
 
