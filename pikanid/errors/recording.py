@@ -102,7 +102,8 @@ def absurd_value(where: str, place: str, name: str, value: float) -> str:
 
 def missing_input(where: str, name: str, sample: int, time: float) -> str:
     return (f"'{where}', sample {sample} (t = {time:g} s): input '{name}' is missing (NaN); only "
-            "outputs may have gaps. Fill it or window the recording.")
+            "outputs may have gaps. Fill it, window the recording, or give an input with a clock "
+            "of its own in a file of its own (joined as run.csv+input.csv).")
 
 
 def constant_output(where: str, name: str, value: float) -> str:
