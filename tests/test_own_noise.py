@@ -40,6 +40,22 @@ def test_the_ratio_of_powers_is_read_at_high_frequencies(times: float, rho: floa
     assert np.std(np.log(ratios)) == pytest.approx(np.mean(errors), rel=0.35)
 
 
+@pytest.mark.parametrize("times", [1.0, 2.0])
+def test_off_an_even_grid_it_is_read_beside_neighbours(times: float) -> None:
+    ratios, errors = [], []
+    for seed in range(40):
+        t = np.sort(np.random.default_rng(seed).uniform(0, T[-1], 500))
+        found = louder(level(1.0), t, noise(times, 0.0, seed)[:500] + 30 * np.sin(2 * t), 2.0,
+                       DEFAULTS.noise)
+        assert found is not None
+        ratios.append(found[0])
+        errors.append(found[1])
+    assert np.median(ratios) == pytest.approx(times**2, rel=0.15)
+    assert np.std(np.log(ratios)) < 1.35 * np.mean(errors)
+    few = slice(0, 500, 20)
+    assert louder(level(1.0), t[few], 5 * np.sin(9 * t[few]), 2.0, DEFAULTS.noise) is None
+
+
 def heard(sigma: float, seed: int, source: str = "a quiet stretch") -> float:
     recording = pk.Recording({"y": Channel("y", T, noise(sigma, 0.0, seed), "m")})
     records = Records((recording,), ({"y": level(1.0)},), DEFAULTS)

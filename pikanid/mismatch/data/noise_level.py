@@ -135,12 +135,17 @@ def _from_neighbours(level: NoiseModel, channel: Channel, t: Array, residual: Ar
 def louder(level: NoiseModel, t: np.ndarray, residual: np.ndarray, rate: float,
            settings: NoiseSettings) -> tuple[float, float] | None:
     """How many times the power of a noise that another recording told a residual (N,) at times t
-    (N,) has at its highest frequencies, and the relative standard error of that; None where its
-    spectrum shows nothing.
+    (N,) has at its highest frequencies or, off an even grid, beside its neighbours, and the
+    relative standard error of that; None where samples are too few to tell.
     """
+    if len(t) < settings.least_spectrum:
+        return None
     found = _spectrum(level, t, residual, rate, settings)
     if found is None:
-        return None
+        beside = beside_neighbours(t, residual)
+        if len(beside) < LEAST or level.rho:
+            return None
+        return (difference_noise(residual, t) / level.sigma) ** 2, known_by(beside)
     omega, power, high, share, _ = found
     expected = level.sigma**2 * (1 - level.rho**2) * _shape(level.rho, omega[high])
     ratio = _calm(power[high] / expected, settings.line)
