@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +18,6 @@ from pikanid.recording.formats import written_endings
 if TYPE_CHECKING:
     from pikanid.model import Model
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 EXAMPLES = """Examples:
 
   pikanid design sloshing --sigma 0.1deg --out next.csv --limit theta=15deg
@@ -115,6 +113,7 @@ def design(
 def ranges(model: Model, texts: list[str]) -> dict[str, tuple[float, float]]:
     """The texts of --range, in the units of the model's inputs."""
     from pikanid import errors
+    from pikanid.formula.quantity import parts
 
     found: dict[str, tuple[float, float]] = {}
     units = {i.name: i.unit for i in model.inputs}
@@ -122,8 +121,9 @@ def ranges(model: Model, texts: list[str]) -> dict[str, tuple[float, float]]:
         low, colon, high = text.partition(":")
         if not (colon and low.strip() and high.strip()):
             raise errors.BadSetting(errors.not_a_range(text, "u=0:10V"))
-        if NUMBER.fullmatch(low.strip()):  # 0:10V are volts both
-            low += NUMBER.sub("", high.strip(), count=1)
+        ends = parts(low), parts(high)
+        if ends[0] and ends[1] and not ends[0][1]:  # 0:10V are volts both
+            low += ends[1][1]
         least, most = (quantity(v, units.get(name, ""), f"--range {name}") for v in (low, high))
         found[name] = least, most
     return found

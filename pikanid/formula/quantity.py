@@ -11,6 +11,16 @@ from pikanid.formula import units
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
+def parts(text: str) -> tuple[str, str] | None:
+    """Number and unit of a text, as they are written; None where it does not begin with a number.
+
+    >>> parts("-45 mm"), parts("1e3"), parts("mm")
+    (('-45', 'mm'), ('1e3', ''), None)
+    """
+    match = _QUANTITY.fullmatch(text)
+    return None if match is None else (match[1], match[2])
+
+
 def quantity(text: str, unit: str, where: str, difference: bool = False) -> float:
     """A number in `unit`; a unit written behind it is converted, none means `unit` itself.
 
@@ -28,10 +38,10 @@ def quantity(text: str, unit: str, where: str, difference: bool = False) -> floa
     >>> quantity("45 mm", "m", "l_theta")
     0.045
     """
-    match = _QUANTITY.fullmatch(text)
-    if match is None or not math.isfinite(float(match[1])):
+    found = parts(text)
+    if found is None or not math.isfinite(float(found[0])):
         raise errors.BadSetting(errors.not_a_quantity(text, where))
-    value, given = float(match[1]), match[2]
+    value, given = float(found[0]), found[1]
     if not given:
         return value
     given = f"1{given}" if given.startswith("/") else given

@@ -85,18 +85,18 @@ def _before(problem: Problem, r: int, t: np.ndarray, x: np.ndarray, start: np.nd
     field, e = VectorField(problem.model), problem.experiments[r]
     p, h = problem.parameters(problem.guess, r), (start - t)[:, None] / STEPS
     back = x
+
+    def rate(t: np.ndarray, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return field.rhs(t, x, u, p)
+
     with np.errstate(all="ignore"):
         for k in range(STEPS):
-            now = t + k * h[:, 0]
-            u = e.inputs(now + h[:, 0] / 2)
-
-            def rate(share: float, x: np.ndarray) -> np.ndarray:
-                return field.rhs(now + share * h[:, 0], x, u, p)  # noqa: B023
-
-            k1 = rate(0.0, back)
-            k2 = rate(0.5, back + h / 2 * k1)
-            k3 = rate(0.5, back + h / 2 * k2)
-            back = back + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(1.0, back + h * k3))
+            now, half, then = (t + (k + share) * h[:, 0] for share in (0.0, 0.5, 1.0))
+            u = e.inputs(half)
+            k1 = rate(now, back, u)
+            k2 = rate(half, back + h / 2 * k1, u)
+            k3 = rate(half, back + h / 2 * k2, u)
+            back = back + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(then, back + h * k3, u))
     return np.where(np.isfinite(back).all(axis=1)[:, None], back, x)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pikanid.estimate import Estimate
 from pikanid.mismatch.data.preparation import with_sigma
 from pikanid.mismatch.data.whitened import Records
 from pikanid.model import Model
@@ -16,17 +15,16 @@ from pikanid.strategies.nls import NLS
 MOST = 4.0  # numerical: logarithm of how much errors grow in a segment, at most
 
 
-def in_pieces(before: Estimate, records: Records, held: Records | None, nls: NLS
+def in_pieces(model: Model, records: Records, held: Records | None, nls: NLS
               ) -> tuple[Model, Records, Records | None]:
     """The nominal model with a start of its own in each segment, and both records in segments.
 
     Args:
-        before: Of the nominal model, from the records.
+        model: The nominal one, fitted to the records.
         records: To explain.
         held: To prove it on.
         nls: By which they are followed.
     """
-    model = before.fitted_model
     return free_start(model), _cut(model, records, nls), held and _cut(model, held, nls)
 
 

@@ -108,7 +108,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
                       "are needed to confirm anything")
     again = None
     if "pieces" in before.settings:
-        nominal, records, held = in_pieces(before, records, held, nls)
+        nominal, records, held = in_pieces(nominal, records, held, nls)
         notes.append(before.warnings[0])
     else:
         again = repeats(nominal, records, held if proves else None)

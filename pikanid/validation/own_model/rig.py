@@ -106,9 +106,8 @@ class Rig:
 
 def _in_units(experiment: Recording, model: Model) -> Recording:
     """With the model's inputs in the model's units."""
-    here = [i for i in model.inputs if i.name in experiment]
-    own = {i.name: experiment.as_input(
-        i.name, i.unit if i.unit and experiment[i.name].unit else None) for i in here}
+    own = {i.name: experiment.as_input(i.name, i.unit or None)
+           for i in model.inputs if i.name in experiment}
     return experiment.with_channels(*{**experiment.channels, **own}.values())
 
 
