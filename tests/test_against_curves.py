@@ -40,7 +40,7 @@ def judged(case: Case, *keys: str) -> Part:
     h = next(h for h in case.search.ranked() if h.key == {*keys})
     sure = tuple(Present(kinds_of(e, h, DEFAULTS.part.dry)[0], e, e.ids, {}, 1.0, 1.0, 50.0, 50.0,
                          0.95) for e in own)
-    return against_curves(case, Explanations((), 1.0, None), Part(sure, (), h, 1.0, 0.95),
+    return against_curves(case, Explanations((), 1.0), Part(sure, (), h, 1.0, 0.95),
                           [{"theta": SIGMA}] * 2)
 
 

@@ -136,9 +136,9 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
         return bool(new)
 
     monkeypatch.setattr(surely, "explanations", lambda *_: SimpleNamespace(
-        lead=SimpleNamespace(hypothesis=lead[0]), weighed=(), leaders=(lead[0],)))
+        weighed=(), leaders=lambda share: (lead[0],)))
     monkeypatch.setattr(surely, "surely_there", lambda found, *_: Part(
-        (), (), found.lead.hypothesis, 1.0, 0.95))
+        (), (), *found.leaders(0.8), 1.0, 0.95))
     monkeypatch.setattr(surely, "_compared", compared)
     monkeypatch.setattr(surely, "_one_more", lambda *_: None)
     monkeypatch.setattr(surely, "lasting", lambda _: [first])
@@ -154,10 +154,11 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
 
 def test_what_is_most_probable_is_reduced_though_it_predicts_too_little_to_lead() -> None:
     probable, predicts = (weighed(e, 1.0, w) for e, w in (((COULOMB, DRAG), 0.9), ((DRAG,), 0.1)))
-    for lead, wanted in ((predicts, (predicts, probable)), (probable, (probable,)),
-                         (None, (probable,))):
-        found = Explanations((probable, predicts), 1.0, lead)
-        assert found.leaders == tuple(w.hypothesis for w in wanted)
+    for shares, wanted in (((0.7, 0.9), (predicts, probable)), ((0.9, 0.95), (probable,)),
+                           ((0.6, 0.7), (probable,))):
+        found = Explanations(tuple(replace(w, share=s) for w, s in zip(
+            (probable, predicts), shares, strict=True)), 1.0)
+        assert found.leaders(0.8) == tuple(w.hypothesis for w in wanted)
 
 
 @pytest.mark.parametrize("wider", [

@@ -32,7 +32,7 @@ def page(dx: Diagnosis, title: str, files: Sequence[str] = ()) -> str:
     return document(title, [
         f"<h1>What is missing? {text(title)}</h1>",
         f'<p class="verdict {dx.verdict}">{text(dx.sentence())}</p>',
-        _proof(dx), _surely(dx), _what(dx), _parameters(dx), _shape(dx),
+        _proof(dx), _surely(dx), _closest(dx), _what(dx), _parameters(dx), _shape(dx),
         _where(dx) if dx.mismatch else "<h2>What the model leaves of the recording</h2>",
         drawn(plot_where(dx), "what is left over time, and the force that would explain it",
               plot_where(dx, narrow=True)),
@@ -107,6 +107,15 @@ def _surely(dx: Diagnosis) -> str:
     left = "".join(f"<li>{text(line)}.</li>" for line in dx.remainder.lines())
     return (f"<h2>Surely there</h2>{tabled(sheet)}"
             f"<p>{text(dx.remainder.sentence())}.</p><ul>{left}</ul>")
+
+
+def _closest(dx: Diagnosis) -> str:
+    """What would be next where nothing is sure."""
+    if dx.closest is None:
+        return ""
+    first, *doubts = (f"{text(line)}." for line in dx.closest.lines())
+    return (f"<h2>What comes closest</h2><p>{first}</p>"
+            f"<ul>{''.join(f'<li>{doubt}</li>' for doubt in doubts)}</ul>")
 
 
 def _what(dx: Diagnosis) -> str:

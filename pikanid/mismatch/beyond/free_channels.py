@@ -45,7 +45,7 @@ def sure_channels(base: Hypothesis, site: Site, candidates: Sequence[Candidate],
     """
     left = _Left(base, site, candidates)
     sure = {"dynamics"} if _free_force(left, tried) else set()
-    lead = None if explained is None else explained.lead
+    lead = None if explained is None else explained.lead(left.rule.share)
     if lead is not None and explained is not None:
         rule, found = left.rule, explained.weighed
         own = left.after(lead.hypothesis)

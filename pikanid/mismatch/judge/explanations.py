@@ -43,19 +43,20 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Explanations:
-    """Explanations, the best first, what χ² is divided by, and the best one that predicts most of
-    what the nominal model misses, if there is one.
-    """
+    """Explanations, the best first, and what χ² is divided by."""
 
     weighed: tuple[Weighed, ...]
     overdispersion: float
-    lead: Weighed | None
 
-    @property
-    def leaders(self) -> tuple[Hypothesis, ...]:
+    def lead(self, share: float) -> Weighed | None:
+        """The best one that predicts a share of what the nominal model misses, if there is one."""
+        return next((w for w in self.weighed if not smaller(w.share, share)), None)
+
+    def leaders(self, share: float) -> tuple[Hypothesis, ...]:
         """What leads, and what would if it predicted enough."""
         first = self.weighed[0].hypothesis
-        lead = self.lead.hypothesis if self.lead else first
+        best = self.lead(share)
+        lead = best.hypothesis if best else first
         return (lead,) if lead is first else (lead, first)
 
 
@@ -84,8 +85,7 @@ def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
             nominal.predicted.rest), settings.least_proof):
         return None
     found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
-    return Explanations(tuple(found), counts,
-                        next((w for w in found if not smaller(w.share, rule.share)), None))
+    return Explanations(tuple(found), counts)
 
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:

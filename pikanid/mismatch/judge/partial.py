@@ -111,9 +111,9 @@ class Part:
     share: float
 
 
-def surely_there(explained: Explanations, scale: float, settings: Settings,
-                 again: Again) -> Part | None:
-    """What is there whatever the remainder is; None where nothing is sure.
+def surely_there(explained: Explanations, scale: float, settings: Settings, again: Again) -> Part:
+    """What is there whatever the remainder is; where nothing is, what keeps the families of the
+    best explanation from being sure.
 
     Args:
         explained: Explanations, weighed.
@@ -122,18 +122,24 @@ def surely_there(explained: Explanations, scale: float, settings: Settings,
         again: χ² that an effect that does not act in the held-out recordings is worth where it acts
             again in the train recordings.
     """
-    rule, found, lead = settings.part, explained.weighed, explained.lead
-    if lead is None:
-        return None
+    rule, found = settings.part, explained.weighed
+    lead = explained.lead(rule.share) or found[0]
     examined = [
         _with_a_size(_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again),
                      lead.hypothesis, explained.overdispersion, settings)
         for kind in kinds_in(lead.hypothesis, rule.dry)]
+    if smaller(lead.share, rule.share):
+        little = (f"the best explanation with it explains {max(lead.share, 0.0):.0%} of the "
+                  f"held-out misfit, {rule.share:.0%} are asked")
+        examined = [one if isinstance(one, Doubtful) else Doubtful(one.kind, one.effect, little)
+                    for one in sorted(examined, key=lambda one: isinstance(one, Doubtful))]
+    doubtful = tuple(d for d in examined if isinstance(d, Doubtful)
+                     and not _elsewhere(d.kind, lead.kinds))
     present = [p for p in examined if isinstance(p, Present)]
     # that a family is there somewhere says no more where a place of it is sure
     present = [p for p in present if not _elsewhere(p.kind, [o.kind for o in present])]
     if not present:
-        return None
+        return Part((), doubtful, lead.hypothesis, explained.overdispersion, lead.share)
     sure = {p.kind for p in present}
     named = {p.effect.key for p in present if p.names}
     # the fewest effects that hold all of it and leave about as much
@@ -142,10 +148,7 @@ def surely_there(explained: Explanations, scale: float, settings: Settings,
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     return Part(tuple(sorted(present, key=lambda p: -p.dominance)),
-                tuple(
-                    d for d in examined if isinstance(d, Doubtful)
-                    and not _elsewhere(d.kind, lead.kinds)), fewest.hypothesis,
-                explained.overdispersion, fewest.share)
+                doubtful, fewest.hypothesis, explained.overdispersion, fewest.share)
 
 
 def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:

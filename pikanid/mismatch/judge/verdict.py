@@ -33,8 +33,8 @@ class Answer:
     `twins` lists, for a hypothesis given, the effects that stand for each other in it; `reasons`
     why others are not given, and `doubt` what keeps the first one from being confirmed.  `rivals`
     are laws outside the catalogue that explain all as well, but are not likely enough to be given.
-    `part` is what is surely there although something is left, and `channels` are those in which
-    something is, whatever it is.
+    `part` is what is surely there although something is left, `closest` what comes closest where
+    nothing is, and `channels` are those in which something is, whatever it is.
     """
 
     verdict: Verdict
@@ -45,6 +45,7 @@ class Answer:
     doubt: str = ""
     rivals: tuple[Hypothesis, ...] = ()
     part: Part | None = None
+    closest: Part | None = None
     channels: tuple[Channel, ...] = ()
 
 

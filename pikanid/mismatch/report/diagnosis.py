@@ -50,6 +50,8 @@ class Diagnosis(DiagnosisData):
             anything does.
         present: What is surely there, where the verdict is "partial".
         remainder: What is left then.
+        closest: Of "unnamed" and "unconfirmed" answers with a proof at hand: the explanation that
+            would be next, and what keeps it from being sure; None where there is none.
         exchanged: Whether the held-out recordings are the ones explained, and the proof is on the
             others.
     """
@@ -87,6 +89,7 @@ class Diagnosis(DiagnosisData):
             "notes": [*self.noise, *self.notes],
             "present": [p.to_dict() for p in self.present],
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
+            "closest": None if self.closest is None else self.closest.to_dict(),
             "settings": self.settings.to_dict(),
         }
 

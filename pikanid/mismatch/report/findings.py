@@ -15,7 +15,7 @@ from pikanid.mismatch.beyond.patch import Patch
 from pikanid.mismatch.beyond.region import Interval
 from pikanid.mismatch.catalogue.candidate import Channel
 from pikanid.mismatch.judge.verdict import Verdict
-from pikanid.mismatch.report.part import SHOWN, Present, Remainder, Value
+from pikanid.mismatch.report.part import SHOWN, Closest, Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.pieces.sentences import enumerated
@@ -212,6 +212,7 @@ class DiagnosisData:
     doubt: str = ""
     present: tuple[Present, ...] = ()
     remainder: Remainder | None = None
+    closest: Closest | None = None
     exchanged: bool = False
 
     @property

@@ -9,6 +9,7 @@ from typing import Any
 from pikanid.estimate.rounding import with_unit
 from pikanid.formula.units import parse
 from pikanid.model.parts import Parameter
+from pikanid.pieces.sentences import enumerated
 from pikanid.pieces.time_unit import spans
 
 SHOWN = 6  # layout: windows of time that are listed
@@ -153,6 +154,37 @@ class Remainder:
         found["time"] = [list(span) for span in self.time]
         found["doubtful"] = [{"family": what, "why": why} for what, why in self.doubtful]
         return found
+
+
+@dataclass(frozen=True)
+class Closest:
+    """What comes closest where nothing is sure.
+
+    Attributes:
+        effects: Names of its effects.
+        ids: Of each.
+        share_explained: Of the square of the nominal misfit, noise taken off, in the held-out
+            recordings.
+        doubtful: Each family in it, that which is nearest to being sure first, and what keeps it
+            from that.
+    """
+
+    effects: tuple[str, ...]
+    ids: tuple[tuple[str, ...], ...]
+    share_explained: float
+    doubtful: tuple[tuple[str, str], ...]
+
+    def lines(self) -> list[str]:
+        """In words."""
+        return [f"Closest, and not sure: {enumerated(self.effects)}: "
+                f"{max(self.share_explained, 0.0):.0%} of the held-out misfit is explained",
+                *(f"Not sure: {what}: {why}" for what, why in self.doubtful)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For diagnosis.json."""
+        return {"effects": [list(own) for own in self.ids],
+                "share_explained": self.share_explained,
+                "doubtful": [{"family": what, "why": why} for what, why in self.doubtful]}
 
 
 def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],

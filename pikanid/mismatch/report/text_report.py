@@ -33,6 +33,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
                 for name, v in dx.where.parameters.items()))
     lines += [f"Surely: {part.sentence()}" for part in dx.present]
     lines += dx.remainder.lines() if dx.remainder is not None else []
+    lines += dx.closest.lines() if dx.closest is not None else []
     for h in dx.hypotheses:
         lines.append(f"What: {h.title}{dx.odds(h)}")
         for e in h.effects:

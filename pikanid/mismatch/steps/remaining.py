@@ -1,4 +1,4 @@
-"""From a partial answer to what is reported of it: what is surely there, and what is left."""
+"""From an answer to what is reported of it: what is surely there, what is left, what is near."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 from scipy.signal import periodogram
 
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.judge.partial import Doubtful
+from pikanid.mismatch.judge.partial import Doubtful, Part
 from pikanid.mismatch.judge.partial import Present as Sure
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Proof
 from pikanid.mismatch.report.locate import loud_windows
-from pikanid.mismatch.report.part import Present, Remainder, values_of
+from pikanid.mismatch.report.part import Closest, Present, Remainder, values_of
 
 
 def present(answer: Answer) -> tuple[Present, ...]:
@@ -48,7 +48,21 @@ def remainder(case: Case, answer: Answer, proof: Proof | None) -> Remainder | No
         proof.rmse_before, proof.rmse_after, proof.rmse_moved, proof.noise, proof.unit,
         proof.p_value, counts, rows * max(after / rows, 1.0) / counts,
         median_frequency(first.t, first.measured - first.after), loud_windows(h),
-        tuple((d.family, _where(d) + d.why) for d in answer.part.doubtful))
+        _doubts(answer.part))
+
+
+def closest(answer: Answer) -> Closest | None:
+    """What explains a part of what is missing, of which nothing is sure."""
+    part = answer.closest
+    if part is None or not part.hypothesis.effects or part.share <= 0:
+        return None
+    effects = part.hypothesis.effects
+    return Closest(tuple(e.name for e in effects), tuple(e.ids for e in effects), part.share,
+                   _doubts(part))
+
+
+def _doubts(part: Part) -> tuple[tuple[str, str], ...]:
+    return tuple((d.family, _where(d) + d.why) for d in part.doubtful)
 
 
 def _where(doubtful: Doubtful) -> str:

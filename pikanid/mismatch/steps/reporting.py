@@ -22,7 +22,7 @@ from pikanid.mismatch.report.explained import explanations
 from pikanid.mismatch.report.findings import Curves, OutputError, Proof
 from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.search.overdispersion import overdispersion
-from pikanid.mismatch.steps.remaining import present, remainder
+from pikanid.mismatch.steps.remaining import closest, present, remainder
 from pikanid.model import Model
 from pikanid.model.domains import not_taken
 from pikanid.problem.problem import bind
@@ -76,7 +76,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         shape=shape,
         force_over_time=force,
         doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""),
-        present=present(answer), remainder=remainder(case, answer, proof))
+        present=present(answer), remainder=remainder(case, answer, proof),
+        closest=closest(answer))
 
 
 def _louder(case: Case, output: str) -> str:

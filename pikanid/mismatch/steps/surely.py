@@ -52,6 +52,7 @@ def with_sure_part(case: Case, answer: Answer, site: Site) -> Answer:
     answer = replace(answer, channels=sure_channels(
         case.base, site, case.candidates, case.search.ranked(), explained))
     if part is None or not part.present:
+        answer = replace(answer, closest=part)
         return replace(answer, verdict="unconfirmed", doubt=TOGETHER) if several else answer
     return replace(answer, verdict="partial", given=(part.hypothesis,), part=part)
 
@@ -67,7 +68,7 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
     assert case.later is not None
     noise = [{o: records.sigma(o) for o in records.levels[0]}
              for records in (case.records, case.later)]
-    search, settings = case.search, case.settings
+    search, settings, rule = case.search, case.settings, case.settings.part
     search.spent = 0.0  # what is sure has a budget of its own
 
     def weighed() -> tuple[Explanations | None, Part | None]:
@@ -84,18 +85,19 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
             break
     explained, part = weighed()
     for _ in range(settings.budget.rechecked):
-        if not _compared(search, part.hypothesis if part else lasting(search.ranked())[0]):
+        if not _compared(search, part.hypothesis if part and part.present else
+                         lasting(search.ranked())[0]):
             break
         explained, part = weighed()
     # nothing of an explanation is sure that was not left out of it, of the last one found neither
     while explained and any([
-            *(search.refine(_without_each_family(h, settings.part.dry), h.key)
-              for h in explained.leaders), _without_either(search, explained, part)]):
+            *(search.refine(_without_each_family(h, rule.dry), h.key)
+              for h in explained.leaders(rule.share)), _without_either(search, explained, part)]):
         explained, part = weighed()
-    if explained is None or part is None:
-        return explained, None
+    if explained is None or part is None or not part.present:
+        return explained, part
     return explained, _without_shares(against_curves(case, explained, part, noise),
-                                      _likely(explained, settings.part.rate))
+                                      _likely(explained, rule.rate))
 
 
 def _likely(explained: Explanations, rate: float) -> list[Candidate]:
@@ -122,7 +124,7 @@ def _without_either(search: Search, explained: Explanations, part: Part | None) 
     """Fit what may explain as much without both of two families of which one is there; whether that
     found anything.
     """
-    found, lead = False, explained.leaders[0]
+    found, lead = False, explained.leaders(search.settings.part.share)[0]
     for p in (p for p in part.present if p.instead) if part else ():
         own = {e.key for e in members(p.kind, lead, search.settings.part.dry)}
         if rest := search.fits.get(lead.key - own):
