@@ -143,7 +143,7 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
     monkeypatch.setattr(surely, "_one_more", lambda *_: None)
     monkeypatch.setattr(surely, "lasting", lambda _: [first])
     monkeypatch.setattr(surely, "against_curves", lambda case, found, part, noise: part)
-    search = SimpleNamespace(refine=refine, ranked=list, scale=lambda: 1.0)
+    search = SimpleNamespace(refine=refine, ranked=list, scale=lambda: 1.0, settings=DEFAULTS)
     records = SimpleNamespace(levels=[{}])
     case: Any = SimpleNamespace(search=search, settings=DEFAULTS, later=records, records=records,
                                 predicted=None, ahead=None)
