@@ -38,7 +38,8 @@ def test_what_explains_too_little_is_no_more_than_closest() -> None:
 
 
 def test_doubts_are_kept_where_nothing_dominates() -> None:
-    part = judged(weighed((COULOMB,), 1.0, 0.999), weighed((DRAG,), 1.5, 0.001))
+    part = judged(weighed((COULOMB,), 1.0, 0.999), weighed((DRAG,), 1.5, 0.001),
+                  weighed((), 1.8, 0.0, share=0.0))
     assert part.present == ()
     assert [d.why for d in part.doubtful] == [
         "without it the best explanation leaves 1.5 times as much, 4 are asked"]
