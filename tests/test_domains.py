@@ -16,6 +16,7 @@ from pikanid import errors
 from pikanid.mismatch.catalogue.bound_effects import bound_to
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.model.domains import candidates_of, catalogues_of, not_taken, taken
+from pikanid.model.effect_form import EffectForm
 from pikanid.model.effects_file import read_effects
 
 NAMES = {"thermal_rc": ("thermal",), "cascaded_tanks": ("hydraulics",),
@@ -52,8 +53,9 @@ def test_units_of_all_states_tell(unit: str, names: tuple[str, ...]) -> None:
 @pytest.mark.parametrize(("first", "second", "names"), [
     ("A", "V", ("electrical",)), ("V", "A", ("electrical",)), ("V", "V", ()),
     ("g/l", "l", ("kinetics",)), ("l", "l", ()), ("bar", "m^3", ("hydraulics",)),
-    ("A", "m", ()), ("bar", "degC", ()), ("g/l", "bar", ())])
-def test_one_unit_tells_where_the_others_go_with_it(
+    ("A", "m", ("electrical",)), ("bar", "degC", ("hydraulics", "thermal")),
+    ("rad", "V", ())])
+def test_one_unit_tells_whatever_stands_beside_it(
         first: str, second: str, names: tuple[str, ...]) -> None:
     table = content(first)
     table["states"] |= {"y": {"unit": second, "initial": "free"}}
@@ -97,10 +99,31 @@ def test_an_empty_domain_takes_none(tmp_path: Path) -> None:
     assert pk.Model.load(tmp_path / "model.toml").domain == ()
 
 
-def test_states_of_several_kinds_tell_nothing() -> None:
+def test_of_states_of_several_kinds_each_takes_what_its_unit_tells() -> None:
     one = decay("degC")
-    assert not catalogues_of(one.with_state(pk.State("v", "m/s", 0), "-v"))
     assert catalogues_of(one.with_state(pk.State("wall", "K", 0), "-wall")) == ("thermal",)
+    reactor = one.with_state(pk.State("c", "mol/l", 0), "-c")
+    assert catalogues_of(reactor) == ("kinetics", "thermal") and not not_taken(reactor, ())
+    assert {e.within for e in candidates_of(reactor) if isinstance(e, EffectForm)} == {
+        ("x",), ("c",)}
+    tank = one.with_state(pk.State("h", "m", 0), "-h")
+    assert "by the units of x." in taken(tank)
+    assert "hydraulics" in not_taken(tank, ()) and "thermal" not in not_taken(tank, ())
+
+
+def test_an_effect_of_a_catalogue_is_looked_for_where_its_unit_tells() -> None:
+    reactor = decay("degC").with_state(pk.State("c", "mol/l", 1.0), "-c")
+    reactor = reactor.replace(outputs=(*reactor.outputs, pk.Output("c", "c", "mol/l")))
+    t = np.linspace(0.0, 5.0, 50)
+    recording = pk.Recording.from_arrays(t, {"x": np.exp(-t), "c": np.exp(-t)},
+                                         {"x": "degC", "c": "mol/l"})
+    motion = {n: np.exp(-t) for n in ("x", "c")}
+    made = bound_to(candidates_of(reactor), sites(reactor, [recording]), [recording],
+                    lambda: motion)
+    where = {(e.key, v) for e in made for v in e.add}
+    assert ("hidden_storage", "x") in where and ("hidden_storage", "c") not in where
+    assert ("saturating_rate", "c") in where or any(k == "removal" and v == "c" for k, v in where)
+    assert not any(k == "removal" and v == "x" for k, v in where)
 
 
 def test_catalogues_that_share_a_key_can_both_be_taken() -> None:

@@ -103,7 +103,8 @@ def bound(form: EffectForm, around: Surroundings) -> Iterator[Effect]:
     """
     bindings: list[dict[str, str]] = [{}]
     for name, kind in form.places.items():
-        bindings = [{**b, name: n} for b in bindings for n in around.choices(kind, b)]
+        bindings = [{**b, name: n} for b in bindings for n in around.choices(kind, b)
+                    if form.within is None or n in form.within or n not in around.model.state_names]
     for binding in bindings:
         try:
             made = _with(form, binding, around, alone=len(bindings) == 1)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+from itertools import chain
 
 from pikanid.errors.wording import listed
 from pikanid.formula import units
@@ -10,10 +12,11 @@ from pikanid.model.effect import Effect
 from pikanid.model.effect_form import EffectForm
 from pikanid.model.effects_file import catalogues, read_effects
 from pikanid.model.lookup import Lookup
+from pikanid.pieces.sentences import enumerated
 
-# A catalogue is taken where some state has a unit that tells its domain, and every other one such a
-# unit or one that goes with it.  A voltage alone tells nothing: levels and angles are recorded in
-# volts as well; nor does a length, which may be a level or a place.
+# A catalogue is taken where some state has a unit that tells its domain, for the states that have
+# such a unit or one that goes with it.  A voltage alone tells nothing: levels and angles are
+# recorded in volts as well; nor does a length, which may be a level or a place.
 STATES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l"), ("l",)),
     "electrical": (("A",), ("V", "C")), "hydraulics": (("Pa",), ("l", "l/s"))}
@@ -26,41 +29,46 @@ def catalogues_of(model: Lookup) -> tuple[str, ...]:
     >>> catalogues_of(pk.systems.thermal_rc()), catalogues_of(pk.systems.cascaded_tanks())
     (('thermal',), ('hydraulics',))
     """
+    return tuple(_states_of(model))
+
+
+def _states_of(model: Lookup) -> dict[str, tuple[str, ...]]:
+    """Of each catalogue that a model takes, the states for which it does."""
     if model.domain is not None:
-        return model.domain
-    return tuple(name for name in catalogues() if name in STATES and _of(model, *STATES[name]))
+        return dict.fromkeys(model.domain, model.state_names)
+    return {name: _in_units(model, telling + beside) for name in catalogues() if name in STATES
+            for telling, beside in [STATES[name]] if _in_units(model, telling)}
 
 
-def _of(model: Lookup, telling: tuple[str, ...], beside: tuple[str, ...]) -> bool:
-    def like(unit: str, others: tuple[str, ...]) -> bool:
-        return any(units.convertible(unit, other) for other in others)
-
-    return any(like(s.unit, telling) for s in model.states) and all(
-        like(s.unit, telling + beside) for s in model.states)
+def _in_units(model: Lookup, others: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(s.name for s in model.states
+                 if any(units.convertible(s.unit, other) for other in others))
 
 
 def candidates_of(model: Lookup) -> tuple[Effect | EffectForm, ...]:
-    """The effects of the catalogues that a model takes, and those that it lists: of two with one
-    key the latter.
+    """The effects of the catalogues that a model takes, for the states for which it does, and those
+    that it lists: of two with one key the latter.
     """
-    listed = (e for name in catalogues_of(model) for e in read_effects(name))
+    listed = (replace(e, within=states) if isinstance(e, EffectForm) else e
+              for name, states in _states_of(model).items() for e in read_effects(name))
     return tuple({e.key: e for e in (*listed, *model.effects)}.values())
 
 
 def not_taken(model: Lookup, known: Iterable[str]) -> str:
     """A sentence on the catalogues for models of its kind whose effects are not among the `known`
-    ones; empty where the model names its domain, or its units do.
+    ones; empty where the model names its domain, or the units of all of its states do.
 
     >>> import pikanid as pk
     >>> not_taken(pk.systems.sloshing(), ())[:58]
     'No effects of the catalogue mechanics were looked for: `do'
     """
-    if model.domain is not None or catalogues_of(model):
+    taken_for = _states_of(model)
+    if model.domain is not None or {*model.state_names} == {*chain(*taken_for.values())}:
         return ""
     ids = {*known}
     moves = any(e.is_Symbol and e.name in model.state_names for e in model.equations.values())
     left = [name for name in catalogues() if (name == "mechanics") == moves
-            and not ids & {e.key for e in read_effects(name)}]
+            and name not in taken_for and not ids & {e.key for e in read_effects(name)}]
     return "" if not left else (
         f"No effects of the catalogue{'s' * (len(left) > 1)} {listed(left)} were looked for: "
         "`domain = \"...\"` in the model, or --catalogue, adds them.")
@@ -76,6 +84,9 @@ def taken(model: Lookup) -> str:
     names = catalogues_of(model)
     if not names:
         return ""
-    why = "the model's domain" if model.domain is not None else "the units of the model's states"
+    told = {*chain(*_states_of(model).values())}
+    why = ("the model's domain" if model.domain is not None else
+           "the units of the model's states" if told == {*model.state_names} else
+           f"the units of {enumerated([s for s in model.state_names if s in told])}")
     return (f"Effects of the catalogue{'s' * (len(names) > 1)} {' and '.join(names)} are looked "
             f"for as well, by {why}.")

@@ -45,12 +45,14 @@ class EffectForm:
         places: Placeholder -> kind (one of `KINDS`).
         content: Its table in a file, without the placeholders' kinds.
         source: Of the table, for messages.
+        within: States that placeholders may stand for; None: any.
     """
 
     key: str
     places: Mapping[str, str]
     content: Mapping[str, Any]
     source: str
+    within: tuple[str, ...] | None = None
 
 
 def form_of(key: str, entry: Entry, source: str) -> EffectForm:

@@ -23,6 +23,7 @@ LEAST = 5  # definition: samples of a neighbourhood
 ALIKE = 1.2  # numerical: times the shortest one that neighbourhoods last on an even grid
 UNEVEN = 0.1  # numerical: share of them that last longer, where samples are lost now and then
 ROUNDS = 10  # numerical: of a fit that gross errors must not lead
+RESTS = 0.2  # numerical: share of samples at which an input that stands still at most may change
 ROWS = 10  # numerical: samples a column from which on those are told from noise
 
 
@@ -94,12 +95,13 @@ def _past(t: np.ndarray, inputs: Sequence[HeldInput], lags: int, uneven: bool
     interval ago and more; between `uneven` samples its integral as well, which has the corners of
     a slow rig where they are.  Between even ones the past has them, and the two would be alike.
 
-    At the same instant an input may know the output's noise, where a controller drives it.
+    At the same instant an input may know the output's noise, where a controller drives it; one that
+    stands still at most samples does not, and an output may follow it at once.
     """
     step = float(np.median(np.diff(t)))
     columns, moves = [np.empty((len(t), 0))], [np.empty(0)]
     for u in (u for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0):
-        own = np.stack([u.at(t, k * step) for k in range(1, lags + 1)], axis=1)
+        own = np.stack([u.at(t, k * step) for k in range(not _rests(u), lags + 1)], axis=1)
         own = own[:, np.ptp(own, axis=0) > 0]
         columns.append(own)
         moves.append(own.std(axis=0))
@@ -107,6 +109,10 @@ def _past(t: np.ndarray, inputs: Sequence[HeldInput], lags: int, uneven: bool
             columns.append(_integral(u, t)[:, None])
             moves.append(np.array([step * float(np.std(u.values))]))
     return np.concatenate(columns, axis=1), np.concatenate(moves)
+
+
+def _rests(u: HeldInput) -> bool:
+    return bool(np.mean(np.diff(u.values) != 0.0) < RESTS)
 
 
 def _integral(u: HeldInput, t: np.ndarray) -> np.ndarray:

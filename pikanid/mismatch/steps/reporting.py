@@ -49,7 +49,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
-    if answer.verdict in ("unnamed", "unconfirmed"):
+    if answer.verdict in ("unnamed", "unconfirmed", "partial"):
         known = (i for c in case.candidates for i in c.ids)
         case.notes += filter(None, [not_taken(case.model, known)])
     if case.proves and (shown := case.predicted(best)) and below(shown.motion, asked):
