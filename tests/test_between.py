@@ -35,9 +35,15 @@ CARTS: dict[str, Any] = {
 }
 
 
+LAWS = ("friction_between", "drag_between", "damping_one_way_between", "spring_between",
+        "play_between", "stops_between", "stop_between:above", "stop_between:below")
+
+
 def between(model: pk.Model, reach: float = 1.0) -> dict[str, pk.Effect]:
+    """By key; of a stop on one side with the side."""
     motion = dict.fromkeys(model.state_names, np.linspace(-reach, reach))
-    return {e.key: e for e in effects_between(model, coordinates(model), lambda: motion)}
+    return {e.key + f":{e.variant.rsplit(',')[-1]}" * (e.key == "stop_between"): e
+            for e in effects_between(model, coordinates(model), lambda: motion)}
 
 
 @pytest.mark.parametrize(("key", "force"), [
@@ -45,7 +51,10 @@ def between(model: pk.Model, reach: float = 1.0) -> dict[str, pk.Effect]:
     ("drag_between", lambda size, d, dv: size * abs(dv) * dv),
     ("spring_between", lambda size, d, dv: size * d**3),
     ("play_between", lambda size, d, dv: K * (np.sign(d) * max(abs(d) - size, 0.0) - d)),
-    ("stops_between", lambda size, d, dv: size * np.sign(d) * max(abs(d) - 0.2, 0.0))])
+    ("damping_one_way_between", lambda size, d, dv: size * max(dv, 0.0)),
+    ("stops_between", lambda size, d, dv: size * np.sign(d) * max(abs(d) - 0.2, 0.0)),
+    ("stop_between:above", lambda size, d, dv: size * max(d - 0.2, 0.0)),
+    ("stop_between:below", lambda size, d, dv: size * min(d + 0.2, 0.0))])
 def test_they_act_on_both_alike(key: str, force: Callable[[float, float, float], float]) -> None:
     """Against the equations of motion: a force f between the carts adds -f/M and f/N."""
     model = pk.Model.from_dict(CARTS).with_values(k=K)
@@ -54,8 +63,8 @@ def test_they_act_on_both_alike(key: str, force: Callable[[float, float, float],
     for _ in range(5):
         x = dict(zip("abvw", rng.normal(size=4), strict=True))
         size = float(rng.uniform(0.1, 0.5))
-        at = {symbol(n): v for n, v in {**model.values, **x, "F": 0.0, "stop_a_b": 0.2,
-                                        effect.size.name: size}.items()}
+        at = {symbol(n): v for n, v in {**model.values, **x, "F": 0.0, **{
+            p.name: 0.2 for p in effect.parameters}, effect.size.name: size}.items()}
         f = force(size, x["a"] - x["b"], x["v"] - x["w"])
         for state, share in (("v", -1 / M), ("w", 1 / N)):
             more = (extended.equations[state] - model.equations[state]).subs(at)
@@ -67,8 +76,7 @@ def test_gears_are_counted() -> None:
     geared = pk.Model.from_dict({**CARTS, "equations": {
         "a": "v", "b": "w", "v": "(F - g*a - c*v - 3*k*(3*a - b))/M", "w": "k*(3*a - b)/N"}})
     found = between(geared)
-    assert [*found] == ["friction_between", "drag_between", "spring_between", "play_between",
-                        "stops_between"]
+    assert (*found,) == LAWS
     text = found["friction_between"].add["v"]
     assert "sign" in text and "w" in text and ("3*v" in text or "w/3" in text)
 
@@ -80,9 +88,7 @@ def test_where_nothing_acts_between_there_are_none(name: str) -> None:
 
 
 def test_the_drive_has_a_shaft() -> None:
-    assert [*between(systems.two_mass_drive())] == [
-        "friction_between", "drag_between", "spring_between", "play_between",
-        "stops_between"]
+    assert (*between(systems.two_mass_drive()),) == LAWS
 
 
 def carts(seed: int, force: Callable[[float, float], float]) -> pk.Recording:
@@ -107,7 +113,9 @@ def carts(seed: int, force: Callable[[float, float], float]) -> pk.Recording:
 @pytest.mark.parametrize(("name", "force", "parameter", "size"), [
     ("friction_between", lambda d, dv: 0.8 * np.tanh(dv / 0.002), "F_a_b", 0.8),
     ("play_between", lambda d, dv: -K * np.clip(d, -0.01, 0.01), "gap_a_b", 0.01),
-    ("stops_between", lambda d, dv: 400.0 * (d - np.clip(d, -0.03, 0.03)), "stop_a_b", 0.03)])
+    ("stops_between", lambda d, dv: 400.0 * (d - np.clip(d, -0.03, 0.03)), "stop_a_b", 0.03),
+    ("stop_between", lambda d, dv: 400.0 * min(d + 0.03, 0.0), "stop_below_a_b", 0.03),
+    ("damping_one_way_between", lambda d, dv: 0.5 * max(dv, 0.0), "d_one_way_a_b", 0.5)])
 def test_they_are_found(name: str, force: Callable[[float, float], float], parameter: str,
                         size: float) -> None:
     found = pk.diagnose(pk.Model.from_dict(CARTS), carts(1, force), carts(2, force))
@@ -130,8 +138,8 @@ def test_two_ways_of_one_pair_are_told_apart() -> None:
     model = pk.Model.from_dict({**CARTS, "equations": equations})
     motion = dict.fromkeys(model.state_names, np.linspace(-1.0, 1.0))
     found = [*effects_between(model, coordinates(model), lambda: motion)]
-    assert len({(e.key, e.variant) for e in found}) == len(found) == 7
-    assert len({p.name for e in found for p in e.parameters}) == 8
+    assert len({(e.key, e.variant) for e in found}) == len(found) == 11
+    assert len({p.name for e in found for p in e.parameters}) == 14
     recording = carts(5, lambda d, dv: 0.0)
     own = bound_to([], sites(model, (recording,)), [recording], lambda: motion)
     assert len(candidates(reserved(sites(model, (recording,)), own), own)) > 60

@@ -235,7 +235,7 @@ def test_a_coordinate_that_stays_has_no_pitch(at: float) -> None:
     run = pk.simulate(model, pk.excitation.free_decay(4.0), seed=0)
     found = bound_to(read_effects("mechanics"), sites(model, (run,)), [run],
                      lambda: dict.fromkeys(model.state_names, np.array([at, at])))
-    assert [e.key for e in found] == ["gravity"]
+    assert [e.key for e in found] == ["gravity", "damping_one_way"]
 
 
 def test_a_state_that_stays_at_zero_has_no_guesses() -> None:

@@ -43,7 +43,8 @@ class _Between:
 
 def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
                     motion: Callable[[], Motion], taken: Iterable[str] = ()) -> Iterator[Effect]:
-    """Dry friction, drag, play, stops and a cubic spring between coordinates (place, speed).
+    """Dry friction, drag, damping that is harder one way, play, stops on both sides and on one,
+    and a cubic spring between coordinates (place, speed).
 
     The motion tells how large each may be; `taken` are names, beside the model's own, that their
     parameters must not have.  A spring or a damper must have a parameter of its own, that of no
@@ -53,8 +54,8 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
     >>> drive = systems.two_mass_drive()
     >>> pairs = [("phi_m", "omega_m"), ("phi_l", "omega_l")]
     >>> motion = lambda: dict.fromkeys(drive.state_names, np.linspace(-1.0, 1.0))
-    >>> [e.key for e in effects_between(drive, pairs, motion)]
-    ['friction_between', 'drag_between', 'spring_between', 'play_between', 'stops_between']
+    >>> [e.key.removesuffix("_between") for e in effects_between(drive, pairs, motion)]
+    ['friction', 'drag', 'damping_one_way', 'spring', 'play', 'stops', 'stop', 'stop']
     """
     speed = dict(coordinates)
     found: dict[_Between, dict[bool, str]] = {}
@@ -96,6 +97,9 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
                   Parameter(named("F"), push, force, (0.0, INF)))
         yield law("drag", "quadratic drag", "drag", f"abs({rate})*({rate})", Parameter(
             named("D"), push / fast**2, units.product((force, 1), (across, -2)), (0.0, INF)))
+        yield law("damping_one_way", "damping that is harder one way", "drag", f"max({rate}, 0)",
+                  Parameter(named("d_one_way"), push / fast,
+                            units.product((force, 1), (across, -1))))
         if True not in by:
             continue
         yield law("spring", "a cubic spring", "restoring force", f"({place})**3", Parameter(
@@ -103,11 +107,16 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
         gap = Parameter(named("gap"), PLAY * far, length, (0.0, INF))
         yield law("play", "play", "restoring force", f"clip({place}, -{gap.name}, {gap.name})",
                   gap, factor=-symbol(by[True]))
-        stop = Parameter(named("stop"), STOPS * far, length, (NEAREST * far, far))
-        yield law("stops", "stops", "restoring force",
-                  f"({place} - clip({place}, -{stop.name}, {stop.name}))",
-                  Parameter(named("k_stop"), HARD * push / far,
-                            units.product((force, 1), (length, -1)), (0.0, INF)), stop)
+        for key, words, shape, side in (
+                ("stops", "stops", "({0} - clip({0}, -{1}, {1}))", ()),
+                ("stop", "a stop on one side (above)", "max({0} - {1}, 0)", ("above",)),
+                ("stop", "a stop on one side (below)", "-max(-({0}) - {1}, 0)", ("below",))):
+            k = Parameter(named("_".join(("k_stop", *side))), HARD * push / far,
+                          units.product((force, 1), (length, -1)), (0.0, INF))
+            stop = Parameter(named("_".join(("stop", *side))), STOPS * far, length,
+                             (NEAREST * far, far))
+            yield law(key, words, "restoring force", shape.format(place, stop.name), k, stop,
+                      variant=",".join((*which, *side)))
 
 
 def _between(model: Model, name: str, coordinates: Sequence[tuple[str, str]], places: bool

@@ -39,6 +39,7 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (friction.hysteresis, ("dry friction",)),
     (channels.delay, ("timing",)),
     (late_inputs.input_delay, ("timing",)),
+    (late_inputs.input_lead, ("timing",)),
     (channels.lags, ("timing",)),
     (channels.input_gain, ("gain",)),
     (channels.sensor_gain, ("gain",)),

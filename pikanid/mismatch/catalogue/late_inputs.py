@@ -1,12 +1,14 @@
-"""Catalogue: one of several inputs comes late.
+"""Catalogue: one of several inputs comes late, or was recorded late.
 
 Alone, an input that comes late is a twin of an output that does.  Where another input acts as well,
-or something moves at first, it is not.
+or something moves at first, it is not.  An input whose recorder lags behind that of the outputs
+acts before it is recorded.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -21,19 +23,27 @@ def input_delay(site: Site) -> list[Candidate]:
     """A delay of each input by itself; of a lone one out of rest only beside a channel that acts as
     well.
     """
-    found = []
-    for u in site.inputs:
-        tau = Parameter(site.name("tau_in"), 0.0, "s", (0.0, float("inf")))
+    tau = Parameter(site.name("tau_in"), 0.0, "s", (0.0, float("inf")))
+    return [Candidate(
+        ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
+        lambda m, u=u: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # defaults
+        partial(_shifted, u, tau, 1), variant=u, twin="delay",
+        beside=() if len(site.inputs) > 1 or not site.still else ("cross_axis",))
+        for u in site.inputs]
 
-        def directions(view: View, u: str = u, tau: Parameter = tau) -> Sequence[TangentDirection]:
-            step = float(np.median(np.diff(view.t)))
-            return [TangentDirection({tau.name: shift * step}, one_sided=True, push={
-                u: np.interp(view.t - shift * step, view.t, view.u[u]) - view.u[u]})
-                for shift in SHIFTS]
 
-        found.append(Candidate(
-            ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
-            lambda m, u=u, tau=tau: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # defaults
-            directions, variant=u, twin="delay",
-            beside=() if len(site.inputs) > 1 or not site.still else ("cross_axis",)))
-    return found
+def input_lead(site: Site) -> list[Candidate]:
+    """Each input recorded late: what acts is what is written a while later."""
+    tau = Parameter(site.name("tau_lead"), 0.0, "s", (0.0, float("inf")))
+    return [Candidate(
+        ("input_lead",), f"{u} recorded late", f"{u}(t + {tau.name})", "input", site, (tau,),
+        lambda m, u=u: m.map_input(u, delay=f"-{tau.name}"),  # type: ignore[misc]  # defaults
+        partial(_shifted, u, tau, -1), variant=u) for u in site.inputs]
+
+
+def _shifted(u: str, tau: Parameter, later: int, view: View) -> Sequence[TangentDirection]:
+    """An input by some samples later, or, of -1, earlier."""
+    step = float(np.median(np.diff(view.t)))
+    return [TangentDirection({tau.name: shift * step}, one_sided=True, push={
+        u: np.interp(view.t - later * shift * step, view.t, view.u[u]) - view.u[u]})
+        for shift in SHIFTS]
