@@ -79,9 +79,10 @@ def too_rough_to_plan(model: str, excitation: str) -> str:
             "make the excitation smaller, or its samples denser.")
 
 
-def no_profile_simulated(candidates: int) -> str:
-    return (f"None of {candidates} profiles can be simulated with every hypothesis within the "
-            "limits: offer smaller ones.")
+def no_profile_simulated(candidates: int, models: int) -> str:
+    whose = "the model" if models == 1 else "every hypothesis"
+    return (f"None of {candidates} profiles can be simulated with {whose} within the limits: offer "
+            "smaller ones.")
 
 
 def limits_not_kept(profile: str) -> str:
