@@ -54,6 +54,22 @@ def test_what_cannot_be_used_is_listed_with_the_reason(run: Run, tmp_path: Path)
     assert (code, out) == (2, "") and "There is no file 'absent.csv'" in err
 
 
+def test_joined_files_are_listed_one_by_one(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "fast.csv").write_text("t,y [mm]\n0,1\n0.1,2\n0.2,3\n")
+    (tmp_path / "slow.csv").write_text("t,u [V]\n0,1\n1,2\n")
+    code, out, err = run("channels", "fast.csv+slow.csv", "--json", "-")
+    assert (code, err) == (0, "")
+    files = json.loads(out)["files"]
+    assert [(one["name"], [c["name"] for c in one["channels"]]) for one in files] == [
+        ("fast.csv", ["y"]), ("slow.csv", ["u"])]
+    code, out, err = run("channels", "fast.csv+absent.csv")
+    assert (code, out) == (2, "") and "There is no file 'absent.csv'" in err
+    code, out, err = run("channels", "fast.csv+slow.csv", "--json", "slow.csv")
+    assert code == 2 and "slow.csv" in err
+    (tmp_path / "a+b.csv").write_text("t,z\n0,1\n1,2\n")
+    assert "a+b.csv: CSV" in run("channels", "a+b.csv")[1]
+
+
 @pytest.mark.parametrize("command", [
     "identify", "diagnose", "validate", "simulate", "confusable", "effects", "design"])
 def test_every_command_reads_with_the_same_options(run: Run, command: str) -> None:

@@ -172,6 +172,21 @@ def test_two_models_are_told_apart_only_where_they_differ(recorded: pk.Recording
                                       baseline=False).pairs
 
 
+def test_a_model_given_twice_is_no_pair(recorded: pk.Recording) -> None:
+    """It was told that it does not lead over itself, p = 1."""
+    right = oscillator().with_initial(x=0.3, v=-0.5)
+    given = {"one": right, "wrong": right.with_values(k=K * 1.1), "two": right}
+    found = pk.validate(given, recorded, baseline=False)
+    assert found.alike == (("one", "two"),) == tuple(map(tuple, found.to_dict()["alike"]))
+    assert {(p.better, p.worse) for p in found.pairs} == {("one", "wrong"), ("two", "wrong")}
+    assert found.sentence() == ("Best are 'one' and 'two', which predict the same, and are "
+                                "significantly better than 'wrong'.")
+    assert found.notes == ("These models predict the same: one, two. Is one of them given twice, "
+                           "or was another meant?",)
+    only = pk.validate([right, right], recorded, baseline=False)
+    assert only.pairs == () and only.sentence().endswith("which predict the same.")
+
+
 def test_two_outputs_of_two_recordings_with_missing_samples() -> None:
     model = oscillator(x="x", v="v")
     runs = []

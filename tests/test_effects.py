@@ -14,7 +14,8 @@ from pikanid.cli import main
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.own_effects import own_effects
 from pikanid.mismatch.catalogue.site import sites
-from pikanid.mismatch.design.effects_shown import effects_shown
+from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown
+from pikanid.mismatch.design.figure import design_figure
 from pikanid.model.effects_file import from_table, read_effects
 
 TANKS = """
@@ -163,6 +164,24 @@ def test_what_effects_do_is_simulated_and_their_derivative_checked(tanks: Path) 
     quiet = effects_shown(model, drive.with_channels(
         pk.Channel("u", t, np.ones(60), "V", hold="zero")))
     assert np.isnan(quiet[0].derivative) and quiet[0].largest["y"] == 0.0  # it never runs over
+
+
+def test_a_legend_covers_no_curve(tanks: Path) -> None:
+    model = pk.Model.load(tanks).with_candidates(*from_table(STORE, "test"))
+    t = np.arange(0.0, 60.0)
+    drive = pk.Recording.from_arrays(t, {"u": np.where(t < 20, 8.0, 1.0)}, units={"u": "V"})
+    run = pk.simulate(model, drive)["y"]
+    two = {"without": {"y": (run.time, run.values)}, "with it": {"y": (run.time, run.values + 1)}}
+    for figure in (effects_figure(effects_shown(model, drive), model),
+                   design_figure(drive, two, {"y": "V"})):
+        figure.draw_without_rendering()
+        legends = [a.get_legend() for a in figure.axes if a.get_legend()] + figure.legends
+        assert legends
+        for legend in legends:
+            place = legend.get_window_extent()
+            for axis in figure.axes:
+                frame = axis.get_window_extent()
+                assert place.y0 >= frame.y1 - 1 or place.y1 <= frame.y0 + 1
 
 
 def test_command(tanks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

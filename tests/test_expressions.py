@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -104,6 +105,19 @@ def test_messages_say_what_and_where() -> None:
         read("kk*x")
     with pytest.raises(errors.BadModel, match=r"'x > 1' .*a test.* clip, .*step\(x - level\)"):
         read("sin(x > 1)")
+
+
+@pytest.mark.parametrize(("text", "part", "what"), [
+    ("x + 9**9**9", "9**9**9", "overflows"), ("1e999*x", "1e999", "overflows"),
+    ("x + exp(1000)", "exp(1000)", "overflows"), ("(2*x)**900*(3*x)**900", "(3*x)**900", "overfl"),
+    ("x*log(0)", "log(0)", "infinite or undefined"), ("atan2(0, 0)", "atan2", "infinite or undef"),
+    ("x + sqrt(-1)", "sqrt(-1)", "not a real number"), ("(-2)**1.5", "(-2)**1.5", "not a real"),
+    ("max(x, asin(2))", "asin(2)", "not a real"), ("sqrt(-x**2)", "sqrt(-x**2)", "not a real"),
+    ("k + x**1e9", "x**1e9", "an exponent beyond 1000"), ("0.5**5000", "0.5**5000", "an exponent"),
+    ("abs_power(x, 1e9)", "abs_power(x, 1e9)", "an exponent beyond 1000")])
+def test_numbers_that_cannot_be_are_told_with_their_place(text: str, part: str, what: str) -> None:
+    with pytest.raises(errors.BadModel, match=rf"'{re.escape(part)}.* of a test .*{what}"):
+        read(text)
 
 
 @pytest.mark.parametrize("name", ["t", "pi", "sin", "clip", "1a", "_s0", "a b", "", "é", "a-b",

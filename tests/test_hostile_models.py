@@ -69,7 +69,7 @@ def used(content: Any) -> None:
 
 
 def test_the_example_holds_every_key() -> None:
-    from pikanid.model.file import KEYS
+    from pikanid.model.file_keys import KEYS
 
     used(FULL)
     assert Model.from_dict(FULL).name == "full"

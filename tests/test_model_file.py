@@ -101,9 +101,23 @@ BROKEN = [
     ("name = ", "cannot be read"),
     ("name = -k*x", "stands in quotes"),
     ("x" * 100, "cannot be read"),
+    (DRIVEN.replace("[equations]", "[equation]"), r"Did you mean 'equations'\?"),
     (DRIVEN.replace("[states]", "[state]"), r"unknown key 'state' .* Did you mean 'states'\?"),
     (DRIVEN.replace("unit = \"rad\", initial", "units = \"rad\", initial"), "'units'"),
     (DRIVEN.replace("guess = 0.06", "gues = 0.06"), "'gues'"),
+    *((DRIVEN.replace('unit = "rad", initial', f'{key} = "theta_dot", unit = "rad", initial'),
+       rf"states.theta has the unknown key '{key}': .* under \[equations\], as theta = ")
+      for key in ("equation", "rhs", "Derivative", "expression")),
+    *((DRIVEN.replace(there, written), rf"'{written.split()[0]}' .* Did you mean '{meant}'\?")
+      for there, written, meant in (
+          ("initial = 0.0 }            #", "start = 0.0 } #", "initial"),
+          ("initial = 0.0 }            #", "value = 0.0 } #", "initial"),
+          ("initial = 0.0 }            #", "Initial = 0.0 } #", "initial"),
+          ("guess = 0.06", "initial = 0.06", "guess"), ("value = 9.81", "constant = 9.81", "value"),
+          ("bounds = [", "limits = [", "bounds"), ("description = ", "comment = ", "description"),
+          ('expression = "theta"', 'equation = "theta"', "expression"),
+          ('expression = "theta"', 'std = 0.1, expression = "theta"', "sigma"),
+          ('hold = "zero"', 'interpolation = "zero"', "hold"))),
     (DRIVEN.replace("guess = 0.06, ", ""), "either 'guess'"),
     (DRIVEN.replace("guess = 0.06", "guess = 0.06, value = 1"), "a 'guess' and a 'value'"),
     (DRIVEN.replace("guess = 0.06", "guess = \"0.06\""), "a number"),

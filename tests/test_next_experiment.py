@@ -213,6 +213,9 @@ def test_limits_make_profiles_smaller() -> None:
                        candidates=[excitation.two_pulse()])
     reached = np.max(np.abs(pk.simulate(systems.sloshing(), chosen.profile)["theta"].values))
     assert 0.04 < reached <= 0.05
+    assert np.max(np.abs(chosen.reach["theta"])) == pytest.approx(reached, rel=1e-3)
+    low, high = chosen.reach["theta"]
+    assert f"It takes theta from {low:.3g} to {high:.3g} rad." in str(chosen)
     with pytest.raises(errors.SimulationFailed):
         d_optimal(systems.sloshing(), sigma=SIGMA, limits={"theta": 0.05},
                   candidates=[excitation.two_pulse()],
@@ -265,9 +268,11 @@ def test_what_cannot_be_designed() -> None:
         d_optimal(systems.sloshing().fix("l_theta", "d_theta"), sigma=SIGMA)
     with pytest.raises(errors.BadSetting, match="noise"):
         d_optimal(systems.sloshing(), candidates=[excitation.two_pulse()])
-    with pytest.raises(errors.SimulationFailed, match="profiles"):
+    with pytest.raises(errors.SimulationFailed, match=r"profiles .* with the model within"):
         d_optimal(systems.sloshing(), sigma=SIGMA, limits={"theta": 1e-9},
                   candidates=[])
+    with pytest.raises(errors.SimulationFailed, match=r"profiles .* with every hypothesis"):
+        next_experiment({"friction": friction(0.3), "drag": drag(0.3)}, sigma=SIGMA, candidates=[])
     still = Model.from_dict({
         "name": "still", "states": {"x": {"initial": 1.0}}, "parameters": {"k": {"guess": 0.5}},
         "equations": {"x": "-k*x"}, "outputs": {"x": {"expression": "x"}}})
@@ -279,7 +284,12 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     out, plot = tmp_path / "next.csv", tmp_path / "next.png"
     words = ["design", "sloshing", "--sigma", "0.1deg", "--limit", "theta=10deg", "--duration", "5"]
     assert main([*words, "--out", str(out), "--plot", str(plot)]) == 0
-    assert "Standard errors" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "Standard errors" in said and "--limit" not in said
+    assert main(["design", "sloshing", "--sigma", "0.1deg", "--duration", "5", "--out", str(out)]
+                ) == 0
+    assert " rad. --limit NAME=VALUE keeps an output nearer." in capsys.readouterr().out
+    assert main([*words, "--out", str(out)]) == 0
     profile = pk.Recording.read(out)
     reached = response(systems.sloshing(), profile.with_hold(u_x="zero"), SIGMA).reached("theta")
     assert reached <= np.radians(10)

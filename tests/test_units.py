@@ -89,6 +89,8 @@ def test_products_round_trip(exponents: dict[str, int]) -> None:
         (20.0, "degC/s", "K/s", 20.0),
         (1.0, "g_0", "m/s^2", 9.80665),
         (1.0, "ms", "s", 1e-3),
+        (1.0, "N*mm/m", "N", 1e-3),
+        (1.0, "N*s^2/(mm*m)", "N*s^2/m^2", 1e3),
     ],
 )
 def test_conversion(value: float, source: str, target: str, wanted: float) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from pikanid.commands.options import FileRate, Json, Sheet
 from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.commands.reading import every_source
 from pikanid.recording.formats import readable
 
 if TYPE_CHECKING:
@@ -18,6 +19,8 @@ EXAMPLES = """Examples:
 
   pikanid channels run.mf4
 
+  pikanid channels output.csv+input.csv
+
   pikanid channels rosbag2_2026_01_15/ --json -
 
 Every name and path may stand behind --column NAME= of the other commands."""
@@ -25,16 +28,18 @@ Every name and path may stand behind --column NAME= of the other commands."""
 
 def channels(
     recordings: Annotated[list[str], typer.Argument(
-        metavar="RECORDING...", help=readable(), show_default=False)],
+        metavar="RECORDING...", help=f"{readable()}; files joined by + are listed one by one",
+        show_default=False)],
     rate: FileRate = None,
     sheet: Sheet = None,
     json_: Json = None,
 ) -> int:
     """List what is in a file: channels with their units, rates, spans and numbers of samples."""
-    check_outputs({"--json": (json_, [".json"])}, recordings)
+    files = every_source(*recordings)
+    check_outputs({"--json": (json_, [".json"])}, files)
     from pikanid.recording.reading.listing import listing
 
-    found = [listing(path, sheet, rate) for path in recordings]
+    found = [listing(path, sheet, rate) for path in files]
     written({}, json_, {"schema_version": 1, "files": [_content(one) for one in found]})
     if json_ != STDOUT:
         for one in found:

@@ -105,7 +105,8 @@ def design(
         made[plot] = image_for(chosen.plot(), plot)
     together(made)
     if not quiet:
-        console().print(f"{chosen}\n{out}: {chosen.profile.stop:g} s, "
+        nearer = "" if limits else " --limit NAME=VALUE keeps an output nearer."
+        console().print(f"{chosen}{nearer}\n{out}: {chosen.profile.stop:g} s, "
                         f"columns {', '.join(chosen.profile.names)}", markup=False, soft_wrap=True)
     return 0
 

@@ -17,6 +17,7 @@ import numpy as np
 DRAWS = 2000  # numerical: resampled series
 SIGNIFICANT = 2.0  # numerical: √(log10 N/N) that a correlation exceeds to count (Politis and White)
 QUIET = 5  # numerical: correlations in a row that do not count; √(log10 N) is never more
+ALIKE = 1e-6  # numerical: of noise and error: squared errors that differ less are one model's
 LONGEST = 0.25  # numerical: share of a series that a block may have
 
 
@@ -89,9 +90,36 @@ def resampled_means(series: Sequence[np.ndarray], draws: int, seed: int) -> np.n
     return total / sum(map(len, series))
 
 
+def same(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> bool:
+    """Whether squared errors (N,) of several series, in variances of the noise, are one model's.
+
+    >>> same([np.array([1.0, 2.0])], [np.array([1.0, 2.0 + 1e-9])])
+    True
+    """
+    return all(bool(np.all(np.abs(x - y) <= ALIKE * (1.0 + x)))
+               for x, y in zip(one, other, strict=True))
+
+
+def twins(errors: dict[str, list[np.ndarray]]) -> tuple[tuple[str, ...], ...]:
+    """The names of models that err alike in every sample, in groups of two or more.
+
+    >>> a, b = [np.ones(9)], [np.zeros(9)]
+    >>> twins({"one": a, "other": b, "again": a})
+    (('one', 'again'),)
+    """
+    groups: list[list[str]] = []
+    for name, own in errors.items():
+        group = next((g for g in groups if same(errors[g[0]], own)), None)
+        if group is None:
+            groups.append([name])
+        else:
+            group.append(name)
+    return tuple(tuple(g) for g in groups if len(g) > 1)
+
+
 def pairs(errors: dict[str, list[np.ndarray]], seed: int = 0, draws: int = DRAWS
           ) -> tuple[Pair, ...]:
-    """All pairs of models, compared on the same samples.
+    """All pairs of models that differ, compared on the same samples.
 
     Args:
         errors: Name -> squared errors (N,) of each series, in the same order for every name.
@@ -102,6 +130,8 @@ def pairs(errors: dict[str, list[np.ndarray]], seed: int = 0, draws: int = DRAWS
     found = []
     for i, a in enumerate(names):
         for b in names[i + 1:]:
+            if same(errors[a], errors[b]):
+                continue
             series = [y - x for x, y in zip(errors[a], errors[b], strict=True)]
             mean = float(np.mean(np.concatenate(series)))
             better, worse, sign = (a, b, 1.0) if mean >= 0 else (b, a, -1.0)

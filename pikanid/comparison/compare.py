@@ -10,7 +10,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.comparison.analyse import LAGS, analyse
-from pikanid.comparison.bootstrap import pairs
+from pikanid.comparison.bootstrap import pairs, twins
 from pikanid.comparison.contender import contenders
 from pikanid.comparison.horizon import usual_window
 from pikanid.comparison.predictions import (
@@ -166,9 +166,11 @@ def assembled(named: dict[str, list[Prediction]],
     sound = {n: e for n, e in squares.items() if all(np.all(np.isfinite(x)) for x in e)}
     for p, m in zip(lists[0], there, strict=True):
         scores.append(_noise(p, m))
+    alike = twins(sound)
+    notes += tuple(errors.predict_alike(group) for group in alike)
     return Validation(tuple(scores), tuple(sorted(losses, key=losses.__getitem__)),
                       pairs(sound, seed), {n: tuple(own) for n, own in named.items()},
-                      residuals, protocol, alpha, notes)
+                      residuals, protocol, alpha, notes, alike)
 
 
 def _quieter(named: dict[str, list[Prediction]], there: list[np.ndarray]

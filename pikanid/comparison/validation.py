@@ -37,7 +37,8 @@ class Validation:
         residuals: Analysis of what each model leaves, by model; empty for predictions ahead.
         protocol: How predictions were made.
         alpha: Below which a p-value is called significant.
-        notes: What could not be done, one sentence each.
+        notes: What could not be done, and which models are none of their own, one sentence each.
+        alike: Names of models that predict the same, in groups.
     """
 
     scores: tuple[Score, ...]
@@ -48,6 +49,7 @@ class Validation:
     protocol: Protocol
     alpha: float = ALPHA
     notes: tuple[str, ...] = ()
+    alike: tuple[tuple[str, ...], ...] = ()
 
     @property
     def best(self) -> str:
@@ -74,21 +76,25 @@ class Validation:
         """Which model is best, and what it is surely better than."""
         first = self.best
         beaten = [p.worse for p in self.significant() if p.better == first]
-        equal = [n for n in self.ranking[1:] if n not in beaten]
+        group = next((g for g in self.alike if first in g), (first,))
+        equal = [n for n in self.ranking[1:] if n not in (*beaten, *group)]
         if len(self.ranking) == 1:
             mean = np.mean([s.fit for s in self.scores if s.model == first])
             return f"'{first}' fits by {mean:.4g} % (NRMSE)."
         words = f"Best is '{first}'"
+        if len(group) > 1:
+            words = f"Best are {_quoted([*group])}, which predict the same"
         if first == BASELINE:
             words = f"No model beats the linear baseline: best is '{first}'"
+        tied = len(group) > 1
         if beaten:
-            words += f", significantly better than {_quoted(beaten)}"
+            words += f"{', and are' if tied else ','} significantly better than {_quoted(beaten)}"
         if equal:
             least = min((p.p_value for p in self.pairs if p.better == first and p.worse in equal),
                         default=1.0)
-            words += (f"{';' if beaten else ','} its lead over {_quoted(equal)} is not significant "
-                      f"(p {'=' if len(equal) == 1 else '>='} {least:.2g}, below {self.alpha:g} "
-                      "would be)")
+            words += (f"{';' if beaten or tied else ','} {'their' if tied else 'its'} lead over "
+                      f"{_quoted(equal)} is not significant (p {'=' if len(equal) == 1 else '>='} "
+                      f"{least:.2g}, below {self.alpha:g} would be)")
         return words + "."
 
     def left(self) -> tuple[tuple[str, bool], ...]:
@@ -119,7 +125,7 @@ class Validation:
             "alpha": self.alpha, "scores": [s.to_dict() for s in self.scores],
             "pairs": [asdict(p) for p in self.pairs],
             "residuals": [a.to_dict() for own in self.residuals.values() for a in own],
-            "notes": list(self.notes)}
+            "alike": [list(group) for group in self.alike], "notes": list(self.notes)}
 
     def rows(self) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
         """Headers and cells of the table, best model first, the noise last."""

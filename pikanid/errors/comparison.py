@@ -52,3 +52,8 @@ def baseline_unstable(output: str) -> str:
 def prediction_diverged(model: str, recording: str) -> str:
     return (f"'{short(model)}' cannot be followed along '{short(recording)}': the motion leaves "
             "the finite numbers.")
+
+
+def predict_alike(names: Iterable[str]) -> str:
+    return (f"These models predict the same: {listed(names)}. Is one of them given twice, or was "
+            "another meant?")

@@ -36,6 +36,24 @@ def formula_forbidden(part: str, where: str, functions: Sequence[str],
             f"+ - * / **, parentheses and the functions {', '.join(functions)}.{hint}")
 
 
+def formula_overflows(part: str, where: str) -> str:
+    return (f"'{short(part)}' in the formula of {where} overflows: no number beyond 1.8e308, or "
+            "fraction of such numbers, can be computed with.")
+
+
+def formula_exponent(part: str, where: str, limit: int) -> str:
+    return (f"'{short(part)}' in the formula of {where} has an exponent beyond {limit}, the "
+            "largest that is read.")
+
+
+def formula_not_real(part: str, where: str) -> str:
+    return f"'{short(part)}' in the formula of {where} is not a real number."
+
+
+def formula_not_finite(part: str, where: str) -> str:
+    return f"'{short(part)}' in the formula of {where} is infinite or undefined."
+
+
 def unknown_symbol(name: str, where: str, known: Sequence[str], close: Sequence[str]) -> str:
     return (f"'{name}' in the formula of {where} is neither a state, an input nor a parameter "
             f"(known: {listed(known)}).{did_you_mean(close)}")

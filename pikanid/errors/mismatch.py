@@ -79,9 +79,10 @@ def too_rough_to_plan(model: str, excitation: str) -> str:
             "make the excitation smaller, or its samples denser.")
 
 
-def no_profile_simulated(candidates: int) -> str:
-    return (f"None of {candidates} profiles can be simulated with every hypothesis within the "
-            "limits: offer smaller ones.")
+def no_profile_simulated(candidates: int, models: int) -> str:
+    whose = "the model" if models == 1 else "every hypothesis"
+    return (f"None of {candidates} profiles can be simulated with {whose} within the limits: offer "
+            "smaller ones.")
 
 
 def limits_not_kept(profile: str) -> str:
@@ -110,3 +111,13 @@ def unknown_setting(name: str, close: Sequence[str]) -> str:
 
 def settings_unreadable(path: str, detail: str) -> str:
     return f"The settings '{path}' cannot be read: {detail}."
+
+
+def columns_exchanged(a: str, b: str, left: float, other: float) -> str:
+    return (f"With the columns of '{a}' and '{b}' exchanged the model leaves {100 * other:.2g} % "
+            f"of what the outputs do, {100 * left:.3g} % as they are: check which is which.")
+
+
+def times_in_another_unit(word: str, left: float, other: float) -> str:
+    return (f"With all times {word} by 1000 the model leaves {100 * other:.2g} % of what the "
+            f"outputs do, {100 * left:.3g} % as they are: check the unit of the time.")

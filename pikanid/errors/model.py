@@ -82,6 +82,11 @@ def model_file_key(path: str, where: str, key: str, known: Sequence[str],
             f"{did_you_mean(close)}")
 
 
+def equation_of_state(path: str, where: str, key: str, state: str) -> str:
+    return (f"'{path}': {where} has the unknown key '{key}': what a state's rate is stands under "
+            f"[equations], as {state} = \"...\".")
+
+
 def model_file_missing(path: str, where: str, wanted: str) -> str:
     return f"'{path}': {where} lacks {wanted}."
 

@@ -13,16 +13,23 @@ from __future__ import annotations
 import ast
 import difflib
 import keyword
-import math
 from collections.abc import Collection, Mapping
 
 import sympy as sp
 
 from pikanid import errors
 from pikanid.formula.functions import abs_power, clip, log_abs, signed_power
-from pikanid.formula.limits import MAX_BITS, MAX_DEPTH, MAX_LENGTH, MAX_NAME, MAX_POWER, Work
+from pikanid.formula.limits import MAX_DEPTH, MAX_LENGTH, MAX_NAME, MAX_POWER, Work
 from pikanid.formula.printing import Printer
-from pikanid.storage.entries import is_integer, is_number
+from pikanid.formula.real_numbers import (
+    Sentence,
+    exponent_too_large,
+    finite_number,
+    to_number,
+    wrong_number,
+    wrong_part,
+    wrong_power,
+)
 
 TIME = sp.Symbol("t", real=True)
 
@@ -126,24 +133,9 @@ def to_real(expression: sp.Expr | float | str, where: str = "A formula") -> sp.E
     if isinstance(expression, sp.Expr):
         return expression.xreplace(
             {s: symbol(s.name) for s in expression.free_symbols if s != symbol(s.name)})
-    if is_number(expression) and (number := to_number(expression)) is not None:
+    if (number := finite_number(expression)) is not None:
         return number
     raise errors.BadModel(errors.not_a_formula(where, expression))
-
-
-def to_number(value: float) -> sp.Expr | None:
-    """A real number as SymPy holds it, None where no float can hold it.
-
-    >>> to_number(3), to_number(10**400)
-    (3, None)
-    """
-    if is_integer(value) and abs(value) < 2**53:
-        return sp.Integer(int(value))
-    try:
-        real = float(value)
-    except OverflowError:
-        return None
-    return sp.Float(real) if math.isfinite(real) else None
 
 
 class _Reader:
@@ -154,10 +146,13 @@ class _Reader:
         self.names, self.functions, self.text, self.where = names, functions, text, where
         self.work = work
 
+    def source(self, node: ast.AST) -> str:
+        return ast.get_source_segment(self.text.strip(), node) or self.text
+
     def fail(self, node: ast.AST) -> errors.BadModel:
-        part = ast.get_source_segment(self.text.strip(), node) or self.text
         return errors.BadModel(errors.formula_forbidden(
-            part, self.where, sorted(FUNCTIONS), isinstance(node, ast.Compare | ast.IfExp)))
+            self.source(node), self.where, sorted(FUNCTIONS),
+            isinstance(node, ast.Compare | ast.IfExp)))
 
     def afford(self, fits: bool) -> None:
         if not fits:
@@ -191,33 +186,18 @@ class _Reader:
                 terms.append(right if isinstance(step.op, ast.Add) else -right)
             else:
                 terms = [self.binary(step, step.op, sp.Add(*terms), right)]
-                self.finite(step, terms[0])
+                self.sound(step, wrong_number(terms[0]))  # before anything grows from it
         return self.real(node, sp.Add(sign * terms[0], *terms[1:]))
+
+    def sound(self, node: ast.AST, wrong: Sentence | None) -> None:
+        """Raise the sentence about a part of the formula, if there is one."""
+        if wrong is not None:
+            raise errors.BadModel(wrong(self.source(node), self.where))
 
     def real(self, node: ast.AST, result: sp.Expr) -> sp.Expr:
         """The expression, if every part of it is real; a number must also be finite."""
-        self.finite(node, result)
-        if result.has(sp.zoo, sp.nan, sp.oo, sp.I):
-            raise self.fail(node)
-        self.small(node, result)
+        self.sound(node, wrong_part(result))
         return result
-
-    def small(self, node: ast.AST, result: sp.Expr) -> None:
-        """Refuse exact numbers without end, which whole powers of products make."""
-        for part in (result, *result.args):
-            number = part if part.is_Rational else part.as_coeff_Mul()[0]
-            if number.is_Rational and max(abs(number.p), number.q).bit_length() > MAX_BITS:
-                raise self.fail(node)
-
-    def finite(self, node: ast.AST, result: sp.Expr) -> None:
-        """Refuse a number that no float can hold, before anything grows from it."""
-        if result.is_number:
-            try:
-                if math.isfinite(float(result)):
-                    return
-            except (TypeError, OverflowError):
-                pass
-            raise self.fail(node)
 
     def part(self, node: ast.AST, depth: int) -> sp.Expr:
         match node:
@@ -236,8 +216,8 @@ class _Reader:
         raise self.fail(node)
 
     def number(self, value: int | float, node: ast.AST) -> sp.Expr:
-        if (found := to_number(value)) is None:
-            raise self.fail(node)
+        found = to_number(value)
+        self.sound(node, errors.formula_overflows if found is None else None)
         return found
 
     def name(self, name: str) -> sp.Expr:
@@ -263,20 +243,12 @@ class _Reader:
     def power(self, node: ast.AST, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
         if base.is_zero and exponent.is_negative:
             raise errors.BadModel(errors.division_by_zero(self.text, self.where))
-        if exponent.is_number and abs(float(exponent)) > MAX_POWER:
-            raise self.fail(node)
+        self.sound(node, wrong_power(base, exponent))
         self.afford(self.work.power(exponent))
-        scale = base.as_coeff_Mul()[0]
-        if exponent.is_number and scale.is_Rational and abs(float(exponent)) * (
-                max(abs(scale.p), scale.q).bit_length() - 1) > MAX_BITS and scale != -1:
-            raise self.fail(node)
         small = exponent.is_Rational and abs(exponent.p) <= 8 and exponent.q <= 8
         if base.is_number and exponent.is_number and not (small and abs(float(base)) < 1e6):
             # exact big-integer powers can fill the memory: these become floating point
-            try:
-                return self.number(float(base) ** float(exponent), node)
-            except (OverflowError, ZeroDivisionError, TypeError):
-                raise self.fail(node) from None
+            return sp.Float(float(base) ** float(exponent))
         return base**exponent
 
     def call(self, node: ast.AST, name: str, args: list[sp.Expr], depth: int) -> sp.Expr:
@@ -293,7 +265,7 @@ class _Reader:
         self.afford(self.work.call(name, depth))
         if name in ("abs_power", "signed_power") and args[1].is_number and (
                 abs(float(args[1])) > MAX_POWER):
-            raise self.fail(node)
+            self.sound(node, exponent_too_large)
         try:
             return build(*args)
         except (ValueError, TypeError, RecursionError):  # SymPy: complex or not comparable

@@ -9,7 +9,6 @@ Inputs and outputs also take the keys of `pikanid.model.channel_maps` (``delay``
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,6 +23,7 @@ from pikanid.formula.limits import Work
 from pikanid.model.channel_maps import INPUT_MAPS, OUTPUT_MAPS, map_input, map_output
 from pikanid.model.checks import MOST
 from pikanid.model.effects_file import from_table, to_table
+from pikanid.model.file_keys import KEYS, OWN, SECTIONS, check_keys
 from pikanid.model.lookup import Lookup
 from pikanid.model.operations import Operations
 from pikanid.model.parts import Input, Output, Parameter, Spline, State
@@ -34,16 +34,6 @@ from pikanid.storage.limits import toml_content
 from pikanid.storage.outputs import atomically
 
 M = TypeVar("M", bound=Operations)
-SECTIONS = ("name", "domain", "states", "inputs", "parameters", "equations", "outputs", "splines",
-            "effects")
-OWN = SECTIONS[:2]  # layout: of the model itself, no tables
-KEYS = {
-    "states": ("unit", "initial", "guess", "bounds", "scope", "description"),
-    "inputs": ("unit", "hold", "default", *INPUT_MAPS),
-    "parameters": ("unit", "guess", "value", "bounds", "scope", "description"),
-    "outputs": ("unit", "expression", "sigma", *OUTPUT_MAPS),
-    "splines": ("degree", "knots"),
-}
 
 
 def load(path: str | os.PathLike[str], kind: Callable[..., M]) -> M:
@@ -76,7 +66,7 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
     if not isinstance(content, Mapping):
         raise errors.BadModel(errors.not_of_kind(
             f"The model '{source}'", type(content).__name__, "a table"))
-    _known_keys(content, SECTIONS, source, "the file")
+    check_keys(content, SECTIONS, source, "the file")
     tables = {section: _table(content, section, source) for section in KEYS}
     equations = content.get("equations", {})
     if not isinstance(equations, Mapping):
@@ -177,13 +167,6 @@ def _drop(entry: dict[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in entry.items() if v is not None and v != ""}
 
 
-def _known_keys(table: Mapping[str, Any], known: tuple[str, ...], source: str, where: str) -> None:
-    for key in table:
-        if key not in known:
-            close = difflib.get_close_matches(str(key), known, 1)
-            raise errors.BadModel(errors.model_file_key(source, where, str(key), known, close))
-
-
 def _table(content: Mapping[str, Any], name: str, source: str) -> dict[str, Mapping[str, Any]]:
     table = content.get(name, {})
     if not isinstance(table, Mapping):
@@ -197,7 +180,7 @@ def _table(content: Mapping[str, Any], name: str, source: str) -> dict[str, Mapp
             f"'{source}': [{name}]", len(table), MOST[name]))
     for key, entry in table.items():
         check_name(key, name.rstrip("s"))
-        _known_keys(entry, KEYS[name], source, f"{name}.{key}")
+        check_keys(entry, KEYS[name], source, f"{name}.{key}")
     return dict(table)
 
 

@@ -36,8 +36,10 @@ def design_figure(profile: Recording,
             axis.plot(*response[output], color=COLOURS[k % len(COLOURS)],
                       linestyle=DASHES[k % len(DASHES)], linewidth=1.0, label=name)
         axis.set_ylabel(f"{output} [{units[output]}]" if units[output] else output)
-        if len(responses) > 1:
-            axis.legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("t [s]")
-    figure.suptitle(profile.name)
+    axes[0].set_title(profile.name, fontsize="large")
+    if len(responses) > 1:  # beside the axes: within, it would cover a curve
+        handles, labels = axes[-1].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=2,
+                      frameon=False, fontsize="small")
     return figure

@@ -26,6 +26,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.mismatch.design.profiles import Bounds, profiles_for, scaled
 from pikanid.mismatch.design.ranges import Range
+from pikanid.mismatch.design.reach import reach_sentence, reached
 from pikanid.mismatch.design.response import (
     Sigma,
     Watch,
@@ -82,6 +83,11 @@ class NextExperiment:
         """How many times better than what it is compared with (`repeated`)."""
         return self.value / self.repeated if self.repeated > 0 else np.inf
 
+    @property
+    def reach(self) -> dict[str, tuple[float, float]]:
+        """Least and largest value of each output under the profile, by any of the hypotheses."""
+        return reached(self.responses.values())
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the profile to a CSV, TSV or Parquet file.
 
@@ -101,21 +107,23 @@ class NextExperiment:
         return {"profile": self.profile.name, "purpose": self.purpose, "value": self.value,
                 "before": self.before, "repeated": self.repeated,
                 "gain": self.gain if np.isfinite(self.gain) else None,
-                "std": dict(self.std), "ranking": [list(row) for row in self.ranking]}
+                "std": dict(self.std), "reach": {k: list(v) for k, v in self.reach.items()},
+                "ranking": [list(row) for row in self.ranking]}
 
     def __str__(self) -> str:
         name = self.profile.name
+        ends = (reach_sentence(self.reach, self.units), *self.profile.notes)
         if self.purpose == "separate":
             verdict = "tells them apart" if self.value >= self.separated else (
                 f"does not tell them apart yet ({self.separated:g} σ are needed)")
             return " ".join((f"Next experiment: {name}. The closest two hypotheses are "
                              f"{self.value:.3g} σ apart afterwards ({self.before:.3g} σ now): it "
-                             f"{verdict}.", *self.profile.notes))
+                             f"{verdict}.", *ends))
         otherwise = ("if the last recording were repeated" if self.before > 0
                      else "with the median profile")
         bounds = ", ".join(f"{key} ± {std:.2g}" for key, std in self.std.items())
         return " ".join((f"Next experiment: {name}. Standard errors of {bounds}; {self.gain:.3g} "
-                         f"times smaller on average than {otherwise}.", *self.profile.notes))
+                         f"times smaller on average than {otherwise}.", *ends))
 
 
 def next_experiment(hypotheses: Mapping[str, Model], recorded: Sequence[Recording] | Recording = (),
@@ -237,7 +245,8 @@ def _chosen(watch: Watch, purpose: Literal["separate", "parameters"], quick: Sco
         new = {name: [r] for name, r in responses.items()}
         tried.append((quick(new, [profile]), profile, new))
     if not tried:
-        raise errors.SimulationFailed(errors.no_profile_simulated(len(candidates)))
+        raise errors.SimulationFailed(errors.no_profile_simulated(
+            len(candidates), len(watch.models)))
     tried.sort(key=lambda entry: -entry[0])
     few = tried[:settings.budget.finalists]
     finalists = [(full(new, [profile]), profile, new) for _, profile, new in few]

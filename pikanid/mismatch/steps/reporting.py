@@ -22,6 +22,7 @@ from pikanid.mismatch.report.explained import explanations
 from pikanid.mismatch.report.findings import Curves, OutputError, Proof
 from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.search.overdispersion import overdispersion
+from pikanid.mismatch.steps.mislabelled import mislabelled
 from pikanid.mismatch.steps.remaining import closest, present, remainder
 from pikanid.model import Model
 from pikanid.model.domains import not_taken
@@ -49,6 +50,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
+    if answer.verdict == "unnamed":
+        case.notes += mislabelled(case)
     if answer.verdict in ("unnamed", "unconfirmed", "partial"):
         known = (i for c in case.candidates for i in c.ids)
         case.notes += filter(None, [not_taken(case.model, known)])
