@@ -111,6 +111,12 @@ def test_of_states_of_several_kinds_each_takes_what_its_unit_tells() -> None:
     assert "hydraulics" in not_taken(tank, ()) and "thermal" not in not_taken(tank, ())
 
 
+def test_of_several_domains_one_is_not_for_states_of_another() -> None:
+    tank = decay("degC", domain=["hydraulics", "thermal"]).with_state(pk.State("h", "m", 0), "-h")
+    assert {(e.key, e.within) for e in candidates_of(tank) if isinstance(e, EffectForm)} >= {
+        ("overflow", ("h",)), ("hidden_storage", ("x", "h"))}
+
+
 def test_an_effect_of_a_catalogue_is_looked_for_where_its_unit_tells() -> None:
     reactor = decay("degC").with_state(pk.State("c", "mol/l", 1.0), "-c")
     reactor = reactor.replace(outputs=(*reactor.outputs, pk.Output("c", "c", "mol/l")))

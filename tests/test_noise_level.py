@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from pikanid.mismatch.data.noise_level import GRID, _shape, _whittle, first_level, refined
 from pikanid.mismatch.settings.settings import DEFAULTS
-from pikanid.noise.level import NoiseModel
+from pikanid.noise.level import NoiseModel, estimate
 from pikanid.noise.quiet import without_moves
 from pikanid.recording import Recording
 from pikanid.recording.channel import Channel
@@ -20,7 +20,7 @@ WHITE = NoiseModel(1.0, 0.0, 0.0, 0.01, "")
 MOVING = np.where(T < 2.0, 0.0, np.sin(9 * (T - 2.0)))
 
 
-def still(u: np.ndarray, start: float, stop: float) -> tuple[float, float]:
+def still(u: np.ndarray, start: float, stop: float) -> tuple[float, float] | None:
     return without_moves(Channel("y", T, T), [Channel("u", T, u)], start, stop)
 
 
@@ -33,12 +33,23 @@ def test_a_stretch_ends_where_the_input_begins_to_move() -> None:
 
 def test_a_noisy_input_at_rest_does_not_move() -> None:
     noise = 0.03 * np.random.default_rng(0).standard_normal(len(T))
-    start, stop = still(MOVING + noise, 0.0, 1.98)
-    assert stop - start > 1.9
+    found = still(MOVING + noise, 0.0, 1.98)
+    assert found is not None and found[1] - found[0] > 1.9
 
 
-def test_where_nothing_rests_the_stretch_is_left_alone() -> None:
-    assert still(np.sin(9 * T), 0.5, 2.6) == (0.5, 2.6)
+def test_where_nothing_rests_no_stretch_is_quiet() -> None:
+    assert still(np.sin(9 * T), 0.5, 2.6) is None
+
+
+def test_what_is_driven_all_along_has_no_colour() -> None:
+    """A cell under a random load: its charge wanders as coloured noise does."""
+    rng = np.random.default_rng(0)
+    load = np.repeat(rng.normal(0.0, 3.0, 50), 20)
+    y = 0.002 * np.cumsum(load) - 0.03 * load + 0.0008 * rng.standard_normal(1000)
+    assert estimate(Channel("u", T, y)).rho > 0.9
+    found = estimate(Channel("u", T, y), drives=[Channel("i", T, load)])
+    assert found.rho == 0 and found.stretch is None
+    assert found.sigma == pytest.approx(0.0008, rel=0.3)
 
 
 def test_a_random_motion_does_not_count_as_coloured_noise() -> None:

@@ -33,9 +33,14 @@ def catalogues_of(model: Lookup) -> tuple[str, ...]:
 
 
 def _states_of(model: Lookup) -> dict[str, tuple[str, ...]]:
-    """Of each catalogue that a model takes, the states for which it does."""
+    """Of each catalogue that a model takes, the states for which it does; of several domains that a
+    model names one is not for states whose units tell another one.
+    """
     if model.domain is not None:
-        return dict.fromkeys(model.domain, model.state_names)
+        own = {name: {*_in_units(model, STATES[name][0])} for name in model.domain
+               if name in STATES}
+        return {name: tuple(s for s in model.state_names if s in own.get(name, ()) or not any(
+            s in others for others in own.values())) for name in model.domain}
     return {name: _in_units(model, telling + beside) for name in catalogues() if name in STATES
             for telling, beside in [STATES[name]] if _in_units(model, telling)}
 

@@ -115,13 +115,13 @@ def estimate(channel: Channel, quiet: tuple[float, float] | None = None,
     """
     check_times(channel, channel.name)
     check_values(channel, channel.name, missing_allowed=True)
-    stretch = find_quiet(channel, settings) if quiet is None else quiet
-    if stretch is None:
+    if quiet is not None:
+        return _from_quiet(channel, *quiet, settings, rounding, about_mean)
+    stretch = find_quiet(channel, settings)
+    still = stretch and without_moves(channel, drives, *stretch, settings)
+    if not still:
         return _from_highest(channel, rounding)
-    if quiet is None:
-        return _from_quiet(channel, *without_moves(channel, drives, *stretch, settings), settings,
-                           rounding, about_trend)
-    return _from_quiet(channel, *stretch, settings, rounding, about_mean)
+    return _from_quiet(channel, *still, settings, rounding, about_trend)
 
 
 def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING

@@ -46,9 +46,9 @@ def find_quiet(channel: Channel, settings: QuietSettings = USUAL
 
 
 def without_moves(channel: Channel, drives: Sequence[Channel], start: float, stop: float,
-                  settings: QuietSettings = USUAL) -> tuple[float, float]:
+                  settings: QuietSettings = USUAL) -> tuple[float, float] | None:
     """The longest part of a stretch [s] in which no input leaves the value that it has for most of
-    it: what is driven at random can look like coloured noise.  The stretch where that is too short.
+    it: what is driven at random can look like coloured noise.  None where that is too short.
     """
     t = channel.time[(channel.time >= start) & (channel.time <= stop)]
     moves = np.zeros(len(t), bool)
@@ -65,7 +65,7 @@ def without_moves(channel: Channel, drives: Sequence[Channel], start: float, sto
     longest = int(np.argmax(np.diff(ends)))
     first, last = int(ends[longest]), int(ends[longest + 1]) - 2
     enough = last - first + 1 >= settings.shortest
-    return (float(t[first]), float(t[last])) if enough else (start, stop)
+    return (float(t[first]), float(t[last])) if enough else None
 
 
 def even_parts(channel: Channel) -> Iterator[tuple[Array, Array]]:
