@@ -22,10 +22,11 @@ from pikanid.mismatch.fitting.descent import (
     place,
     renewed,
 )
-from pikanid.mismatch.fitting.progressive_horizon import besides, hits, lost, progressive_horizon
+from pikanid.mismatch.fitting.lowest import lowest
+from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
 from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
-from pikanid.optimise.levenberg_marquardt import Minimum, minimise, worth_a_step
+from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
 
@@ -248,12 +249,11 @@ def near_guess(nominal: Model, records: Records) -> Hypothesis | None:
     valley that the recording hardly closes it stays there.  None where that cannot be simulated.
     """
     whitened = Whitened(nominal, records)
-    theta, problem = place(whitened, records.guess), whitened.problem
+    theta = place(whitened, records.guess)
     rows = np.diag(1.0 / (GIVEN * whitened.sizes))
-    near = besides(whitened, lambda at: (rows @ (at - theta), rows))
-    found = minimise(near, theta, problem.lower, problem.upper, records.settings.budget.iterations,
-                     sizes=whitened.sizes) if whitened.choose_steps(
-                         theta, misfit=records.settings.fits.gross) else None
+    found = lowest(whitened, theta, records.settings.budget.iterations,
+                   besides=lambda at: (rows @ (at - theta), rows)) if whitened.choose_steps(
+                       theta, misfit=records.settings.fits.gross) else None
     if found is None:
         return None
     seen = len(found.r) - len(rows)
