@@ -22,6 +22,7 @@ from pikanid.mismatch.fitting.descent import (
     place,
     renewed,
 )
+from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.fitting.lowest import lowest
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
 from pikanid.mismatch.settings.thresholds import price
@@ -175,14 +176,6 @@ def _inverse(J: np.ndarray) -> np.ndarray:
     _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
     inverse = vt.T / np.maximum(s, 1e-9 * (s[0] or 1.0) if len(s) else 1.0) ** 2 @ vt
     return np.asarray(inverse / np.outer(norms, norms))
-
-
-def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
-    """The nominal model with all effects: sensors show what acts."""
-    model = nominal
-    for effect in sorted(effects, key=lambda e: e.channel == "sensor"):
-        model = effect.applied(model)
-    return model
 
 
 def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,

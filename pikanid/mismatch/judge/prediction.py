@@ -13,7 +13,8 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, extended
+from pikanid.mismatch.fitting.extended import extended
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.lowest import lowest
 from pikanid.mismatch.fitting.progressive_horizon import progressive_horizon, rough
 from pikanid.mismatch.judge.beginning import own_beginning
