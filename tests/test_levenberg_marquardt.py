@@ -36,6 +36,40 @@ def test_a_bent_valley_is_followed_to_its_end() -> None:
     np.testing.assert_allclose(found.theta, 1.0, atol=1e-8)
 
 
+def test_a_glance_saves_derivatives_and_leads_to_the_same_minimum() -> None:
+    none, full, glances = np.full(2, np.inf), [0, 0], 0
+
+    def evaluate(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        full[-1] += 1
+        return valley(q)
+
+    def glance(q: np.ndarray) -> np.ndarray:
+        nonlocal glances
+        glances += 1
+        return valley(q)[0]
+
+    start = np.array([-1.2, 1.0])
+    plain = minimise(evaluate, start, -none, none, 100, tolerance=1e-12)
+    full.append(0)
+    quick = minimise(evaluate, start, -none, none, 100, tolerance=1e-12, glance=glance)
+    assert plain is not None and quick is not None
+    assert glances > 0 and full[-1] < full[-2]
+    np.testing.assert_array_equal(quick.theta, plain.theta)
+    np.testing.assert_array_equal(quick.J, plain.J)
+
+
+def test_a_glance_that_promises_more_than_there_is_leads_nowhere() -> None:
+    """Where no derivatives are, no step is taken."""
+    none = np.full(2, np.inf)
+
+    def evaluate(q: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        return valley(q) if q[0] == -1.2 else None
+
+    found = minimise(evaluate, np.array([-1.2, 1.0]), -none, none, glance=lambda q: valley(q)[0])
+    assert found is not None and not found.converged
+    np.testing.assert_array_equal(found.theta, [-1.2, 1.0])
+
+
 def test_a_parameter_with_equal_bounds_stays() -> None:
     found = minimise(valley, np.array([-1.0, 0.25]), np.array([-2.0, 0.25]), np.array([2.0, 0.25]),
                      100, tolerance=1e-12)

@@ -24,7 +24,7 @@ from pikanid.mismatch.detect.residual_tests import (
 )
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.diagnose import diagnose
-from pikanid.mismatch.fitting.hypothesis import extended
+from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import systems

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.fitting.hypothesis import extended, fitted
+from pikanid.mismatch.fitting.extended import extended
+from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.lowest import lowest
 from pikanid.mismatch.judge import prediction, together
 from pikanid.mismatch.judge.doubt import worth
 from pikanid.mismatch.judge.prediction import held_out
@@ -18,7 +21,7 @@ from pikanid.mismatch.judge.prior import Prior, room
 from pikanid.mismatch.judge.together import _from_levels
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
-from pikanid.optimise.levenberg_marquardt import Evaluate, Minimum, minimise
+from pikanid.optimise.levenberg_marquardt import Minimum, minimise
 
 
 def prior(root: np.ndarray) -> Prior:
@@ -161,13 +164,12 @@ def test_a_wall_that_was_hardly_touched_predicts_a_hard_hit(depth: float, seed: 
 def test_settings_bound_the_fits_to_held_out_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
     limits: list[int] = []
 
-    def watched(evaluate: Evaluate, start: np.ndarray, lower: np.ndarray, upper: np.ndarray,
-                limit: int, sizes: np.ndarray) -> Minimum | None:
+    def watched(whitened: Whitened, start: np.ndarray, limit: int, **more: Any) -> Minimum | None:
         limits.append(limit)
-        return minimise(evaluate, start, lower, upper, limit, sizes=sizes)
+        return lowest(whitened, start, limit, **more)
 
     for module in (prediction, together):
-        monkeypatch.setattr(module, "minimise", watched)
+        monkeypatch.setattr(module, "lowest", watched)
     own = DEFAULTS.with_values({"budget.held_out": 4, "budget.beginnings": 5})
     model = pk.systems.sloshing().with_initial(theta="free")
     train, later = (pk.simulate(model, pk.excitation.planar_moves(3, 5.0, seed=seed),

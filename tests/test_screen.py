@@ -10,7 +10,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
-from pikanid.mismatch.fitting.hypothesis import extended
+from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.search.screen import Screen, best_level, entry, law
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case

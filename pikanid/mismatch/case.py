@@ -19,13 +19,13 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.lowest import lowest
 from pikanid.mismatch.fitting.parallel import side_by_side
 from pikanid.mismatch.fitting.repeats import Repeats
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
-from pikanid.optimise.levenberg_marquardt import minimise
 
 
 @dataclass
@@ -122,8 +122,7 @@ class Case:
         problem = whitened.problem
         if not whitened.choose_steps(h.minimum.theta):
             return False
-        found = minimise(whitened.residual, h.minimum.theta, problem.lower, problem.upper,
-                         self.settings.budget.noise_refit, sizes=whitened.sizes)
+        found = lowest(whitened, h.minimum.theta, self.settings.budget.noise_refit)
         return found is not None and residual_tests(
             whitened, found.theta, found.r, found.movable(problem.lower, problem.upper),
             self.candidates, self.rate

@@ -99,11 +99,14 @@ class Rows:
 
 def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit: int = 30,
              tolerance: float = 0.02, give_up: GiveUp = lambda count, last, cost: False,
-             sizes: Array | None = None) -> Minimum | None:
+             sizes: Array | None = None,
+             glance: Callable[[Array], Array | None] | None = None) -> Minimum | None:
     """Minimise |r(θ)|² within bounds; None where the start cannot be evaluated.
 
     After each iteration it is asked whether to `give_up`.  No step takes a parameter of known size
     (n,) far out of its order of magnitude: to change by its size counts as an increase of one.
+    A `glance` at r alone, where it costs less than both, tells what becomes of steps that are
+    likely to fail.
 
     >>> line = lambda q: (np.array([q[0] - 3.0]), np.ones((1, 1)))
     >>> found = minimise(line, np.array([1.0]), np.array([0.0]), np.array([2.0]))
@@ -114,9 +117,13 @@ def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit
         at = evaluate(theta)
         return None if at is None else Rows(*at)
 
+    def alone(theta: Array) -> Rows | None:
+        r = glance(theta) if glance is not None else None
+        return None if r is None else Rows(r, np.empty((len(r), 0)))
+
     found = descend(rows, start, lower, upper, limit, give_up=give_up,
                     enough=lambda at: worth_a_step(at.cost, len(at.r), tolerance), sizes=sizes,
-                    bend=Rows.bend)
+                    bend=Rows.bend, glance=None if glance is None else alone)
     return None if found is None else Minimum(found.theta, found.at.r, found.at.J, found.converged)
 
 
@@ -133,7 +140,8 @@ def worth_a_step(cost: float, rows: int, tolerance: float = 0.02) -> float:
 def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, upper: Array,
             limit: int, enough: Callable[[At], float],
             give_up: GiveUp = lambda count, last, cost: False, sizes: Array | None = None,
-            bend: Callable[[At, At, Array], Array] | None = None) -> Descent[At] | None:
+            bend: Callable[[At, At, Array], Array] | None = None,
+            glance: Callable[[Array], At | None] | None = None) -> Descent[At] | None:
     """Minimise a sum of squares within bounds; None where the start cannot be evaluated.
 
     Args:
@@ -148,6 +156,8 @@ def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, 
             increase of one (a proximal term, R. T. Rockafellar, SIAM J. Control Optim. 14, 1976).
         bend: What the slope (n,) changes by, to second order, as a step (n,) from one place to
             another one shows.
+        glance: The same as `evaluate`, but for derivatives: what tells whether a step behind one
+            that failed, which most often fails as well, is taken.
     """
     theta = np.clip(start, lower, upper)
     usual = np.full(len(theta), np.inf) if sizes is None else sizes
@@ -166,15 +176,18 @@ def descend(evaluate: Callable[[Array], At | None], start: Array, lower: Array, 
             expected = about.fall(step)
             if expected < enough(at):
                 return Descent(theta, at, tried == 0)
+            look = evaluate if glance is None or tried == 0 else glance
             new = about.moved(step)
-            there = evaluate(new)
+            there = look(new)
             if there is not None and there.cost >= at.cost and bend is not None:
                 other = about.corrected(step, damping, bend(at, there, new - theta))
                 if other is not None:
                     new = about.moved(other)
-                    there = evaluate(new)
+                    there = look(new)
             if there is not None and there.cost < at.cost:
-                break
+                there = there if look is evaluate else evaluate(new)
+                if there is not None:
+                    break
             there = None
             damping, step = about.step(max(damping * 8, AGAIN))
         if there is None:

@@ -105,13 +105,15 @@ def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:
     groups = ["prelude", "h", *(["f", "g", "g_rate"] if K else ["f"] if moving else [])]
     parts = [DECLARED, TABLES, Writer(_NOTHING).text(),
              *(text for group in groups for text in _of_group(tape, group, live, lanes)),
-             look("put", tape, 0, False), step("step", tape, 0, live, False),
-             look("look_h_only", tape, 0, False, "values_h")]
+             step("step", tape, 0, live, False), look("look_h_only", tape, 0, False, "values_h")]
+    if K or moving:  # a smooth model is looked at before an input that moves, and nowhere else
+        parts.append(look("put", tape, 0, False))
+    if K and lanes:
+        parts.append(look("put_tangents", tape, lanes, moving))
     if moving:
         parts.append(_values(tape, "h_rate"))
     if lanes:
-        parts += [look("put_tangents", tape, lanes, moving),
-                  look("look_h", tape, lanes, moving, "values_h", "tangents_h"),
+        parts += [look("look_h", tape, lanes, moving, "values_h", "tangents_h"),
                   step("step_tangents", tape, lanes, live, moving)]
     if K:
         parts += [look("look_g", tape, 0, False, "values_g"),

@@ -7,6 +7,7 @@ where it damps the coordinate by a force of its own, -b v: there ∂f/∂b = -M�
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 
 import sympy as sp
@@ -45,6 +46,7 @@ def lever(model: Model, v: str, rates: Sequence[str]) -> tuple[str, Mapping[str,
     return None
 
 
+@functools.lru_cache(maxsize=256)  # a diagnosis asks of the same model again and again
 def _without(product: sp.Expr, factor: sp.Symbol) -> sp.Expr:
     """A product without one of its factors, which stays in a denominator where it is none."""
     ratio = product / factor

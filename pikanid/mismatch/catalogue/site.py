@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -135,7 +136,7 @@ class Site:
         used = {s.name for s in self.acceleration.free_symbols}
         return tuple(p.name for p in self.model.parameters if p.free and p.name in used)
 
-    @property
+    @functools.cached_property
     def resisted(self) -> bool:
         """Whether a parameter of the model resists v itself in proportion, at rest: not a speed
         relative to another coordinate's.

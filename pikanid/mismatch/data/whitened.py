@@ -132,6 +132,7 @@ class Whitened:
         self.rows = self.problem.n_samples
         self.sigma = [self._sigmas(r) for r in range(len(self.simulators))]
         self.work = 0.0
+        self._counted: np.ndarray | None = None  # where the last simulation was counted already
 
     def choose_steps(self, theta: np.ndarray, share: float = SHARE, misfit: float = 1.0) -> bool:
         """Steps whose error stays below a share of the noise; False where nothing can be run.
@@ -206,7 +207,7 @@ class Whitened:
 
     def responses(self, theta: np.ndarray, states: bool = False) -> list[Response]:
         """Simulate every recording, with derivatives by its own parameters."""
-        self.work += self.cost
+        self.work += 0.0 if theta is self._counted else self.cost
         return [s.run(self.problem.parameters(theta, r), self.columns[r][0], self.steps[r], states)
                 for r, s in enumerate(self.simulators)]
 
@@ -251,19 +252,32 @@ class Whitened:
         finite = all(math.isfinite(np.vdot(a, a)) for a in (rows, jacobian))
         return (rows, jacobian) if finite else None
 
+    def rows_alone(self, theta: np.ndarray) -> np.ndarray | None:
+        """The rows of `residual`, the same numbers, without derivatives: for a fraction of the
+        time, where there are many parameters.  It counts as work as they do, both together once.
+        """
+        if not self.steps:
+            return None
+        self.work += self.cost
+        self._counted, found = theta, self._each(theta)
+        return None if found is None else np.concatenate(found)
+
     def chi2(self, theta: np.ndarray) -> float:
         """Sum of squares of the whitened residual, without derivatives; infinite if it fails, or
         where no steps were found that could do.
         """
-        if not self.steps:
-            return np.inf
-        total = 0.0
-        for r, simulator in enumerate(self.simulators):
+        found = self._each(theta)
+        return np.inf if found is None else sum(float(np.sum(part ** 2)) for part in found)
+
+    def _each(self, theta: np.ndarray) -> list[np.ndarray] | None:
+        """Whitened residuals of the recordings, without derivatives."""
+        parts: list[np.ndarray] = []
+        for r, simulator in enumerate(self.simulators if self.steps else ()):
             response = simulator.run(self.problem.parameters(theta, r), steps=self.steps[r])
             if not response.finished:
-                return np.inf
-            total += float(np.sum(self.whiten(r, response.y - self.measured(r)) ** 2))
-        return total
+                return None
+            parts.append(self.whiten(r, response.y - self.measured(r)))
+        return parts or None
 
     def measured(self, r: int) -> np.ndarray:
         """All samples of recording r (rows,)."""

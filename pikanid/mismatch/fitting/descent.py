@@ -13,8 +13,9 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.data.whitened import Whitened, allowance
 from pikanid.mismatch.fitting.closest import Closest
+from pikanid.mismatch.fitting.lowest import lowest
 from pikanid.mismatch.settings.settings import Settings
-from pikanid.optimise.levenberg_marquardt import Minimum, minimise
+from pikanid.optimise.levenberg_marquardt import Minimum
 
 TOLERATED = 2.0  # numerical: times the error that steps are chosen for, before they are chosen anew
 BACK = (1.0, 0.25, 0.06, 0.01)  # numerical: shares of a first step, tried until χ² falls
@@ -52,7 +53,7 @@ def per_row(chi2: float, rows: int) -> float:
 def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
               closest: Closest, limit: int, beyond: Callable[[float], bool]) -> Minimum | None:
     """The lowest of the minima that the starts lead to."""
-    problem, rows = whitened.problem, max(whitened.rows, 1)
+    rows = max(whitened.rows, 1)
     fits, budget = whitened.settings.fits, whitened.settings.budget
     gross, closer = fits.gross, fits.closer
     give_up = impatient(beyond, whitened.settings)
@@ -62,9 +63,8 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
         guess = _begun(whitened, start, misfit, closest)
         if guess is None:
             continue
-        found = minimise(whitened.residual, guess, problem.lower, problem.upper,
-                         budget.several_starts if len(starts) > 1 else limit, give_up=give_up,
-                         sizes=whitened.sizes)
+        found = lowest(whitened, guess, budget.several_starts if len(starts) > 1 else limit,
+                       give_up)
         if found is not None and (best is None or found.chi2 < best.chi2):
             best = found
     if best is None:
@@ -75,8 +75,7 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
         if not closest.choose_steps(whitened, best.theta,
                                     lambda chi2: min(coarse / rows, misfit(chi2))):
             return None
-        best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        give_up=give_up, sizes=whitened.sizes)
+        best = lowest(whitened, best.theta, limit, give_up)
     return renewed(whitened, best, closest, limit, beyond)
 
 
@@ -85,7 +84,7 @@ def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: i
     """A fit that goes on with finer steps where those of its start are too long: a stiff wall met
     in one step takes energy out that a real one gives back.
     """
-    problem, misfit = whitened.problem, partial(per_row, rows=max(whitened.rows, 1))
+    misfit = partial(per_row, rows=max(whitened.rows, 1))
     for _ in range(whitened.settings.budget.finer):
         if best is None or beyond(best.chi2):
             break
@@ -103,8 +102,7 @@ def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: i
                 all(new.longest >= old.longest for new, old in zip(
                     whitened.steps, before, strict=True)):
             break
-        best = minimise(whitened.residual, best.theta, problem.lower, problem.upper, limit,
-                        give_up=impatient(beyond, whitened.settings), sizes=whitened.sizes)
+        best = lowest(whitened, best.theta, limit, impatient(beyond, whitened.settings))
     return best
 
 
@@ -140,17 +138,14 @@ def basin_hopping(whitened: Whitened, best: Minimum, effect: Candidate, limit: i
             theta[first] *= share
             if later:
                 theta[more[0]] += later
-            found.append(minimise(whitened.residual, theta, problem.lower, problem.upper,
-                                  settings.budget.several_starts,
-                                  give_up=impatient(partial(lt, best.chi2), settings),
-                                  sizes=whitened.sizes))
+            found.append(lowest(whitened, theta, settings.budget.several_starts,
+                                impatient(partial(lt, best.chi2), settings)))
         lower = min((m for m in found if m is not None), key=lambda m: m.chi2, default=best)
         if lower.chi2 > best.chi2 - settings.fits.lower_hill:
             break
         best = lower
         if not best.converged:
-            best = minimise(whitened.residual, best.theta, problem.lower, problem.upper,
-                            limit, sizes=whitened.sizes) or best
+            best = lowest(whitened, best.theta, limit) or best
     return best
 
 

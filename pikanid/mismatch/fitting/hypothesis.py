@@ -22,10 +22,12 @@ from pikanid.mismatch.fitting.descent import (
     place,
     renewed,
 )
-from pikanid.mismatch.fitting.progressive_horizon import besides, hits, lost, progressive_horizon
+from pikanid.mismatch.fitting.extended import extended
+from pikanid.mismatch.fitting.lowest import lowest
+from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
 from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
-from pikanid.optimise.levenberg_marquardt import Minimum, minimise, worth_a_step
+from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
 
@@ -176,14 +178,6 @@ def _inverse(J: np.ndarray) -> np.ndarray:
     return np.asarray(inverse / np.outer(norms, norms))
 
 
-def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
-    """The nominal model with all effects: sensors show what acts."""
-    model = nominal
-    for effect in sorted(effects, key=lambda e: e.channel == "sensor"):
-        model = effect.applied(model)
-    return model
-
-
 def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
            starts: Sequence[Start | Mapping[str, float]], choices: int,
            closest: Closest | None = None, settled: frozenset[str] = frozenset()
@@ -248,12 +242,11 @@ def near_guess(nominal: Model, records: Records) -> Hypothesis | None:
     valley that the recording hardly closes it stays there.  None where that cannot be simulated.
     """
     whitened = Whitened(nominal, records)
-    theta, problem = place(whitened, records.guess), whitened.problem
+    theta = place(whitened, records.guess)
     rows = np.diag(1.0 / (GIVEN * whitened.sizes))
-    near = besides(whitened, lambda at: (rows @ (at - theta), rows))
-    found = minimise(near, theta, problem.lower, problem.upper, records.settings.budget.iterations,
-                     sizes=whitened.sizes) if whitened.choose_steps(
-                         theta, misfit=records.settings.fits.gross) else None
+    found = lowest(whitened, theta, records.settings.budget.iterations,
+                   besides=lambda at: (rows @ (at - theta), rows)) if whitened.choose_steps(
+                       theta, misfit=records.settings.fits.gross) else None
     if found is None:
         return None
     seen = len(found.r) - len(rows)

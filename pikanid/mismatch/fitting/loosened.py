@@ -7,7 +7,7 @@ import numpy as np
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.descent import place
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.optimise.levenberg_marquardt import minimise
+from pikanid.mismatch.fitting.lowest import lowest
 
 
 def loosened(h: Hypothesis, near: Hypothesis) -> float | None:
@@ -35,8 +35,8 @@ def loosened(h: Hypothesis, near: Hypothesis) -> float | None:
         for _ in range(2):  # the second time with steps for what the first one leaves
             if not whitened.choose_steps(theta, misfit=max(misfit, 1.0)):
                 break
-            one = minimise(whitened.residual, theta, lower, upper,
-                           whitened.settings.budget.iterations, sizes=whitened.sizes)
+            one = lowest(whitened, theta, whitened.settings.budget.iterations,
+                         lower=lower, upper=upper)
             if one is None:
                 break
             theta, misfit = one.theta, one.chi2 / rows

@@ -7,20 +7,18 @@ and what it tells leads to the next one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Whitened
+from pikanid.mismatch.fitting.lowest import Known, lowest, nothing
 from pikanid.mismatch.settings.settings import Settings
-from pikanid.optimise.levenberg_marquardt import Evaluate, Minimum, minimise
+from pikanid.optimise.levenberg_marquardt import Minimum
 
 # of all motion, that beginnings hold: each half as much again as the one before
 SHARES = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7)  # numerical: where a path of fits leads along
-
-Known = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
-
 
 def rough(chi2: float, rows: int, effects: Sequence[Candidate], settings: Settings) -> bool:
     """Whether a fit that leaves χ² of so many rows may have missed impacts."""
@@ -35,20 +33,6 @@ def hits(effects: Sequence[Candidate]) -> bool:
 def lost(chi2: float, rows: int, settings: Settings) -> bool:
     """Whether a fit that leaves χ² of so many rows explains nothing."""
     return chi2 > settings.fits.lost * rows
-
-
-def nothing(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """No rows besides those of the records."""
-    return np.empty(0), np.empty((0, len(theta)))
-
-
-def besides(whitened: Whitened, known: Known) -> Evaluate:
-    """The residual of records with what is known besides below it."""
-    def evaluate(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        at, rows = whitened.residual(theta), known(theta)
-        return at and (np.concatenate([at[0], rows[0]]), np.vstack([at[1], rows[1]]))
-
-    return evaluate
 
 
 def progressive_horizon(whitened: Whitened, effects: Sequence[Candidate], theta: np.ndarray,
@@ -83,12 +67,11 @@ def _fitted(part: Whitened, effects: Sequence[Candidate], theta: np.ndarray, kno
     """The fit of a beginning: from where the last one ended or, if that leaves more than noise of a
     `level`, from where the effects leave the least, and over the hills about that.
     """
-    problem, settings, found = part.problem, part.settings, None
+    settings, found = part.settings, None
 
     def explained(start: np.ndarray, limit: int = settings.budget.iterations) -> bool:
         nonlocal found
-        other = minimise(besides(part, known), start, problem.lower, problem.upper, limit,
-                         sizes=part.sizes)
+        other = lowest(part, start, limit, besides=known)
         found = min((m for m in (found, other) if m), key=lambda m: m.chi2, default=None)
         return found is not None and not rough(
             found.chi2 / level, part.rows, effects, settings)

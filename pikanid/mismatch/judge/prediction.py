@@ -13,14 +13,16 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, extended
-from pikanid.mismatch.fitting.progressive_horizon import besides, progressive_horizon, rough
+from pikanid.mismatch.fitting.extended import extended
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.lowest import lowest
+from pikanid.mismatch.fitting.progressive_horizon import progressive_horizon, rough
 from pikanid.mismatch.judge.beginning import own_beginning
 from pikanid.mismatch.judge.prior import Prior, elsewhere, of_fit, room
 from pikanid.mismatch.judge.together import fitted_together, part_of, tested_together
 from pikanid.model import Model
 from pikanid.noise.projection import project
-from pikanid.optimise.levenberg_marquardt import Minimum, minimise
+from pikanid.optimise.levenberg_marquardt import Minimum
 
 Residual = tuple[int, str, np.ndarray, np.ndarray]  # recording, output, times, values
 
@@ -109,9 +111,9 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
         begun = own_beginning(whitened.problem, guess, tuple({c.site.v: c.site
                                                               for c in candidates}.values()))
         guess = min(guess, begun, key=whitened.chi2)
-        first = minimise(whitened.residual, guess, np.where(own, whitened.problem.lower, guess),
-                         np.where(own, whitened.problem.upper, guess),
-                         records.settings.budget.beginnings, sizes=whitened.sizes)
+        first = lowest(whitened, guess, records.settings.budget.beginnings,
+                       lower=np.where(own, whitened.problem.lower, guess),
+                       upper=np.where(own, whitened.problem.upper, guess))
         if first is not None:
             guess = first.theta
     found, prior = _moved(hypothesis, whitened, guess, shared, prior)
@@ -141,7 +143,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
 def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared: list[int],
            prior: Prior) -> tuple[Minimum | None, Prior]:
     """Where parameters suit both a recording and a prior, and that prior, linearised near there."""
-    problem, settings = whitened.problem, whitened.settings
+    settings = whitened.settings
     effects = [e for e in hypothesis.effects if not e.absent]
 
     def known(before: Prior, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,8 +152,8 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
         return before.residual(theta[shared]), rows
 
     def suited(before: Prior, begin: np.ndarray) -> Minimum | None:
-        return minimise(besides(whitened, functools.partial(known, before)), begin, problem.lower,
-                        problem.upper, settings.budget.held_out, sizes=whitened.sizes)
+        return lowest(whitened, begin, settings.budget.held_out,
+                      besides=functools.partial(known, before))
 
     found = suited(prior, guess)
     suits = not rough(hypothesis.minimum.chi2, hypothesis.whitened.rows, effects, settings)

@@ -14,7 +14,8 @@ from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.descent import impatient
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.optimise.levenberg_marquardt import Minimum, minimise
+from pikanid.mismatch.fitting.lowest import lowest
+from pikanid.optimise.levenberg_marquardt import Minimum
 
 
 def tested_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum,
@@ -48,8 +49,7 @@ def fitted_together(hypothesis: Hypothesis, later: Whitened, apart: Minimum, lef
             for f, v in zip(later.problem.free, apart.theta, strict=True)}
     problem = whitened.problem
     start = np.array([own[f.name, f.recording] for f in problem.free])
-    found = minimise(whitened.residual, start, problem.lower, problem.upper,
-                     first.settings.budget.held_out, sizes=whitened.sizes)
+    found = lowest(whitened, start, first.settings.budget.held_out)
     if found is None:
         return None
     if found.chi2 > hypothesis.minimum.chi2 + left + first.settings.verdict.missed:
@@ -87,8 +87,7 @@ def _from_levels(whitened: Whitened, hypothesis: Hypothesis, found: Minimum) -> 
             beside = [at(theta, {name: share * size}) for share in (1.0, *effect.other_minima)]
             theta = min(beside, key=whitened.chi2)
             if whitened.choose_steps(theta):
-                other = minimise(whitened.residual, theta, problem.lower, problem.upper,
-                                 whitened.settings.budget.held_out, sizes=whitened.sizes,
-                                 give_up=impatient(partial(lt, found.chi2), whitened.settings))
+                other = lowest(whitened, theta, whitened.settings.budget.held_out,
+                               impatient(partial(lt, found.chi2), whitened.settings))
                 found = min(found, other or found, key=lambda m: m.chi2)
     return found

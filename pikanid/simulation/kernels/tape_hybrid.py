@@ -40,9 +40,9 @@ def take_step(b, t, h, x, S, u, v, gap, dtau, mode, slopes_on, kx, kS, xs, Ss, x
 def margin(b, t, x, S, u, v, gap, dtau, mode):
     """How far the modes are from their ends (>= 0 while they hold), and which is the closest."""
     first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
-    if not fixed(mode):
+    if not fixed(mode):  # else the step that led here has put them
         call_look(b.code[PUT], b.r, b.d, t, gap, x, S, u, v, dtau)
-    put_signs(b, mode, b.flag[0])
+        put_signs(b, mode, b.flag[0])
     call_look(b.code[LOOK_G], b.r, b.d, t, gap, x, S, u, v, dtau)
     least, which = np.inf, -1
     for k in range(len(mode)):

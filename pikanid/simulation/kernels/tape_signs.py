@@ -26,6 +26,17 @@ def put_signs(b, mode, slide):
         return
     call_native(b.code[VALUES_G_RATE], r, d)
     call_native(b.code[SIGNS_G_RATE], r, ds)
+    if K == 1:
+        # as below, without matrices: what sticks is most often one dry friction
+        o = out[G_RATE, 0]
+        slope = ds[o, 0]
+        r[first] = -r[o] / slope if slope != 0.0 else 0.0
+        if slide:
+            call_native(b.code[VALUES_G_RATE], r, d)
+            call_native(b.code[TANGENTS_G_RATE], r, d)
+            for a in range(lanes):
+                d[first, a] = -d[o, a] / slope if slope != 0.0 else 0.0
+        return
     matrix, right, again, change = b.matrix, b.right, b.again, b.change
     for k in range(K):
         right[k, 0] = 0.0
