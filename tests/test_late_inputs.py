@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 import pikanid as pk
-from pikanid.mismatch.catalogue.late_inputs import input_lead
+from pikanid.mismatch.catalogue.late_inputs import input_delay, input_lead
 from pikanid.mismatch.catalogue.site import sites
 
 STEP, FINE, SIGMA = 0.02, 10, 0.003  # s, steps of the truth between two samples, V
@@ -36,7 +36,9 @@ def recorded(seed: int, late: float) -> pk.Recording:
 def test_it_is_a_delay_the_other_way() -> None:
     recording = recorded(1, 0.0)
     (late,) = input_lead(sites(MODEL, [recording])[0])
-    assert late.ids == ("input_lead",) and "recorded late" in late.name
+    assert late.ids == ("input_lead",) and "before it is recorded" in late.name
+    delays = input_delay(sites(MODEL, [recording])[0])
+    assert not any(late.suits([d]) or d.suits([late]) for d in delays)
     tau = late.parameters[0].name
     led = late.extend(MODEL.replace(parameters=(*MODEL.parameters, *late.parameters)))
     ahead = pk.simulate(led.with_values(**{tau: 4 * STEP}), recording)["x"].values

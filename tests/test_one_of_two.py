@@ -74,7 +74,7 @@ def test_what_holds_neither_of_two_families_is_fitted_beside_the_rest(
     tried: list[Any] = []
     monkeypatch.setattr(surely, "_one_more", lambda *args: bool(tried.append(args[1:])) or True)
     search: Any = SimpleNamespace(settings=DEFAULTS, fits={rest.key: rest})
-    explained: Any = SimpleNamespace(leaders=(lead,))
+    explained: Any = SimpleNamespace(leaders=lambda share: (lead,))
     either, sure = (Present(kind, e, (), {}, 1.0, 1.0, 9.0, 1.0, 0.9, other) for kind, e, other in (
         (Kind("gain"), GAIN, Instead(Kind("restoring force", "v"), SPRING)),
         (Kind("drag", "v"), DRAG, None)))

@@ -14,6 +14,7 @@ from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.judge.same_law import Names
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Where
 from pikanid.mismatch.report.locate import locate
@@ -162,7 +163,7 @@ def test_twins_in_two_channels_leave_it_undecided_and_in_one_do_not(
 
     def where(key: str, *ids: str) -> tuple[str, ...]:
         h = replace(base, effects=effect(known, key))
-        answer = replace(given(h), twins={h.key: {key: ids}})
+        answer = replace(given(h), twins={h.key: {key: Names(ids, ids)}})
         return locate(base, h, answer, site, None, None, tuple(known.values())).channels
 
     assert where("input_delay", "input_delay", "sensor_delay") == ()

@@ -27,7 +27,8 @@ STEP = 0.01
 USUAL = 0.02  # of a sign's length, that it may be off
 LIMITS = {
     # a third of a sample late, or a lag of a sixth: outputs are straight lines between samples
-    "input_delay": 0.06, "sensor_delay": 0.06, "sensor_lag": 0.06, "actuator_lag": 0.06,
+    "input_delay": 0.06, "input_lead": 0.06, "sensor_delay": 0.06, "sensor_lag": 0.06,
+    "actuator_lag": 0.06,
     # six states stand for the half-derivative over two decades
     "boundary_layer": 0.05,
     # an input's jump inside a step counts for half of it
@@ -141,7 +142,7 @@ class Rig:
             # the sign is that of a stiffness of one: a stop that hardly pushes is linear in it
             values[candidate.parameters[1].name] = size = 0.02 / np.abs(column).max()
         elif candidate.parameters and sign.scales and sign.null is None and \
-                not candidate.ids[-1].endswith("_delay"):
+                not candidate.ids[-1].endswith(("_delay", "_lead")):
             size = 0.02 / np.abs(column).max()
             name = next(iter(sign.start))
             values[name] = candidate.parameters[0].value + size * sign.start[name]

@@ -312,8 +312,8 @@ def test_twins_beside_a_law_outside_the_catalogue_are_one_hypothesis() -> None:
     given = answered(fits, {"a": 500.0, "gain": 500.0, "lever": 500.0})
     assert [sorted(h.key) for h in given.given] == [["a", "gain"], ["gain", "outside"]]
     assert given.verdict == "set"
-    table = given.twins[frozenset({"outside", "gain"})]
-    assert table["gain"] == ("gain", "lever") and table["outside"] == ("symbolic:outside",)
+    gain, outside = (given.twins[frozenset({"outside", "gain"})][n] for n in ("gain", "outside"))
+    assert gain.ids == gain.words == ("gain", "lever") and outside.ids == ("symbolic:outside",)
 
 
 def test_a_formula_is_given_only_where_the_catalogue_is_refuted() -> None:

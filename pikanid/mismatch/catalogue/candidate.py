@@ -134,6 +134,7 @@ class Candidate:
             entry.
         probes: Values of its parameters but the size, at each of which its sign is derived from
             what it adds to the model; its `directions` then say no more than where a fit begins.
+        undoes: Id of effects on the same channel that it is the contrary of.
     """
 
     ids: tuple[str, ...]
@@ -173,12 +174,17 @@ class Candidate:
     beside: tuple[str, ...] = ()
     other: Callable[[Model], Model] | None = None
     probes: tuple[Mapping[str, float], ...] = ()
+    undoes: str = ""
 
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these.  Of two that act once each may be
         what the shape of the other lacks.  Forces on a coordinate act through a lever or do not:
-        some of each together would be any coupling.  One parameter is one quantity.
+        some of each together would be any coupling.  One parameter is one quantity, and an effect
+        that undoes another one is no company for it.
         """
+        if any(a.undoes in b.ids and b.variant in ("", a.variant)
+               for e in others for a, b in ((self, e), (e, self)) if a.undoes):
+            return False
         own = {p.name: p.unit for p in self.parameters}
         if any(own.get(p.name, p.unit) != p.unit for e in others for p in e.parameters):
             return False

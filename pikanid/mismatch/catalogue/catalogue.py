@@ -94,7 +94,7 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known and c.suits() and not c.refines for c in found), found[0].key
-    (36, 'coulomb_friction')
+    (37, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, or moved by one input: each is one channel

@@ -33,12 +33,15 @@ def input_delay(site: Site) -> list[Candidate]:
 
 
 def input_lead(site: Site) -> list[Candidate]:
-    """Each input recorded late: what acts is what is written a while later."""
+    """Each input recorded late: what acts is what is written a while later.
+
+    Less than a sample of that is what a digital filter behind the sensor leaves beside a lag.
+    """
     tau = Parameter(site.name("tau_lead"), 0.0, "s", (0.0, float("inf")))
     return [Candidate(
-        ("input_lead",), f"{u} recorded late", f"{u}(t + {tau.name})", "input", site, (tau,),
-        lambda m, u=u: m.map_input(u, delay=f"-{tau.name}"),  # type: ignore[misc]  # defaults
-        partial(_shifted, u, tau, -1), variant=u) for u in site.inputs]
+        ("input_lead",), f"{u} acts before it is recorded", f"{u}(t + {tau.name})", "input", site,
+        (tau,), lambda m, u=u: m.map_input(u, delay=f"-{tau.name}"),  # type: ignore[misc]  # defaults
+        partial(_shifted, u, tau, -1), variant=u, undoes="input_delay") for u in site.inputs]
 
 
 def _shifted(u: str, tau: Parameter, later: int, view: View) -> Sequence[TangentDirection]:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 SHARE = 1e-3  # numerical: of the size, by which it is moved for a difference
 PANEL = (6.0, 2.4)  # layout: width and height [inch] of one output with one effect
+TIGHT = {"borderaxespad": 0.1, "handlelength": 1.4, "columnspacing": 1.2}  # layout: of a legend
 LEGEND = 20.0  # layout: points that a legend takes between axes and their title
 ROUNDING = 1e-10  # numerical: of an output, below which it has not moved
 
@@ -149,7 +150,7 @@ def effects_figure(effects: Sequence[ShownEffect], model: Model) -> Figure:
             axis.set_title(one.effect.name, loc="left", fontsize="medium", pad=LEGEND)
             # above the axes, where no offset of the ticks stands: within, it would cover a curve
             axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=2,
-                        frameon=False, borderaxespad=0.1, handlelength=1.4, columnspacing=1.2)
+                        frameon=False, **TIGHT)
     for axis in axes[-1]:
         axis.set_xlabel("t [s]")
     return figure

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
@@ -55,8 +56,20 @@ def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]
                  if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
 
 
+class Names(NamedTuple):
+    """What an effect and those that stand for it are called: ids, and in words."""
+
+    ids: tuple[str, ...]
+    words: tuple[str, ...]
+
+    def and_also(self, ids: Iterable[str], *words: str) -> Names:
+        """With those of another one."""
+        return Names(tuple(dict.fromkeys((*self.ids, *ids))),
+                     tuple(dict.fromkeys((*self.words, *words))))
+
+
 def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: VerdictSettings
-                 ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, tuple[str, ...]]]]:
+                 ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, Names]]]:
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
@@ -68,23 +81,26 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
         return e.ids[0] + e.site.suffix if e.refines else e.key
 
     first: dict[frozenset[str], Hypothesis] = {}
-    twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = {}
+    twins: dict[frozenset[str], dict[str, Names]] = {}
     absorbed = set()
     for h in known:
         signature = frozenset(group(e) for e in h.effects)
         leader = first.setdefault(signature, h)
-        table = twins.setdefault(leader.key, {e.key: e.names for e in leader.effects})
+        table = twins.setdefault(
+            leader.key, {e.key: Names(e.names, (e.name,)) for e in leader.effects})
         for e in leader.effects:
             for o in h.effects:
                 if group(o) == group(e):
-                    table[e.key] = tuple(dict.fromkeys((*table[e.key], *o.names)))
+                    # another shape of an entry goes by its name
+                    words = (o.name,) if e.alike else ()
+                    table[e.key] = table[e.key].and_also(o.names, *words)
         for e in h.effects:
             if leader is h and isinstance(e.exponent, int | float) and (
                     wider := _power_law(h, e, tried)) and _open_exponent(
                         wider[0], e.exponent, asks):
-                table[e.key] += wider[1].names
+                table[e.key] = table[e.key].and_also(wider[1].names)
                 absorbed.add(wider[0].key)
             if leader is h and e.limit and (
                     h.values[e.limit.parameter] < asks.narrow * e.site.half_range):
-                table[e.key] += e.limit.ids
+                table[e.key] = table[e.key].and_also(e.limit.ids)
     return [h for h in first.values() if h.key not in absorbed], twins

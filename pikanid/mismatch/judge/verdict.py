@@ -16,7 +16,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Again, Predict, gained, speaks, why_not
 from pikanid.mismatch.judge.partial import Part
 from pikanid.mismatch.judge.prediction import HeldOut
-from pikanid.mismatch.judge.same_law import integer_laws, merged_twins
+from pikanid.mismatch.judge.same_law import Names, integer_laws, merged_twins
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import VerdictSettings
 
@@ -40,7 +40,7 @@ class Answer:
     verdict: Verdict
     given: tuple[Hypothesis, ...]
     others: tuple[Hypothesis, ...]
-    twins: dict[frozenset[str], dict[str, tuple[str, ...]]] = field(default_factory=dict)
+    twins: dict[frozenset[str], dict[str, Names]] = field(default_factory=dict)
     reasons: dict[frozenset[str], str] = field(default_factory=dict)
     doubt: str = ""
     rivals: tuple[Hypothesis, ...] = ()

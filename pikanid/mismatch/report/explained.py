@@ -7,6 +7,7 @@ import numpy as np
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Predict
+from pikanid.mismatch.judge.same_law import Names
 from pikanid.mismatch.judge.verdict import Answer, Test, criterion
 from pikanid.mismatch.report.findings import Explanation, NamedEffect
 from pikanid.mismatch.report.part import values_of
@@ -41,10 +42,11 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
 
     def one(h: Hypothesis, probability: float, why: str) -> Explanation:
         table = answer.twins.get(h.key, {})
+        named = [table.get(e.key, Names(e.names, (e.name,))) for e in h.effects]
         effects = tuple(NamedEffect(
-            table.get(e.key, e.names), e.name, e.expression,
+            names.ids, " or ".join(names.words), e.expression,
             values_of(e.parameters, h.values, h.std, overdispersion), e.channel, e.site.v, e.absent)
-            for e in h.effects)
+            for e, names in zip(h.effects, named, strict=True))
         p = predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(
             {n: v for n, v in h.values.items()}), h.score(scale),

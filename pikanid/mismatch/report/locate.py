@@ -130,7 +130,7 @@ def _channels(answer: Answer, candidates: Sequence[Candidate]) -> tuple[Channel,
         found = [{*answer.channels, *(next(iter(c)) for c in told if len(c) == 1)}]
     for h in () if answer.part is not None else answer.given:
         table = answer.twins.get(h.key, {})
-        told = [of(e, table.get(e.key, e.names)) for e in h.effects]
+        told = [of(e, table[e.key].ids if e.key in table else e.names) for e in h.effects]
         sure = answer.verdict in SURE or len(frozenset().union(*told)) == 1
         found.append({next(iter(c)) for c in told if len(c) == 1} if sure else set())
     shared = set.intersection(*found) if found else set()
