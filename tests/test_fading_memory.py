@@ -105,4 +105,4 @@ def test_an_unknown_memory_of_a_rate_is_given_no_name() -> None:
     answer = pk.diagnose(rolling(), rolled(1), rolled(2))
     assert answer.mismatch and answer.verdict == "unnamed"
     title, why_not = answer.not_given[0]
-    assert title == "a memory that fades" and "has no entry for it" in why_not
+    assert title == "a memory that fades" and "a law of no catalogue" in why_not

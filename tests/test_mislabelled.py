@@ -12,7 +12,7 @@ import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import mislabelled as module
-from pikanid.mismatch.steps.mislabelled import mislabelled
+from pikanid.mismatch.steps.mislabelled import mislabelled, sampled_otherwise
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import systems
 
@@ -73,6 +73,18 @@ def test_times_that_are_too_long_are_told() -> None:
 
     (said,) = mislabelled(opened(model, recorded(1), recorded(2)))
     assert "all times divided by 1000" in said
+
+
+def test_an_input_that_the_held_out_recording_samples_more_coarsely_is_told() -> None:
+    model = systems.dc_motor()
+    u = np.repeat(np.random.default_rng(2).uniform(-6.0, 6.0, 60), 10)
+    drive = pk.Recording.from_arrays(np.arange(600) * 0.005, {"u": u}, {"u": "V"})
+    one, other = (pk.simulate(model, drive, sigma=2.0, seed=seed) for seed in (1, 2))
+    assert sampled_otherwise(opened(model, one, other)) == []
+    coarse = other["u"]
+    coarse = replace(coarse, time=coarse.time[::4], values=coarse.values[::4])
+    (said,) = sampled_otherwise(opened(model, one, other.with_channels(coarse)))
+    assert "'u' every 0.02 s" in said and "every 0.005 s" in said
 
 
 @pytest.mark.parametrize("name", [*EXPERIMENTS])

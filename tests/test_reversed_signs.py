@@ -71,7 +71,7 @@ def test_what_hides_behind_a_reversed_input_is_found_as_well() -> None:
         assert {p.family for p in answer.present} == {"gain", "dry friction"}
     else:
         assert any("coulomb_friction" in e.ids for h in answer.hypotheses for e in h.effects)
-    assert "at rest, or too short" not in str(answer)
+    assert "it is at rest" not in str(answer)
 
 
 def test_a_temperature_has_no_sign() -> None:

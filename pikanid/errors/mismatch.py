@@ -121,3 +121,8 @@ def columns_exchanged(a: str, b: str, left: float, other: float) -> str:
 def times_in_another_unit(word: str, left: float, other: float) -> str:
     return (f"With all times {word} by 1000 the model leaves {100 * other:.2g} % of what the "
             f"outputs do, {100 * left:.3g} % as they are: check the unit of the time.")
+
+
+def sampled_otherwise(name: str, one: float, other: float) -> str:
+    return (f"The held-out recording has a sample of the input '{name}' every {other:.3g} s, the "
+            f"recording one every {one:.3g} s: what it does between samples is another motion.")

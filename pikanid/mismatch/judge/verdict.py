@@ -21,7 +21,7 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import VerdictSettings
 
 Test = Callable[[Hypothesis], Detection]
-NO_ENTRY = "the catalogue has no entry for it: other laws may do the same"
+NO_ENTRY = "holds a law of no catalogue: others may do the same"
 
 Verdict = Literal["none", "named", "set", "partial", "unconfirmed", "unnamed"]
 

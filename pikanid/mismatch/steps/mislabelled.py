@@ -25,6 +25,7 @@ POOR = 0.3  # numerical: share of what the outputs do, left by a fit that explai
 TIMES = 16.0  # numerical: as much as another reading leaves, for a hint: a quarter of the RMSE
 PAIRS = 6  # limit: of outputs that are exchanged
 FINE, LONG = 0.2, 0.5  # limit: periods or time constants between samples, and in a recording
+COARSER = 2.0  # numerical: times as long between an input's samples, which makes a difference
 THOUSAND = (("divided", 1e-3), ("multiplied", 1e3))  # definition: milliseconds, and their contrary
 
 
@@ -50,6 +51,22 @@ def mislabelled(case: Case) -> list[str]:
             other = _refitted(model, [_stretched(r, factor) for r in given])
             if other * TIMES < left:
                 found.append(errors.times_in_another_unit(word, left, other))
+    return found
+
+
+def sampled_otherwise(case: Case) -> list[str]:
+    """Sentences about inputs that the held-out recordings sample far more coarsely, or finely, than
+    the recordings do: what an input does between samples is another motion.
+    """
+    later = case.later.recordings if case.later is not None else ()
+    found = []
+    for u in case.model.input_names:
+        steps = [[r[u].interval for r in some if u in r] for some in (
+            case.records.recordings, later)]
+        if all(steps):
+            one, other = map(max, steps)
+            if not 1 / COARSER < other / one < COARSER:
+                found.append(errors.sampled_otherwise(u, one, other))
     return found
 
 

@@ -22,7 +22,7 @@ from pikanid.mismatch.report.explained import explanations
 from pikanid.mismatch.report.findings import Curves, OutputError, Proof
 from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.search.overdispersion import overdispersion
-from pikanid.mismatch.steps.mislabelled import mislabelled
+from pikanid.mismatch.steps.mislabelled import mislabelled, sampled_otherwise
 from pikanid.mismatch.steps.remaining import closest, present, remainder
 from pikanid.model import Model
 from pikanid.model.domains import not_taken
@@ -50,6 +50,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
             f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
+        case.notes += sampled_otherwise(case)
     if answer.verdict == "unnamed":
         case.notes += mislabelled(case)
     if answer.verdict in ("unnamed", "unconfirmed", "partial"):
@@ -57,9 +58,9 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.notes += filter(None, [not_taken(case.model, known)])
     if case.proves and (shown := case.predicted(best)) and below(shown.motion, asked):
         case.notes.append(
-            "The held-out recording is at rest, or too short: all that moves in it is worth "
-            f"{shown.motion:.2g} of chi-squared, and {asked:.0f} are needed to confirm "
-            "anything.")
+            "By this model all that moves in the held-out recording is worth "
+            f"{shown.motion:.2g} of chi-squared, and {asked:.0f} are needed to confirm anything: "
+            "it is at rest, too short, or the model is far off.")
     levels = [level.sentence(o) + _louder(case, o)
               for o, level in case.records.levels[0].items()]
     force = None if answer.verdict == "none" else force_over_time(case.base, site)

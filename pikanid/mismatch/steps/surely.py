@@ -54,7 +54,8 @@ def with_sure_part(case: Case, answer: Answer, site: Site) -> Answer:
     if part is None or not part.present:
         answer = replace(answer, closest=part)
         return replace(answer, verdict="unconfirmed", doubt=TOGETHER) if several else answer
-    return replace(answer, verdict="partial", given=(part.hypothesis,), part=part)
+    others = tuple(h for h in answer.others if h.key != part.hypothesis.key)
+    return replace(answer, verdict="partial", given=(part.hypothesis,), part=part, others=others)
 
 
 def _is_all(part: Part, given: Sequence[Hypothesis]) -> bool:
