@@ -110,7 +110,7 @@ def effects_between(model: Model, coordinates: Sequence[tuple[str, str]],
         for key, words, shape, side in (
                 ("stops", "stops", "({0} - clip({0}, -{1}, {1}))", ()),
                 ("stop", "a stop on one side (above)", "max({0} - {1}, 0)", ("above",)),
-                ("stop", "a stop on one side (below)", "-max(-({0}) - {1}, 0)", ("below",))):
+                ("stop", "a stop on one side (below)", "min({0} + {1}, 0)", ("below",))):
             k = Parameter(named("_".join(("k_stop", *side))), HARD * push / far,
                           units.product((force, 1), (length, -1)), (0.0, INF))
             stop = Parameter(named("_".join(("stop", *side))), STOPS * far, length,
