@@ -111,6 +111,13 @@ def test_of_states_of_several_kinds_each_takes_what_its_unit_tells() -> None:
     assert "hydraulics" in not_taken(tank, ()) and "thermal" not in not_taken(tank, ())
 
 
+def test_the_unit_of_an_input_tells_as_well() -> None:
+    cell = content("V", inputs={"i": {"unit": "A"}}) | {"equations": {"x": "-k*x"}}
+    assert catalogues_of(pk.Model.from_dict(cell)) == ("electrical",)
+    motor = content("rad/s", inputs={"i": {"unit": "A"}})
+    assert catalogues_of(pk.Model.from_dict(motor)) == ()
+
+
 def test_of_several_domains_one_is_not_for_states_of_another() -> None:
     tank = decay("degC", domain=["hydraulics", "thermal"]).with_state(pk.State("h", "m", 0), "-h")
     assert {(e.key, e.within) for e in candidates_of(tank) if isinstance(e, EffectForm)} >= {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -62,7 +62,10 @@ class Surroundings:
             "coordinate": [q for q, v in rates.items() if v in self.states],
             "angle": [q for q, v in rates.items() if v in self.states
                       and self.unit(q) and units.convertible(self.unit(q), "rad")],
-            "current": self._measured_in("A"), "voltage": self._measured_in("V"),
+            "current": self._measured_in("A", self.states),
+            "voltage": self._measured_in("V", self.states),
+            "voltage output": self._measured_in("V", self.seen),
+            "current input": self._measured_in("A", inputs),
             "its rate": [rates[first]] if first in rates else [],
             "output": [n for n in self.model.output_names if n in self.seen],
             "input": inputs,
@@ -72,8 +75,8 @@ class Surroundings:
             "parameter": [p for p in self.model.free_names if first in self.model.equations
                           and symbol(p) in self.model.equations[first].free_symbols]}[kind]
 
-    def _measured_in(self, unit: str) -> list[str]:
-        return [x for x in self.states if self.unit(x) and units.convertible(self.unit(x), unit)]
+    def _measured_in(self, unit: str, names: Iterable[str]) -> list[str]:
+        return [x for x in names if self.unit(x) and units.convertible(self.unit(x), unit)]
 
     @property
     def rates(self) -> dict[str, str]:
@@ -84,7 +87,8 @@ class Surroundings:
 
     def range_of(self, name: str, kind: str) -> tuple[float, float]:
         """Lowest and highest value of a state, or of an output."""
-        return (self.seen if kind == "output" else self.ranges).get(name, (0.0, 1.0))
+        own = self.seen if kind.endswith("output") else self.ranges
+        return own.get(name, (0.0, 1.0))
 
     def unit(self, name: str) -> str:
         """Of a state, input, output, parameter or channel; empty where it says none."""

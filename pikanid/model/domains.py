@@ -14,9 +14,9 @@ from pikanid.model.effects_file import catalogues, read_effects
 from pikanid.model.lookup import Lookup
 from pikanid.pieces.sentences import enumerated
 
-# A catalogue is taken where some state has a unit that tells its domain, for the states that have
-# such a unit or one that goes with it.  A voltage alone tells nothing: levels and angles are
-# recorded in volts as well; nor does a length, which may be a level or a place.
+# A catalogue is taken where some state or input has a unit that tells its domain, for the states
+# that have such a unit or one that goes with it.  A voltage alone tells nothing: levels and angles
+# are recorded in volts as well; nor does a length, which may be a level or a place.
 STATES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l"), ("l",)),
     "electrical": (("A",), ("V", "C")), "hydraulics": (("Pa",), ("l", "l/s"))}
@@ -41,13 +41,22 @@ def _states_of(model: Lookup) -> dict[str, tuple[str, ...]]:
                if name in STATES}
         return {name: tuple(s for s in model.state_names if s in own.get(name, ()) or not any(
             s in others for others in own.values())) for name in model.domain}
-    return {name: _in_units(model, telling + beside) for name in catalogues() if name in STATES
-            for telling, beside in [STATES[name]] if _in_units(model, telling)}
+    found = {name: _in_units(model, telling + beside)
+             for name, (telling, beside) in STATES.items() if _tells(model, telling)}
+    return {name: found[name] for name in catalogues() if found.get(name)}
 
 
 def _in_units(model: Lookup, others: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(s.name for s in model.states
-                 if any(units.convertible(s.unit, other) for other in others))
+    return tuple(s.name for s in model.states if _like(s.unit, others))
+
+
+def _tells(model: Lookup, telling: tuple[str, ...]) -> bool:
+    return any(_like(unit, telling) for unit in (
+        *(s.unit for s in model.states), *(i.unit for i in model.inputs)))
+
+
+def _like(unit: str, others: tuple[str, ...]) -> bool:
+    return any(units.convertible(unit, other) for other in others)
 
 
 def candidates_of(model: Lookup) -> tuple[Effect | EffectForm, ...]:

@@ -15,7 +15,8 @@ absolute zero on a state's scale of temperature (``x_zero``), of the recordings'
 the usual interval between samples [s]: what is gone within one is as good as gone at once.  A
 parameter with a ``value`` instead of a guess is not estimated.  A coordinate is a state whose rate
 is another state: ``"its rate"``, the place after it, is that one; an angle is a coordinate with a
-unit of angles, a current or a voltage a state with one of those.  A parameter is one of the
+unit of angles, a current or a voltage a state with one of those, and so is a voltage output, or a
+current input.  A parameter is one of the
 equation of the first place; a channel like it, recorded and not used by the model, has a unit that
 converts to its own, and a signal like it may be an input or a fixed parameter of the model as well,
 such as the temperature of the surroundings.
@@ -31,9 +32,10 @@ from pikanid.formula.expressions import check_name
 from pikanid.storage.entries import Entry
 
 MOST_PLACES = 4  # limit: of placeholders in one form
-FIRST = ("state", "coordinate", "angle", "current", "voltage", "input", "output")
-KINDS = (*FIRST, "other state", "its rate", "channel", "channel like it", "signal like it",
-         "parameter")
+FIRST = ("state", "coordinate", "angle", "current", "voltage", "input", "output",
+         "voltage output")
+KINDS = (*FIRST, "current input", "other state", "its rate", "channel", "channel like it",
+         "signal like it", "parameter")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from pikanid import errors
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.between import Motion, effects_between
 from pikanid.mismatch.catalogue.input_offset import input_offsets
+from pikanid.mismatch.catalogue.output_curve import output_curves
 from pikanid.mismatch.catalogue.site import Site, coordinates
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Effect, EffectForm, Model
@@ -41,17 +42,19 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     names = {n for e in own for n in e.names}
     recorded = [*(i for i in site.model.input_names if i in first), *site.extra]
     sizes = {n: float(np.abs(first[n].values).max(initial=0.0)) for n in recorded}
+    seen = {n: _range(first, n) for n in site.model.output_names if n in first}
     derived = [e for e in (*effects_between(site.model, coordinates(site.model), motion, names),
-                           *input_offsets(site.model, sizes, names))
+                           *input_offsets(site.model, sizes, names),
+                           *output_curves(site.model, motion, {
+                               n: high - low for n, (low, high) in seen.items()}, names))
                if all(e.key != one.key for one in own)]
     if not forms and not derived:
         return own
     around = Surroundings(
         site.model, tuple(dict.fromkeys(s.v for s in sites)),
         {n: (float(x.min()), float(x.max())) for n, x in motion().items()},
-        {n: _range(first, n) for n in site.model.output_names if n in first},
-        sizes, {n: first[n].unit for n in site.extra}, sum(r.stop - r.start for r in recordings),
-        site.interval)
+        seen, sizes, {n: first[n].unit for n in site.extra},
+        sum(r.stop - r.start for r in recordings), site.interval)
     extended = {_extended(site.model, e) for e in own}
     for effect in derived:
         made = _extended(site.model, effect)
