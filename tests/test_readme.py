@@ -68,3 +68,17 @@ def test_every_strategy_and_every_format_is_named() -> None:
 def test_every_ready_made_model_is_named() -> None:
     listed = README.split("Ready-made are ")[1].split(";")[0]
     assert re.findall(r"`(\w+)`", listed) == list(pk.systems.SYSTEMS)
+
+
+@pytest.mark.parametrize("name", ["rotors.toml", "mount.toml"])
+def test_effects_of_ones_own(name: str, tmp_path: Path) -> None:
+    """Each changes what the model shows."""
+    found = re.search(rf"^```toml\n(# {name}\n.*?)^```$", README, re.MULTILINE | re.DOTALL)
+    assert found
+    (tmp_path / name).write_text(found[1], "utf-8")
+    (effect,) = pk.read_effects(tmp_path / name)
+    assert isinstance(effect, pk.Effect)
+    model, drive = pk.systems.sloshing(), pk.excitation.two_pulse()
+    without, with_it = (pk.simulate(m, drive)["theta"].values
+                        for m in (model, model.with_effect(effect)))
+    assert abs(with_it - without).max() > 1e-3
