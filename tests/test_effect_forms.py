@@ -134,6 +134,10 @@ FILTER = pk.Model.from_dict({
                    "C": {"unit": "F", "guess": 1.0}},
     "equations": {"i": "(u - R*i - v)/L", "v": "i/C"},
     "outputs": {"i": {"unit": "A", "expression": "i"}, "v": {"unit": "V", "expression": "v"}}})
+CELL = pk.Model.from_dict({
+    "name": "cell", "states": {"v": {"unit": "V"}}, "inputs": {"i": {"unit": "A"}},
+    "parameters": {"R": {"unit": "ohm", "guess": 1.0}, "C": {"unit": "F", "guess": 1.0}},
+    "equations": {"v": "(i - v/R)/C"}, "outputs": {"v": {"unit": "V", "expression": "v"}}})
 SUITABLE = {"hydraulics": ["cascaded_tanks"], "thermal": ["thermal_rc"], "electrical": ["dc_motor"],
             "kinetics": ["batch_reactor", "one_compartment", "sir"],
             "populations": ["lotka_volterra", "sir"],
@@ -144,7 +148,8 @@ SUITABLE = {"hydraulics": ["cascaded_tanks"], "thermal": ["thermal_rc"], "electr
 def test_the_catalogues_suit_their_models(name: str) -> None:
     """Every form of each, bound in all ways: symbols and units are those of the models."""
     used = set()
-    models = [*map(pk.systems.find, SUITABLE[name]), *[FILTER] * (name == "electrical")]
+    models = [*map(pk.systems.find, SUITABLE[name]),
+              *((FILTER, CELL) if name == "electrical" else ())]
     for model in models:
         for effect in read_effects(name):
             assert isinstance(effect, EffectForm)

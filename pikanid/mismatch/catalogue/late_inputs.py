@@ -17,6 +17,7 @@ from pikanid.mismatch.catalogue.site import Site
 from pikanid.model.parts import Parameter
 
 SHIFTS = (0.3, 3.0, 8.0)  # numerical: samples, from where fits begin
+LEADS = (1.5, 3.0, 8.0)  # numerical: the same of what acts before it is recorded
 
 
 def input_delay(site: Site) -> list[Candidate]:
@@ -27,26 +28,28 @@ def input_delay(site: Site) -> list[Candidate]:
     return [Candidate(
         ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
         lambda m, u=u: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # defaults
-        partial(_shifted, u, tau, 1), variant=u, twin="delay",
+        partial(_shifted, u, tau, SHIFTS, 1), variant=u, twin="delay",
         beside=() if len(site.inputs) > 1 or not site.still else ("cross_axis",))
         for u in site.inputs]
 
 
 def input_lead(site: Site) -> list[Candidate]:
-    """Each input recorded late: what acts is what is written a while later.
+    """Each input recorded late: what acts is what is written a while later, by a sample at least.
 
-    Less than a sample of that is what a digital filter behind the sensor leaves beside a lag.
+    Less is how the input runs between samples, or a digital filter behind the sensor.
     """
-    tau = Parameter(site.name("tau_lead"), 0.0, "s", (0.0, float("inf")))
+    tau = Parameter(site.name("tau_lead"), site.interval, "s", (site.interval, float("inf")))
     return [Candidate(
         ("input_lead",), f"{u} acts before it is recorded", f"{u}(t + {tau.name})", "input", site,
         (tau,), lambda m, u=u: m.map_input(u, delay=f"-{tau.name}"),  # type: ignore[misc]  # defaults
-        partial(_shifted, u, tau, -1), variant=u, undoes="input_delay") for u in site.inputs]
+        partial(_shifted, u, tau, LEADS, -1), variant=u, undoes="input_delay")
+        for u in site.inputs]
 
 
-def _shifted(u: str, tau: Parameter, later: int, view: View) -> Sequence[TangentDirection]:
-    """An input by some samples later, or, of -1, earlier."""
+def _shifted(u: str, tau: Parameter, shifts: Sequence[float], later: int, view: View
+             ) -> Sequence[TangentDirection]:
+    """An input by so many samples later, or, of -1, earlier."""
     step = float(np.median(np.diff(view.t)))
     return [TangentDirection({tau.name: shift * step}, one_sided=True, push={
         u: np.interp(view.t - later * shift * step, view.t, view.u[u]) - view.u[u]})
-        for shift in SHIFTS]
+        for shift in shifts]

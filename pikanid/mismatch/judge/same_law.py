@@ -91,9 +91,9 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
         for e in leader.effects:
             for o in h.effects:
                 if group(o) == group(e):
-                    # another shape of an entry goes by its name
-                    words = (o.name,) if e.alike else ()
-                    table[e.key] = table[e.key].and_also(o.names, *words)
+                    # another shape or side of an entry goes by its name
+                    new = e.alike and not {*o.names} <= {*table[e.key].ids}
+                    table[e.key] = table[e.key].and_also(o.names, *([o.name] if new else []))
         for e in h.effects:
             if leader is h and isinstance(e.exponent, int | float) and (
                     wider := _power_law(h, e, tried)) and _open_exponent(
