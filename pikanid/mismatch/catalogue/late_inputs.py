@@ -14,6 +14,7 @@ import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 SHIFTS = (0.3, 3.0, 8.0)  # numerical: samples, from where fits begin
@@ -27,7 +28,7 @@ def input_delay(site: Site) -> list[Candidate]:
     tau = Parameter(site.name("tau_in"), 0.0, "s", (0.0, float("inf")))
     return [Candidate(
         ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
-        lambda m, u=u: m.map_input(u, delay=tau.name),  # type: ignore[misc]  # defaults
+        partial(_delayed, u, tau.name),
         partial(_shifted, u, tau, SHIFTS, 1), variant=u, twin="delay",
         beside=() if len(site.inputs) > 1 or not site.still else ("cross_axis",))
         for u in site.inputs]
@@ -41,9 +42,13 @@ def input_lead(site: Site) -> list[Candidate]:
     tau = Parameter(site.name("tau_lead"), site.interval, "s", (site.interval, float("inf")))
     return [Candidate(
         ("input_lead",), f"{u} acts before it is recorded", f"{u}(t + {tau.name})", "input", site,
-        (tau,), lambda m, u=u: m.map_input(u, delay=f"-{tau.name}"),  # type: ignore[misc]  # defaults
+        (tau,), partial(_delayed, u, f"-{tau.name}"),
         partial(_shifted, u, tau, LEADS, -1), variant=u, undoes="input_delay")
         for u in site.inputs]
+
+
+def _delayed(u: str, by: str, model: Model) -> Model:
+    return model.map_input(u, delay=by)
 
 
 def _shifted(u: str, tau: Parameter, shifts: Sequence[float], later: int, view: View
