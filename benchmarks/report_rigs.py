@@ -37,7 +37,8 @@ NOISES = (0.005, 0.05)  # shares of an output's range
 WORKERS = 2
 # One for each rig, noise and round, and never looked at before
 SEEDS = {(name, noise, part): 670_000 + 100_000 * part + 10 * k + i
-         for part in (1, 2, 3, 4) for k, name in enumerate(RIGS) for i, noise in enumerate(NOISES)}
+         for part in (1, 2, 3, 4, 5) for k, name in enumerate(RIGS)
+         for i, noise in enumerate(NOISES)}
 MAKERS = ("formula", "model", "recording", "validation")  # rooms: what makes the sets
 COUNTED = ("right", "wrong", "wrong_but_knowable", "false_alarm", "missed", "surely_in_part",
            "parameters_within_3_std", "held_out_within_1.1_noise")
@@ -60,6 +61,7 @@ longer confirmed. The last two sets of round 4 (two_mass_drive and cart_pole_upr
 after that and were answered blindly first: four of 60 wrong, all on the drive. One of these, an
 oscillation left by "another initial state" that had passed for a colour of the noise, went away
 once tests allowed for noise no louder than what a fit leaves; both sets are reported with that.
+Round 5 was made and answered long after that, blindly, and nothing was changed after it.
 
 Of rounds 1 to 3, the code after round 4 has answered all sets of cascaded_tanks, dc_motor and
 thermal_rc again but three (cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at

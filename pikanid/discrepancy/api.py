@@ -28,7 +28,7 @@ from pikanid.problem.problem import Problem
 from pikanid.recording import Recording
 from pikanid.settings import changed, of_kind
 from pikanid.storage.version import __version__
-from pikanid.strategies.finish import evaluate
+from pikanid.strategies.finish import bounds_met, evaluate
 from pikanid.strategies.nls import NLS
 
 POINTS = 401  # layout: points at which an edge is drawn
@@ -159,9 +159,7 @@ def _estimate(level: Level, covariance: np.ndarray, method: str, begun: float) -
     notes = []
     if adequacy.verdict == "misfit":
         notes.append(errors.no_static_law([p.argument for p in level.plans]))
-    for f, inside in zip(problem.free, fit.inside, strict=True):
-        if not inside:
-            notes.append(f"'{f.label}' ended at its bound; its standard error is not known.")
+    notes += bounds_met(problem.free, fit.theta, ~np.asarray(fit.inside))
     settings = {"method": method, "intervals": level.plans[0].intervals,
                 "steps": [p.name for p in level.plans if p.step],
                 "log_lambda": [list(map(float, r)) for r in fit.smoothness.split(fit.rho)],

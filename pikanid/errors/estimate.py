@@ -9,6 +9,11 @@ def undetermined(name: str, value: float, std: float) -> str:
 
 
 
+def at_bound(name: str, value: str, lower: bool) -> str:
+    return (f"'{name}' ended at its {'lower' if lower else 'upper'} bound ({value}); its standard "
+            "error is not known.  Widen the bound, unless it is one that physics sets.")
+
+
 def sigma_unknown(output: str) -> str:
     return (f"The noise of output '{output}' is not known: give it in the output's unit (--sigma "
             "0.1; in Python sigma=0.1).")

@@ -8,16 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit, Trajectory
 from pikanid.estimate.estimate import total_cost
 from pikanid.estimate.outlying import loose_warning, outlying_warning
+from pikanid.estimate.rounding import with_unit
+from pikanid.formula.units import parse
 from pikanid.objective.shooting import Shooting
 from pikanid.optimise.box import met
 from pikanid.optimise.propagation import propagated
-from pikanid.problem.problem import Problem
+from pikanid.problem.problem import FreeParameter, Problem
 from pikanid.storage.version import __version__
 from pikanid.strategies.growth import growth
+from pikanid.uncertainty.bounded import with_bounds
 from pikanid.uncertainty.information import Directions, undetermined_warnings
 from pikanid.uncertainty.settings import USUAL, UncertaintySettings
 
@@ -33,22 +37,22 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     """
     jacobian = shooting.jacobian(theta)
     adequacy = shooting.adequacy(theta)
-    scale = 1.0
-    if adequacy.source != "given":
-        r = shooting.residual(theta)
-        scale = float(r @ r) / adequacy.dof
+    r = shooting.residual(theta)
+    scale = float(r @ r) / adequacy.dof if adequacy.source != "given" else 1.0
     at_bound = met(theta, problem.lower, problem.upper)
     shown = Directions.of(jacobian, ~at_bound)
     cov = shown.covariance * scale
     covariance = cov if covariance is None else covariance
+    if at_bound.any():
+        cov, covariance = (
+            with_bounds(c, jacobian / scale**0.5, r / scale**0.5, theta, problem.lower,
+                        problem.upper, at_bound) for c in (cov, covariance))
     fits, trajectories = evaluate(problem, shooting, theta, covariance)
     notes = [*warnings, *problem.model.unit_disagreements]
     if not converged:
         notes.append("The optimiser stopped before it converged: raise max_evaluations or give "
                      "better guesses.")
-    for f, stuck in zip(problem.free, at_bound, strict=True):
-        if stuck:
-            notes.append(f"'{f.label}' ended at its bound; its standard error is not known.")
+    notes += bounds_met(problem.free, theta, at_bound)
     misfit = adequacy.verdict == "misfit"
     grown = max(growth(problem, theta)) if misfit and not stable else 0.0
     advice = "" if strategy == "nls" else "; NLS follows it in segments"
@@ -81,6 +85,14 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
         adequacy=adequacy, converged=converged, settings=settings, history=tuple(history),
         warnings=tuple(notes), seconds=time.perf_counter() - begun, seed=seed,
         version=__version__, approximator=approximator)
+
+
+def bounds_met(free: Sequence[FreeParameter], theta: np.ndarray, at_bound: np.ndarray
+               ) -> list[str]:
+    """A sentence about each of the parameters (n,) that are at a bound."""
+    return [errors.at_bound(f.label, with_unit(f"{value:.3g}", parse(f.unit)),
+                            lower=value - f.bounds[0] <= f.bounds[1] - value)
+            for f, value, stuck in zip(free, theta.tolist(), at_bound, strict=True) if stuck]
 
 
 def evaluate(problem: Problem, shooting: Shooting, theta: np.ndarray,

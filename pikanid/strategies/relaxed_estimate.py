@@ -127,9 +127,9 @@ def assemble(strategy: str, fit: Relaxed, settings: Mapping[str, Any],
                           history=history, settings=settings, seed=None, begun=begun,
                           warnings=fit.warnings, approximator=curves, covariance=covariance)
     else:
-        estimate = _unsimulated(strategy, fit, curves, history, settings)
-    return replace(estimate, covariance=covariance, converged=fit.converged,
-                   seconds=time.perf_counter() - begun)
+        estimate = replace(_unsimulated(strategy, fit, curves, history, settings),
+                           covariance=covariance)
+    return replace(estimate, converged=fit.converged, seconds=time.perf_counter() - begun)
 
 
 def trajectories(fit: RelaxedFit) -> SplineTrajectories:
