@@ -27,22 +27,25 @@ from pikanid.simulation.translated import Translated
 from pikanid.validation.concealed import signals
 
 HOLDS: tuple[Hold, ...] = ("zero", "first")
-HALF, RATE = 0.3, 4.0
+HALF, RATE, BEGUN = 0.3, 4.0, -0.4
 
 
-def slow(hold: Hold = "zero") -> pk.Model:
+def slow(hold: Hold = "zero", operating: bool = False) -> pk.Model:
     """Behind a play, and no faster than RATE."""
     most = Parameter("R", RATE, "m/s^3", (1e-3, 1e3))
-    return loose(hold).map_input("u_x", [most], rate_limit="R")
+    return loose(hold, operating).map_input("u_x", [most], rate_limit="R")
 
 
-def loose(hold: Hold = "zero") -> pk.Model:
-    half = Parameter("b", HALF, "m/s^2", (0.0, 10.0))
-    return pk.systems.sloshing().map_input("u_x", [half], hold=hold, backlash="b")
+def loose(hold: Hold = "zero", operating: bool = False) -> pk.Model:
+    """Behind a play, in which it begins anywhere where `operating`."""
+    model = pk.systems.sloshing().map_input(
+        "u_x", [Parameter("b", HALF, "m/s^2", (0.0, 10.0))], hold=hold, backlash="b")
+    begun = Parameter("e", BEGUN, "", (-1.0, 1.0), scope="recording")
+    return model.map_input("u_x", [begun], backlash_start="e") if operating else model
 
 
-def wandering(hold: Hold = "zero", count: int = 600) -> pk.Recording:
-    u = 0.1 * np.cumsum(np.random.default_rng(0).normal(size=count))
+def wandering(hold: Hold = "zero", count: int = 600, about: float = 0.0) -> pk.Recording:
+    u = about + 0.1 * np.cumsum(np.random.default_rng(0).normal(size=count))
     return pk.Recording.from_arrays(0.01 * np.arange(count), {"u_x": u},
                                     units={"u_x": "m/s^2"}, hold={"u_x": hold})
 
@@ -50,36 +53,44 @@ def wandering(hold: Hold = "zero", count: int = 600) -> pk.Recording:
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=40),
        st.one_of(st.none(), st.floats(0.0, 3.0)), st.one_of(st.just(np.inf), st.floats(0.01, 9.0)),
-       st.sampled_from(HOLDS), st.randoms(use_true_random=False))
+       st.one_of(st.just(np.nan), st.floats(-1.0, 1.0)), st.sampled_from(HOLDS),
+       st.randoms(use_true_random=False))
 def test_what_follows_equals_the_oracle(values: list[float], half: float | None, rate: float,
-                                        hold: Hold, chance: Random) -> None:
+                                        start: float, hold: Hold, chance: Random) -> None:
     t, u = np.arange(len(values), dtype=float), np.array(values)
     made = signals.zero_order if hold == "zero" else signals.first_order
-    expected = made(t, u)
+    begins = half is not None and np.isfinite(start)
+    first = u[0] + start * (half or 0.0) if begins else 0.0  # the oracle begins at 0
+    expected = made(t, u - first)
     if half is not None:
         expected = signals.played(expected, half)
     if np.isfinite(rate):
         expected = signals.slewed(expected, rate)
-    carrier, side, ramp = acting(HeldInput("u", t, u, hold), half, rate)
+    carrier, side, untouched, ramp = acting(HeldInput("u", t, u, hold), half, rate, start)
     probe = np.sort([chance.uniform(0.0, t[-1] - 1e-6) for _ in range(200)])
     probe = probe[np.abs(probe - np.round(probe)) > 1e-6]
-    found = carrier.at(probe) + (half or 0.0) * side.at(probe)
+    found = carrier.at(probe) + (half or 0.0) * side.at(probe) - first
     if np.isfinite(rate):
         found += rate * ramp.at(probe)
+    if begins:
+        found += start * (half or 0.0) * untouched.at(probe)
     assert found == pytest.approx(expected.at(probe), abs=1e-7)
     assert np.isfinite(rate) or set(side.values) <= {-1.0, 0.0, 1.0}
 
 
 @pytest.mark.parametrize("hold", HOLDS)
 @pytest.mark.parametrize("kind", [Simulator, Translated])
-def test_sensitivities_are_those_of_differences(kind: type[Simulator], hold: Hold) -> None:
-    model = slow(hold)
+@pytest.mark.parametrize("operating", [False, True])
+def test_sensitivities_are_those_of_differences(operating: bool, kind: type[Simulator],
+                                                hold: Hold) -> None:
+    model = slow(hold, operating)
     simulator = kind(model, bind(model, pk.simulate(model, wandering(hold), sigma=0.0)))
-    p, active = np.array([0.045, 0.15, 0.3, 9.81, HALF, RATE]), np.array([0, 1, 4, 5])
+    p = np.array([0.045, 0.15, 0.3, 9.81, HALF, *([BEGUN] if operating else []), RATE])
+    active = np.array([0, 1, *range(4, len(p))])
     steps = simulator.choose_steps(p, 1e-10)
     found = simulator.run(p, active, steps)
     for column, k in enumerate(active):
-        aside = np.zeros(6)
+        aside = np.zeros(len(p))
         aside[k] = 1e-6
         up, down = (simulator.run(p + s * aside, active, steps).y for s in (1, -1))
         expected = (up - down) / 2e-6
@@ -121,10 +132,25 @@ def test_fit_finds_the_play() -> None:
     assert abs(est.value("b") - HALF) < 4 * est.std("b") < 0.1
 
 
+def test_fit_finds_where_each_recording_begins_in_the_play() -> None:
+    model = loose(operating=True)
+    made = [pk.simulate(model.with_values(e=e), wandering(about=u), sigma=0.002, seed=seed)
+            for seed, (e, u) in enumerate(((0.7, 2.0), (-0.2, -3.0)))]
+    est = pk.NLS().fit(model.with_values(b=0.2, e=0.0), made)
+    for name, of, true in (("b", None, HALF), ("e", 0, 0.7), ("e", 1, -0.2)):
+        assert abs(est.value(name, of) - true) < 4 * est.std(name, of) < 0.2
+
+
 def test_files_and_dicts_keep_it() -> None:
-    text = slow().to_dict()["inputs"]["u_x"]
-    assert (text["backlash"], text["rate_limit"]) == ("b", "R")
-    assert pk.Model.from_dict(slow().to_dict()) == slow()
+    text = slow(operating=True).to_dict()["inputs"]["u_x"]
+    assert (text["backlash"], text["backlash_start"], text["rate_limit"]) == ("b", "e", "R")
+    for model in (slow(), slow(operating=True)):
+        assert pk.Model.from_dict(model.to_dict()) == model
+
+
+def test_a_start_in_no_play_is_refused() -> None:
+    with pytest.raises(errors.BadModel, match="backlash_start but no backlash"):
+        pk.systems.sloshing().map_input("u_x", backlash_start=0.5)
 
 
 def test_a_relaxation_sees_a_known_play_and_refuses_an_unknown_one() -> None:
@@ -145,6 +171,14 @@ def test_the_catalogue_offers_it_for_every_input() -> None:
     found = [c for c in candidates(sites(model, (rec,))) if c.variant.startswith("backlash")]
     assert [c.ids for c in found] == [("hysteresis",)]
     assert found[0].applied(model).inputs[0].backlash.free_symbols
+
+
+def test_one_that_is_in_operation_begins_anywhere_in_the_play() -> None:
+    model, rest, far = pk.systems.sloshing(), pk.excitation.two_pulse(), wandering(about=1.0)
+    for recordings, names in (((rest,), 1), ((far,), 2), ((rest, far), 2)):
+        found = [c for c in candidates(sites(model, recordings))
+                 if c.variant.startswith("backlash")]
+        assert [len(c.parameters) for c in found] == [names]
 
 
 def test_recorded_rates_below_the_limit_change_nothing() -> None:

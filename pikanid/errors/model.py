@@ -127,6 +127,11 @@ def path_twice(name: str, what: str) -> str:
             "adding a second one.")
 
 
+def start_without_backlash(name: str) -> str:
+    return (f"Input '{name}' has a backlash_start but no backlash: give the half play, or leave "
+            "the start away.")
+
+
 def no_recordings() -> str:
     return "No recording was given: pass at least one."
 

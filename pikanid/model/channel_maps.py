@@ -20,25 +20,26 @@ from pikanid.model.parts import Formula, Hold, Parameter, State
 from pikanid.model.shown_rates import showing
 
 M = TypeVar("M", bound=Operations)
-INPUT_MAPS = ("backlash", "rate_limit", "gain", "offset", "saturation", "dead_zone", "function",
-              "lag", "delay")
+INPUT_MAPS = ("backlash", "backlash_start", "rate_limit", "gain", "offset", "saturation",
+              "dead_zone", "function", "lag", "delay")
 OUTPUT_MAPS = ("lag", "gain", "offset", "drift", "function", "clip", "delay")
 
 
 def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
               hold: Hold | None = None, backlash: Formula | None = None,
-              rate_limit: Formula | None = None,
+              backlash_start: Formula | None = None, rate_limit: Formula | None = None,
               gain: Formula | None = None, offset: Formula | None = None,
               saturation: Formula | None = None, dead_zone: Formula | None = None,
               function: Formula | None = None, lag: Formula | None = None,
               delay: Formula | None = None) -> M:
     """The model whose input `name` passes through the given maps before it acts.
 
-    They apply in the order of the keywords: u -> behind a play of ±backlash -> changing no faster
-    than rate_limit [1/s] -> gain·u -> + offset -> limited to ±saturation -> dead zone of ±dead_zone
-    -> function (a formula of the input's name) -> first-order lag [s]; `delay` [s] shifts the
-    recorded signal, `hold` ("zero", "first", "cubic") says how it runs between samples.  Play,
-    limited rate and delay act on the recorded signal, before all other maps.
+    They apply in the order of the keywords: u -> behind a play of ±backlash, at backlash_start in
+    it (-1 to 1) when the record begins, by default as on a rig at rest -> changing no faster than
+    rate_limit [1/s] -> gain·u -> + offset -> limited to ±saturation -> dead zone of ±dead_zone ->
+    function (a formula of the input's name) -> first-order lag [s]; `delay` [s] shifts the recorded
+    signal, `hold` ("zero", "first", "cubic") says how it runs between samples.  Play, limited rate
+    and delay act on the recorded signal, before all other maps.
 
     Raises:
         BadModel: Unknown input or symbol, or a second backlash or rate limit.
@@ -80,9 +81,10 @@ def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
         added = {held.name: (value - held) / read(lag, "lag")}
         swap = {u: held}
     paths = {}
-    for what, formula in (("backlash", backlash), ("rate_limit", rate_limit)):
+    for what, formula in (("backlash", backlash), ("backlash_start", backlash_start),
+                          ("rate_limit", rate_limit)):
         if formula is not None:
-            if getattr(item, what) != 0:
+            if getattr(item, what) not in (0, None):
                 raise errors.BadModel(errors.path_twice(name, what.replace("_", " ")))
             paths[what] = read(formula, what.replace("_", " "))
     changed = dataclasses.replace(

@@ -142,9 +142,11 @@ def validate(model: Lookup, checked: Checked) -> None:
         if splines := state.initial.atoms(AppliedUndef):
             raise errors.BadModel(errors.spline_at_start(state.name, str(splines.pop())))
     for item in checked.new(model.inputs):
-        for what, formula in (("delay", item.delay), ("backlash", item.backlash),
-                              ("rate limit", item.rate_limit)):
-            _check_symbols(formula, constants, f"The {what} of input '{item.name}'", model)
+        for what, formula in item.formulas.items():
+            _check_symbols(formula, constants, f"The {what.replace('_', ' ')} of input "
+                           f"'{item.name}'", model)
+        if item.backlash_start is not None and item.backlash == 0:
+            raise errors.BadModel(errors.start_without_backlash(item.name))
         if item.hold not in get_args(Hold):
             raise errors.BadModel(errors.bad_value(
                 f"The hold of input '{item.name}'", item.hold, "'zero', 'first' or 'cubic'"))

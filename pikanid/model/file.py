@@ -131,6 +131,7 @@ def to_dict(model: Lookup) -> dict[str, Any]:
             "unit": i.unit, "hold": i.hold, "default": i.default,
             "delay": None if i.delay == 0 else _plain(i.delay),
             "backlash": None if i.backlash == 0 else _plain(i.backlash),
+            "backlash_start": None if i.backlash_start is None else _plain(i.backlash_start),
             "rate_limit": None if i.rate_limit == 0 else _plain(i.rate_limit)})
             for i in model.inputs}
     if model.parameters:

@@ -82,8 +82,8 @@ class Model(Operations):
             for s in self.states))
         put(self, "inputs", tuple(
             i if checked.holds(i) else dataclasses.replace(i, **{
-                what: _constant(getattr(i, what), f"The {what.replace('_', ' ')} of '{i.name}'")
-                for what in ("delay", "backlash", "rate_limit")}) for i in self.inputs))
+                what: _constant(e, f"The {what.replace('_', ' ')} of '{i.name}'")
+                for what, e in i.formulas.items()}) for i in self.inputs))
         put(self, "parameters", tuple(self.parameters))
         put(self, "outputs", tuple(
             o if checked.holds(o) else dataclasses.replace(

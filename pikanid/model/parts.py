@@ -35,7 +35,9 @@ class Input:
 
     `backlash`, in the input's unit, is half the play that the recorded signal has to cross before
     anything moves, each time that it turns round; behind it the signal changes no faster than
-    `rate_limit` per second (0: as fast as it likes).
+    `rate_limit` per second (0: as fast as it likes).  `backlash_start` says where in the play it
+    begins, from -1 (below) to 1 (above): what acts first is the recorded signal and so many half
+    plays.  Without it nothing acts before the record begins, as on a rig at rest.
     """
 
     name: str
@@ -45,6 +47,14 @@ class Input:
     delay: sp.Expr = sp.S.Zero
     backlash: sp.Expr = sp.S.Zero
     rate_limit: sp.Expr = sp.S.Zero
+    backlash_start: sp.Expr | None = None
+
+    @property
+    def formulas(self) -> dict[str, sp.Expr]:
+        """Of parameters, by name of the field; without a start of the play where none is given."""
+        found = {"delay": self.delay, "backlash": self.backlash, "rate_limit": self.rate_limit}
+        start = self.backlash_start
+        return found if start is None else {**found, "backlash_start": start}
 
     @property
     def shaped(self) -> bool:

@@ -118,5 +118,7 @@ def _input(item: Input, put: Callable[..., sp.Expr]) -> Input:
         item, delay=put(item.delay, SECOND, f"The delay of input '{item.name}'"),
         backlash=put(item.backlash, own, f"The backlash of input '{item.name}'",
                      open_=not item.unit),
+        backlash_start=None if item.backlash_start is None else put(
+            item.backlash_start, declared("1"), f"The backlash start of input '{item.name}'"),
         rate_limit=put(item.rate_limit, own.times(SECOND, Fraction(-1)),
                        f"The rate limit of input '{item.name}'", open_=not item.unit))

@@ -292,9 +292,9 @@ def _output_delays(model: Model) -> Array:
                 raise errors.BadSetting(errors.relaxation_cannot_see(
                     names, f"the delay of {what} '{item.name}'"))
     for item in model.inputs:
-        for what, formula in (("backlash", item.backlash), ("rate limit", item.rate_limit)):
+        for what, formula in item.formulas.items():
             names = sorted(s.name for s in formula.free_symbols & free)
             if names:
                 raise errors.BadSetting(errors.relaxation_cannot_see(
-                    names, f"the {what} of input '{item.name}'"))
+                    names, f"the {what.replace('_', ' ')} of input '{item.name}'"))
     return delays(model.outputs, model, np.array(list(model.values.values())))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -142,23 +142,34 @@ class PiecewiseInput:
         return self.knots[1:][(ends != self.values[1:]) | (self.slopes[:-1] != self.slopes[1:])]
 
 
-def acting(held: HeldInput, half: float | None = None, rate: float = np.inf
-           ) -> tuple[PiecewiseInput, PiecewiseInput, PiecewiseInput]:
-    """What follows an input through a play of ±half, and no faster than `rate` per second.
+class Acting(NamedTuple):
+    """Of v = carrier + side·half + start·open·half + ramp·rate the four signals; they are its
+    derivatives as well: ∂v/∂half = side + start·open, ∂v/∂start = half·open, ∂v/∂rate = ramp.
+    """
 
-    Three signals c, s, q, straight between their knots, with v = c + s·half + q·rate and, exactly,
-    ∂v/∂half = s and ∂v/∂rate = q.
+    carrier: PiecewiseInput
+    side: PiecewiseInput
+    open: PiecewiseInput
+    ramp: PiecewiseInput
+
+
+def acting(held: HeldInput, half: float | None = None, rate: float = np.inf,
+           start: float = np.nan) -> Acting:
+    """What follows an input u through a play of ±half, and no faster than `rate` per second.
 
     Behind the play v stays until u has crossed it and then follows u ∓ half (M. A. Krasnosel'skii
-    and A. V. Pokrovskii, Systems with Hysteresis, 1989, sec. 2); it is 0 before the record begins.
-    The limit on the rate comes after the play and starts from its first value; without it s is -1
-    where u pushes upwards or did so last, +1 downwards, 0 before the first contact.
+    and A. V. Pokrovskii, Systems with Hysteresis, 1989, sec. 2).  It begins at u + start·half, or,
+    without a start, is 0 before the record begins.  The limit on the rate comes after the play and
+    begins at its first value; without it `side` is -1 where u pushes upwards or did so last, +1
+    downwards, 0 before the first contact, until which `open` is 1 where there is a start.
 
     >>> u = HeldInput("u", np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 0.9]), "zero")
-    >>> carrier, side, _ = acting(u, 0.25)
+    >>> carrier, side, *_ = acting(u, 0.25)
     >>> (carrier.values + 0.25 * side.values).tolist(), side.values.tolist()
     ([0.0, 0.75, 0.75], [0.0, -1.0, -1.0])
-    >>> carrier, _, ramp = acting(u, rate=2.0)
+    >>> acting(u, 0.25, start=-0.5).open.values.tolist()
+    [1.0, 0.0, 0.0]
+    >>> carrier, *_, ramp = acting(u, rate=2.0)
     >>> t = np.array([1.0, 1.25, 1.75])
     >>> (carrier.at(t) + 2.0 * ramp.at(t)).tolist()
     [0.0, 0.5, 1.0]
@@ -170,13 +181,17 @@ def acting(held: HeldInput, half: float | None = None, rate: float = np.inf
     if held.hold == "first" and len(u) > 1:
         slopes[:-1] = np.diff(u) / np.diff(held.time)
     knots, carrier, rates, side = np.asarray(held.time, float), u, slopes, np.zeros(len(u))
-    ramp = ramp_rates = moves = np.zeros(len(u))
+    ramp = ramp_rates = untouched = moves = shifts = np.zeros(len(u))
+    begins = min(max(float(start), -1.0), 1.0)
     if half is not None:
-        knots, carrier, rates, side, moves = play(knots, carrier, rates, float(half))
+        knots, carrier, rates, side, untouched, moves, shifts = play(
+            knots, carrier, rates, float(half), begins)
         ramp = ramp_rates = np.zeros(len(knots))
     if np.isfinite(rate):
-        knots, carrier, rates, side, ramp, ramp_rates = limited(
-            knots, carrier, rates, side, moves, float(half or 0.0), float(rate))
-    return (PiecewiseInput(knots, carrier, rates),
-            PiecewiseInput(knots, side, np.zeros(len(knots))),
-            PiecewiseInput(knots, ramp, ramp_rates))
+        knots, carrier, rates, side, ramp, ramp_rates, untouched = limited(
+            knots, carrier, rates, side, untouched, moves, shifts, float(half or 0.0), float(rate))
+    if begins == begins:
+        side = side - begins * untouched
+    still = np.zeros(len(knots))
+    return Acting(PiecewiseInput(knots, carrier, rates), PiecewiseInput(knots, side, still),
+                  PiecewiseInput(knots, untouched, still), PiecewiseInput(knots, ramp, ramp_rates))

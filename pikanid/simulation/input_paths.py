@@ -1,26 +1,30 @@
 """Play and limited rates of inputs, for kernels that know neither: more inputs instead.
 
-Behind a play of ±b and a limit R of its rate an input is v = c + s·b + q·R
-(`pikanid.problem.held.acting`).  Between two knots c, s and q are straight lines, and s and q are
-the derivatives by b and R: the sensitivities come out exact.
+Behind a play of ±b, begun at e·b in it, and a limit R of its rate an input is
+v = c + s·b + o·e·b + q·R (`pikanid.problem.held.acting`).  Between two knots c, s, o and q are
+straight lines, and the derivatives by b, e and R those of the formula: the sensitivities come out
+exact.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 import sympy as sp
 
 from pikanid.formula.expressions import symbol
-from pikanid.model import Model
+from pikanid.model import Input, Model
 from pikanid.problem.held import HeldInput, PiecewiseInput, acting
+
+Paths = Sequence[np.ndarray]  # (m,) each, as from `pikanid.problem.evaluated.paths`
 
 
 def with_parts(model: Model) -> Model:
-    """The model with every input that has play or a limited rate written as c + s·b + q·R; the
-    parts s and q are its last inputs.
+    """The model with every input that has play or a limited rate written as
+    c + s·b + o·e·b + q·R; the parts s, o and q are its last inputs.
 
     >>> from pikanid.model import systems
     >>> with_parts(systems.sloshing()).input_names
@@ -32,15 +36,14 @@ def with_parts(model: Model) -> Model:
 
 @functools.lru_cache(maxsize=64)
 def _with_parts(model: Model) -> Model:
-    plain = {"unit": "", "backlash": sp.S.Zero, "rate_limit": sp.S.Zero}
+    plain = {"unit": "", "backlash": sp.S.Zero, "rate_limit": sp.S.Zero, "backlash_start": None}
     added, swap = [], {}
     for item in model.inputs:
         whole = symbol(item.name)
-        for what, formula in (("side", item.backlash), ("ramp", item.rate_limit)):
-            if formula != 0:
-                part = dataclasses.replace(item, name=_fresh(model, f"{item.name}_{what}"), **plain)
-                added.append(part)
-                whole += symbol(part.name) * formula
+        for what, formula in _factors(item).items():
+            part = dataclasses.replace(item, name=_fresh(model, f"{item.name}_{what}"), **plain)
+            added.append(part)
+            whole += symbol(part.name) * formula
         swap[symbol(item.name)] = whole
     own = tuple(dataclasses.replace(i, **{**plain, "unit": i.unit}) for i in model.inputs)
     return model.replace(
@@ -49,34 +52,42 @@ def _with_parts(model: Model) -> Model:
         outputs=tuple(o.with_swapped(swap) for o in model.outputs))
 
 
+def _factors(item: Input) -> dict[str, sp.Expr]:
+    """What each part of an input is multiplied by, by the name of the part."""
+    start = item.backlash_start
+    found = {"side": item.backlash, "open": sp.S.Zero if start is None else start * item.backlash,
+             "ramp": item.rate_limit}
+    # a start that is zero now may be estimated: only one that is not given has no part
+    return {what: formula for what, formula in found.items()
+            if formula != 0 or (what == "open" and start is not None)}
+
+
 def _fresh(model: Model, name: str) -> str:
     while name in model.symbols:
         name += "_"
     return name
 
 
-def split(model: Model, held: tuple[HeldInput, ...], halves: np.ndarray, rates: np.ndarray
+def split(model: Model, held: tuple[HeldInput, ...], paths: Paths
           ) -> tuple[HeldInput | PiecewiseInput, ...]:
-    """The inputs of `with_parts(model)` for half plays and greatest rates (m,) of its own ones."""
+    """The inputs of `with_parts(model)` for the paths of its own ones."""
     own: list[HeldInput | PiecewiseInput] = []
     added: list[PiecewiseInput] = []
-    for item, h, half, rate in zip(model.inputs, held, halves, rates, strict=True):
+    for item, h, half, rate, start in zip(model.inputs, held, *paths, strict=True):
         if not item.shaped:
             own.append(h)
             continue
-        carrier, side, ramp = acting(h, None if item.backlash == 0 else float(half), float(rate))
-        own.append(carrier)
-        added += [part for part, formula in ((side, item.backlash), (ramp, item.rate_limit))
-                  if formula != 0]
+        acts = acting(h, None if item.backlash == 0 else float(half), float(rate), float(start))
+        own.append(acts.carrier)
+        added += [getattr(acts, what) for what in _factors(item)]
     return (*own, *added)
 
 
-def combined(model: Model, U: np.ndarray, halves: np.ndarray, rates: np.ndarray) -> np.ndarray:
+def combined(model: Model, U: np.ndarray, paths: Paths) -> np.ndarray:
     """The model's own inputs (L, m) from those of `with_parts(model)` (L, m + parts)."""
     own, part = U[:, :len(model.inputs)].copy(), len(model.inputs)
-    for j, (item, half, rate) in enumerate(zip(model.inputs, halves, rates, strict=True)):
-        for formula, factor in ((item.backlash, half), (item.rate_limit, rate)):
-            if formula != 0:
-                own[:, j] += factor * U[:, part]
-                part += 1
+    for j, (item, half, rate, start) in enumerate(zip(model.inputs, *paths, strict=True)):
+        for what in _factors(item):
+            own[:, j] += {"side": half, "open": start * half, "ramp": rate}[what] * U[:, part]
+            part += 1
     return own

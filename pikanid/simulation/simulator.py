@@ -111,7 +111,7 @@ class Simulator:
         shapes = paths(self.model, p)
         key = b"".join(a.tobytes() for a in (delay_in, delay_out, *shapes))
         if self._kept.get("delays") != key:
-            held = split(self.model, self.experiment.held, *shapes)
+            held = split(self.model, self.experiment.held, shapes)
             self._kept.update(
                 delays=key, grid=build_grid(self.experiment, held, delay_in, delay_out))
         return self._kept["grid"]

@@ -104,7 +104,7 @@ def course(best: Hypothesis, nominal: Model, effect: Candidate) -> Course | None
     simulator = whitened.simulators[0]
     p = whitened.problem.parameters(best.minimum.theta, 0)
     grid = simulator.grid(p)
-    acting = combined(simulator.model, grid.U, *paths(simulator.model, p))
+    acting = combined(simulator.model, grid.U, paths(simulator.model, p))
     u = acting[:, [simulator.model.input_names.index(n) for n in nominal.input_names]]
     states = whitened.responses(best.minimum.theta, states=True)[0].states
     x = states[:, [best.model.state_names.index(n) for n in nominal.state_names]]

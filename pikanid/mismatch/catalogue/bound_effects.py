@@ -87,7 +87,7 @@ def _extended(model: Model, effect: Effect) -> tuple[sp.Expr, ...] | None:
     except errors.BadUnit:
         return None
     plain = {symbol(n): symbol(f"own_{k}") for k, n in enumerate(effect.names)}
-    delays = (d for i in found.inputs for d in (i.delay, i.backlash, i.rate_limit))
+    delays = (d for i in found.inputs for d in i.formulas.values())
     return tuple(sp.S(e).xreplace(plain) for e in (
         *found.equations.values(), *(s.initial for s in found.states), *delays,
         *(formula for o in found.outputs for formula in (o.expression, o.delay))))

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pikanid import errors
 from pikanid.formula import units
 from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
+from pikanid.mismatch.catalogue.backlash import input_backlash
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.catalogue.coupled_state import coupled_state
 from pikanid.mismatch.catalogue.cross_axis import cross_axis
@@ -44,7 +45,7 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (channels.input_gain, ("gain",)),
     (channels.sensor_gain, ("gain",)),
     (channels.input_limits, ("input curve",)),
-    (channels.input_backlash, ("input curve",)),
+    (input_backlash, ("input curve",)),
     (channels.sensor_offset, ("constant force",)),
     (channels.sensor_drift, ("slow change",)),
     (channels.sensor_saturation, ("sensor curve",)),

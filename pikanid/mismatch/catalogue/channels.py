@@ -12,7 +12,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDire
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
-from pikanid.problem.held import PIECES, HeldInput, acting
+from pikanid.problem.held import PIECES
 
 INF = float("inf")
 # of a limit: on both sides alike, or on one; what it is called
@@ -235,30 +235,6 @@ def input_limits(site: Site) -> list[Candidate]:
         found.append(
             _input(site, u, "input_dead_zone", "a dead zone of the input", (width,),
                    f"dead_zone({u}, {width.name})", dead, dead_zone=width.name))
-    return found
-
-
-def input_backlash(site: Site) -> list[Candidate]:
-    """Play behind the input: each time that it turns round it moves nothing for a while."""
-    found = []
-    for u in site.inputs:
-        unit = site.model.input(u).unit
-        half = Parameter(site.name("half_play", site.variant(u)), 0.0, unit, (0.0, INF))
-
-        def directions(view: View, u: str = u, half: Parameter = half) -> list[TangentDirection]:
-            d = HeldInput(u, view.t, view.u[u], "zero")
-            top = float(np.abs(d.values).max(initial=0.0))
-            found = []
-            for size in top * np.array([0.003, 0.01, 0.03, 0.08, 0.2, 0.4]) if top else ():
-                carrier, side, _ = acting(d, size)
-                acts = carrier.at(view.t) + size * side.at(view.t)
-                found.append(TangentDirection({half.name: float(size)}, push={u: acts - d.values},
-                                              one_sided=True, scales=False))
-            return found
-
-        found.append(_input(site, u, "hysteresis", "backlash of the input", (half,),
-                            f"{u} behind a play of ±{half.name}", directions, variant="backlash",
-                            backlash=half.name))
     return found
 
 

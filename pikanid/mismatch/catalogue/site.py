@@ -20,6 +20,7 @@ from pikanid.model.parts import Formula, Output, Parameter
 from pikanid.recording import Recording
 
 SLOWEST = 0.005  # numerical: of the usual speed, the least at which a law changes its course
+NEAR_ZERO = 0.01  # numerical: of an input's largest value, from where on it does not begin at 0
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class Site:
             empty where it acts on v' alone.
         along: The parameter whose damping acts so.
         unseen_speed: Largest value of a state that no output shows, along the nominal motion.
+        operating: Inputs that do not begin at 0 in every recording: the rig need not be at rest.
     """
 
     model: Model
@@ -68,6 +70,7 @@ class Site:
     lever: Mapping[str, sp.Expr] = field(default_factory=dict, hash=False)
     along: str = ""
     unseen_speed: float = 0.0
+    operating: tuple[str, ...] = ()
 
     def pushed(self, model: Model, force: Formula) -> Model:
         """A model with a force on the coordinate [force_unit]."""
@@ -252,7 +255,14 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
                 expanded(force) == 0 and all(e == 0 for e in starts), alone,
                 all(_starts_still(model, r) for r in recordings),
                 (first.start, first.stop), _swing(first, output.name),
-                _interval(first, output.name), suffix)
+                _interval(first, output.name), suffix,
+                operating=tuple(n for n in inputs if not all(
+                    n in r and _begins_at_zero(r[n].values) for r in recordings)))
+
+
+def _begins_at_zero(values: np.ndarray) -> bool:
+    seen = values[np.isfinite(values)]
+    return not seen.size or abs(float(seen[0])) <= NEAR_ZERO * float(np.abs(seen).max())
 
 
 def _interval(recording: Recording, name: str) -> float:

@@ -169,7 +169,7 @@ class Tangent:
                 if np.all(np.isfinite(c.values)):
                     extra[name] = HeldInput(name, c.time, c.values, "zero").at(self.t)
         nominal = self.simulator.model
-        acting = combined(nominal, self.u, *paths(nominal, self.p))
+        acting = combined(nominal, self.u, paths(nominal, self.p))
         force = {}
         for name in self.model.free_names:
             k = self.model.parameter_names.index(name)

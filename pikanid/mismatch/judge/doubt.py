@@ -120,7 +120,7 @@ def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: S
         overdispersion: That divides χ²: standard errors grow with its root.
         settings: How many of them a size must be from nothing.
     """
-    sizes = [p for p in effect.parameters if p.free]
+    sizes = [p for p in effect.parameters if p.free and p.scope == "shared"]
     if len(sizes) != 1:
         return ""
     size = h.values[sizes[0].name]
