@@ -308,8 +308,7 @@ def test_standard_errors_count_the_remainder(diagnosed: pk.Diagnosis) -> None:
     found, left = diagnosed.present[0], diagnosed.remainder
     assert left is not None and left.overdispersion > 3
     for name, value in found.parameters.items():
-        assert found.std_with_remainder[name] == pytest.approx(
-            value.std * np.sqrt(left.overdispersion))
+        assert found.std_with_remainder[name] > value.std * np.sqrt(left.overdispersion)
     # those of the explanation as well
     shown = diagnosed.hypotheses[0].effects[0].parameters
     assert all(v.std == found.std_with_remainder[n] for n, v in shown.items()

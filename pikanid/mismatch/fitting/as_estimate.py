@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -44,12 +46,15 @@ def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
         settings={**like.settings, "effects": sorted(h.key)}, version=__version__)
 
 
-def widened(estimate: Estimate, overdispersion: float) -> Estimate:
+def widened(estimate: Estimate, overdispersion: float,
+            spread: Mapping[str, float] = MappingProxyType({})) -> Estimate:
     """The same with standard errors that count what is left beside noise: where χ² is divided by
     so much, covariances are multiplied by it (P. McCullagh and J. A. Nelder, Generalized Linear
-    Models, 1989, sec. 4.5).
+    Models, 1989, sec. 4.5), and the square of each shared parameter's spread is added.
     """
     wider = overdispersion**0.5
     fits = tuple(f if f.spread is None else replace(f, spread=wider * f.spread)
                  for f in estimate.fits)
-    return replace(estimate, covariance=overdispersion * estimate.covariance, fits=fits)
+    apart = [spread.get(f.name, 0.0) if f.recording is None else 0.0 for f in estimate.free]
+    return replace(estimate, covariance=overdispersion * estimate.covariance + np.diag(
+        np.square(apart)), fits=fits)

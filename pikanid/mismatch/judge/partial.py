@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Again, idle, no_size, worth
-from pikanid.mismatch.judge.explanations import Explanations, Weighed, dominance
+from pikanid.mismatch.judge.explanations import Explanations, Weighed, dominance, spread
 from pikanid.mismatch.judge.kinds import Kind, holds, kinds_in, members
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import PartSettings
@@ -102,6 +102,7 @@ class Part:
         hypothesis: With the fewest effects, that holds what is present.
         overdispersion: What χ² is divided by.
         share: Of the held-out misfit's square that the hypothesis explains.
+        spread: How far apart explanations that are not ruled out have its parameters, by name.
     """
 
     present: tuple[Present, ...]
@@ -109,6 +110,7 @@ class Part:
     hypothesis: Hypothesis
     overdispersion: float
     share: float
+    spread: Mapping[str, float] = field(default_factory=dict)
 
 
 def surely_there(explained: Explanations, scale: float, settings: Settings, again: Again) -> Part:
@@ -148,7 +150,8 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     return Part(tuple(sorted(present, key=lambda p: -p.dominance)),
-                doubtful, fewest.hypothesis, explained.overdispersion, fewest.share)
+                doubtful, fewest.hypothesis, explained.overdispersion, fewest.share,
+                spread(fewest, found, rule))
 
 
 def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:

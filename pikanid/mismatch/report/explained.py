@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from pikanid.mismatch.fitting.decisions import smaller
@@ -15,7 +17,7 @@ from pikanid.mismatch.settings.settings import Settings
 
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
-                 settings: Settings, overdispersion: float = 1.0
+                 settings: Settings, overdispersion: float, spread: Mapping[str, float]
                  ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
     """Given and rejected hypotheses, for reports.
 
@@ -25,6 +27,7 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         test, predict: Adequacy on the train and on the held-out recordings.
         settings: What counts as evidence, and as adequate.
         overdispersion: That variances of parameters are multiplied by.
+        spread: By name, whose square is added to those of what is given.
     """
     pool = [*answer.given, *answer.others]
     if not pool:
@@ -45,7 +48,8 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         named = [table.get(e.key, Names(e.names, (e.name,))) for e in h.effects]
         effects = tuple(NamedEffect(
             names.ids, " or ".join(names.words), e.expression,
-            values_of(e.parameters, h.values, h.std, overdispersion), e.channel, e.site.v, e.absent)
+            values_of(e.parameters, h.values, h.std, overdispersion,
+                      spread if h in answer.given else {}), e.channel, e.site.v, e.absent)
             for e, names in zip(h.effects, named, strict=True))
         p = predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from types import MappingProxyType
 from typing import Any
 
 from pikanid.estimate.rounding import with_unit
@@ -42,7 +44,8 @@ class Present:
         dominance_within: The same of the best explanation with another member of the family.
         share: Of the held-out misfit's square that the best explanation explains.
         parameters: Estimates, with standard errors as the noise alone would have them.
-        std_with_remainder: Standard errors with the remainder counted in.
+        std_with_remainder: Standard errors with the remainder counted in, and how far apart
+            explanations that are not ruled out have them.
         or_family: Another family, where one of both is surely there, and which one is not sure;
             else empty.
     """
@@ -188,7 +191,11 @@ class Closest:
 
 
 def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],
-              std: Mapping[str, float], overdispersion: float = 1.0) -> dict[str, Value]:
-    """Estimates of an effect's parameters, with variances multiplied by the overdispersion."""
-    return {p.name: Value(values[p.name], std[p.name] * overdispersion**0.5, parse(p.unit))
+              std: Mapping[str, float], overdispersion: float = 1.0,
+              spread: Mapping[str, float] = MappingProxyType({})) -> dict[str, Value]:
+    """Estimates of an effect's parameters, with variances multiplied by the overdispersion; the
+    square of a spread, by name, is added to them.
+    """
+    return {p.name: Value(values[p.name], math.hypot(
+                std[p.name] * overdispersion**0.5, spread.get(p.name, 0.0)), parse(p.unit))
             for p in parameters if p.name in values}

@@ -21,8 +21,8 @@ def present(answer: Answer) -> tuple[Present, ...]:
     h, counts = answer.part.hypothesis, answer.part.overdispersion
     found = []
     for p in answer.part.present:
-        values, wider = (values_of(p.effect.parameters, h.values, h.std, by)
-                         for by in (1.0, counts))
+        values, wider = (values_of(p.effect.parameters, h.values, h.std, by, spread)
+                         for by, spread in ((1.0, {}), (counts, answer.part.spread)))
         found.append(Present(
             p.family, p.names, _name(p), p.effect.expression, p.alternatives, p.probability,
             p.probability_family, _finite(p.dominance), _finite(p.dominance_within), p.share,

@@ -41,9 +41,10 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     counts = _overdispersion(case, answer)
     before = case.before if answer.verdict == "none" else widened(
         case.before, overdispersion([case.base]))
-    after = widened(as_estimate(best, case.before), counts) if answer.given else before
+    spread = answer.part.spread if answer.part is not None else {}
+    after = (widened(as_estimate(best, case.before), counts, spread) if answer.given else before)
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
-                                   case.settings, counts)
+                                   case.settings, counts, spread)
     proof = _proof(case, answer, best)
     alone = not smaller(case.detected().p_value, alpha)
     if alone and not answer.given and proof is not None and proof.p_value < alpha:

@@ -1,0 +1,60 @@
+"""How far apart explanations of about the same worth have a parameter, and who counts it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from weighing import COULOMB, DRAG, RULE, Candidate, weighed
+
+import pikanid as pk
+from pikanid.mismatch.fitting.as_estimate import widened
+from pikanid.mismatch.judge.explanations import Weighed, spread
+from pikanid.mismatch.report.part import Value, values_of
+
+
+def with_parameter(effect: Candidate, name: str) -> Candidate:
+    return SimpleNamespace(**{  # type: ignore[return-value]  # a stand-in
+        **vars(effect), "parameters": (pk.Parameter(name, 0.0),)})
+
+
+FRICTION, QUADRATIC = with_parameter(COULOMB, "c"), with_parameter(DRAG, "c")
+
+
+def found(effects: tuple[Candidate, ...], left: float, **values: float) -> Weighed:
+    one = weighed(effects, left, 0.5)
+    h: Any = SimpleNamespace(effects=effects, values=values,
+                             key=frozenset(e.key for e in effects))
+    return replace(one, hypothesis=h)
+
+
+def test_what_is_not_ruled_out_says_how_sure_a_parameter_is() -> None:
+    given = found((FRICTION,), 1.0, m=2.0, c=1.0)
+    others = [given,
+              found((FRICTION, DRAG), 1.5, m=2.2, c=1.3),
+              found((QUADRATIC,), 3.9, m=1.7, c=50.0),  # its c is something else
+              found((), 4.1, m=99.0)]
+    assert spread(given, others, RULE) == pytest.approx({
+        "m": np.sqrt((0.2**2 + 0.3**2) / 3), "c": np.sqrt(0.3**2 / 2)})
+
+
+def test_where_nothing_is_left_nothing_counts_but_noise() -> None:
+    given = found((FRICTION,), 1e-9, m=2.0)
+    near, far = (found((DRAG,), times * RULE.dominance * RULE.floor, m=3.0)
+                 for times in (0.9, 1.1))
+    assert spread(given, [given, near, far], RULE)["m"] == pytest.approx(np.sqrt(0.5))
+
+
+def test_its_square_is_added_to_variances_of_shared_parameters() -> None:
+    model = pk.systems.sloshing().per_recording("d_theta")
+    recording = pk.simulate(model, pk.excitation.two_pulse(), sigma=0.01, seed=0)
+    est = pk.NLS(starts=1).fit(model, recording)
+    wider = widened(est, 4.0, {"l_theta": 0.5, "d_theta": 0.5})
+    assert wider.std("l_theta") == pytest.approx(np.hypot(2 * est.std("l_theta"), 0.5))
+    assert wider.std("d_theta", 0) == pytest.approx(2 * est.std("d_theta", 0))
+    p = pk.Parameter("c", 0.0, "N")
+    assert values_of((p,), {"c": 2.0}, {"c": 0.1}, 9.0, {"c": 0.4})["c"] == Value(
+        2.0, pytest.approx(0.5), "N")
