@@ -135,6 +135,8 @@ class Candidate:
         probes: Values of its parameters but the size, at each of which its sign is derived from
             what it adds to the model; its `directions` then say no more than where a fit begins.
         undoes: Id of effects on the same channel that it is the contrary of.
+        begins: Names of its parameters that only say how a recording begins; without them that is
+            an assumption, which costs no evidence either.
     """
 
     ids: tuple[str, ...]
@@ -175,6 +177,7 @@ class Candidate:
     other: Callable[[Model], Model] | None = None
     probes: tuple[Mapping[str, float], ...] = ()
     undoes: str = ""
+    begins: tuple[str, ...] = ()
 
     def suits(self, others: Sequence[Candidate] = ()) -> bool:
         """Whether it is an explanation of its own beside these.  Of two that act once each may be

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from pikanid.formula import units
+from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
@@ -169,6 +171,8 @@ def lags(site: Site) -> list[Candidate]:
                        twin="lag")]
     for u in site.inputs:
         t_u = Parameter(site.name("tau_a", site.variant(u)), 0.5 * step, "s", within)
+        begun = Parameter(site.name("d_lag", site.variant(u)), 0.0, site.model.input(u).unit,
+                          scope="recording")
 
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[TangentDirection]:
             from pikanid.mismatch.catalogue.recurrences import lag_of_held
@@ -177,9 +181,21 @@ def lags(site: Site) -> list[Candidate]:
                 {t_u.name: float(s)}, push={u: lag_of_held(view.t, view.u[u], s)},
                 one_sided=True, null=0.0) for s in step * np.array(LAGS)]
 
-        found.append(_input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),
-                            f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name))
+        lag = _input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),
+                     f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name)
+        # in operation an actuator is not in balance with what it is told at first
+        found.append(replace(
+            lag, parameters=(t_u, begun), extend=partial(_behind, u, t_u.name, begun.name),
+            begins=(begun.name,))
+            if u in site.operating else lag)
     return found
+
+
+def _behind(u: str, lag: str, begun: str, model: Model) -> Model:
+    """The model whose input lags, and begins `begun` above its first value."""
+    lagging = model.map_input(u, lag=lag)
+    held = lagging.states[-1]
+    return lagging.with_initial(**{held.name: held.initial + symbol(begun)})
 
 
 def _input(site: Site, u: str, identifier: str, name: str, parameters: tuple[Parameter, ...],

@@ -227,7 +227,7 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         best = renewed(whitened, best, closest, limit, beyond)
     if best is None:
         return None
-    free = sum(max(len(e.parameters), 1) for e in effects)
+    free = sum(max(len(e.parameters) - len(e.begins), 1) for e in effects)
     penalty = price(free, len(effects), whitened.rows, choices, records.settings.choice_weight)
     found = Hypothesis(tuple(effects), model, whitened, best, penalty)
     for otherwise in (turned, read_otherwise):
