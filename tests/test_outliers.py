@@ -69,6 +69,17 @@ def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
     assert len(left) < len(hit) + 3
 
 
+@pytest.mark.parametrize("turn", [10, 12, 16, 30])
+def test_peaks_of_a_misfit_that_swings_are_none(turn: int) -> None:
+    k = np.arange(1200)
+    swing = np.sin(2 * np.pi * k / 97) * np.sin(2 * np.pi * k / turn) + np.sin(2 * np.pi * k / 211)
+    residual = swing + 0.02 * noise(1200, seed=3)
+    assert lone(residual, DEFAULTS.noise).sum() <= 1  # one in 5000 by chance
+    hit = np.arange(40, 1200, 80)
+    residual[hit] += 2.0
+    assert lone(residual, DEFAULTS.noise)[hit].mean() > 0.8
+
+
 def test_straight_lines_over_gaps_take_power_away() -> None:
     rng = np.random.default_rng(3)
     n = 400

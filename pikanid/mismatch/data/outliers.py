@@ -29,6 +29,7 @@ TOUCHING = 5  # numerical: samples, within which a sample makes others look bad
 GLITCH = 12  # numerical: samples that a glitch of a few may make look bad
 NEAR = 15  # numerical: samples, within which errors that happen by chance seldom follow another
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
+CUBIC = np.array([-4.0, 9.0, 0.0, 0.0, 0.0, 9.0, -4.0]) / 10.0  # numerical: but for the next ones
 
 
 def without_outliers(recording: Recording, output: str, settings: Settings,
@@ -126,7 +127,8 @@ def from_inputs(recording: Recording, t: np.ndarray, y: np.ndarray, inputs: Sequ
 
 def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
     """Which samples (N,) of a residual are far from what its neighbours say, whichever one asks:
-    those around it, or those on one side only, beyond which a misfit may bend.
+    those around it, those on one side only, beyond which a misfit may bend, or a cubic, which
+    follows one that swings.
     """
     if len(residual) < noise.least_alone:
         return np.zeros(len(residual), bool)
@@ -134,10 +136,10 @@ def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
         np.pad(residual, 3, mode="reflect", reflect_type="odd"), 7)
     said = np.stack([np.median(np.delete(near, 3, axis=1), axis=1), near[:, :3] @ LINE,
                      near[:, :3:-1] @ LINE])
-    gap = np.min(np.abs(residual - said), axis=0)
-    found = gap > noise.lone * np.median(gap)
-    few = 0 < found.sum() <= noise.most_outliers * len(found)
-    return np.asarray(found if few else np.zeros_like(found))
+    gap, swung = np.min(np.abs(residual - said), axis=0), np.abs(residual - near @ CUBIC)
+    far = gap > noise.lone * np.median(gap)
+    few = far.sum() <= noise.most_outliers * len(far)
+    return far & (swung > noise.off_cubic * np.median(swung)) & few
 
 
 def with_humps(residual: np.ndarray, kept: np.ndarray, together: int) -> np.ndarray:

@@ -141,7 +141,7 @@ class Remainder:
         """In words."""
         size, before, noise = (with_unit(f"{v:.3g}", self.unit)
                                for v in (self.rmse, self.rmse_before, self.noise))
-        return (f"{100 * self.share_explained:.0f} % of the held-out misfit is explained; of "
+        return (f"{almost(self.share_explained)} of the held-out misfit is explained; of "
                 f"{before} (RMSE) {size} are left, beside noise of {noise}")
 
     def lines(self) -> list[str]:
@@ -157,6 +157,17 @@ class Remainder:
         found["time"] = [list(span) for span in self.time]
         found["doubtful"] = [{"family": what, "why": why} for what, why in self.doubtful]
         return found
+
+
+def almost(share: float) -> str:
+    """A share in percent, which is not 100 where something is left.
+
+    >>> almost(0.876), almost(0.9971), almost(0.99999)
+    ('88 %', '99.7 %', 'more than 99.9 %')
+    """
+    if share < 0.995:
+        return f"{100 * share:.0f} %"
+    return f"{100 * share:.1f} %" if share < 0.9995 else "more than 99.9 %"
 
 
 @dataclass(frozen=True)

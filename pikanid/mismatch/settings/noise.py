@@ -27,7 +27,9 @@ class NoiseSettings:
         same_correlation: Change of the correlation of neighbours below which it is.
         spike: [σ] by which a sample must leave its neighbours before there is a fit.
         lone: Median gaps by which it must once a fit is taken away: of white noise one sample in
-            4000 does, counted.
+            5000 does, counted, that is also off the cubic.
+        off_cubic: Median gaps by which it must leave a cubic through those around it as well: the
+            peaks of a smooth misfit do not.
         together: Neighbours that are alone together are none: a sensor may have been at its end.
         by_chance: Rate at which noise counts as what the inputs' past explains: it is asked of
             every output of every recording, several times.
@@ -59,6 +61,7 @@ class NoiseSettings:
     same_correlation: Share = 0.06
     spike: Amount = 5.0
     lone: Amount = 9.0
+    off_cubic: Amount = 2.5
     together: Count = 3
     by_chance: Rate = 1e-6
     least_alone: Annotated[int, Range(7, whole=True)] = 20
