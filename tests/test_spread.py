@@ -12,7 +12,7 @@ from weighing import COULOMB, DRAG, RULE, Candidate, weighed
 
 import pikanid as pk
 from pikanid.mismatch.fitting.as_estimate import widened
-from pikanid.mismatch.judge.explanations import Weighed, spread
+from pikanid.mismatch.judge.explanations import Weighed, not_ruled_out, spread
 from pikanid.mismatch.report.part import Value, values_of
 
 
@@ -37,7 +37,8 @@ def test_what_is_not_ruled_out_says_how_sure_a_parameter_is() -> None:
               found((FRICTION, DRAG), 1.5, m=2.2, c=1.3),
               found((QUADRATIC,), 3.9, m=1.7, c=50.0),  # its c is something else
               found((), 4.1, m=99.0)]
-    assert spread(given, others, RULE) == pytest.approx({
+    near = not_ruled_out(given, others, RULE)
+    assert spread(given.hypothesis, near) == pytest.approx({
         "m": np.sqrt((0.2**2 + 0.3**2) / 3), "c": np.sqrt(0.3**2 / 2)})
 
 
@@ -45,7 +46,7 @@ def test_where_nothing_is_left_nothing_counts_but_noise() -> None:
     given = found((FRICTION,), 1e-9, m=2.0)
     near, far = (found((DRAG,), times * RULE.dominance * RULE.floor, m=3.0)
                  for times in (0.9, 1.1))
-    assert spread(given, [given, near, far], RULE)["m"] == pytest.approx(np.sqrt(0.5))
+    assert not_ruled_out(given, [given, near, far], RULE) == [given.hypothesis, near.hypothesis]
 
 
 def test_its_square_is_added_to_variances_of_shared_parameters() -> None:

@@ -144,23 +144,27 @@ def dominance(lead: Weighed, others: Sequence[Weighed], rule: PartSettings) -> f
     return float(least / max(lead.left, rule.floor))
 
 
-def spread(given: Weighed, found: Iterable[Weighed], rule: PartSettings) -> dict[str, float]:
-    """Root mean square distance of each parameter's estimates from that which is given, over the
-    explanations that leave less than κ times as much.
-
-    All of them are wrong where something is left, and how far is in no standard error: between
-    models it adds to that within one (S. T. Buckland, K. P. Burnham and N. H. Augustin, Biometrics
-    53, 1997, eq. 9, with equal weights).
-    """
-    near = [w.hypothesis for w in found
+def not_ruled_out(given: Weighed, found: Iterable[Weighed], rule: PartSettings
+                  ) -> list[Hypothesis]:
+    """Explanations that leave less than κ times as much as that which is given."""
+    return [w.hypothesis for w in found
             if smaller(w.left, rule.dominance * max(given.left, rule.floor))]
-    # another effect may have the same name for something else
-    of = {p.name: e.key for e in given.hypothesis.effects for p in e.parameters}
 
+
+def spread(given: Hypothesis, near: Sequence[Hypothesis]) -> dict[str, float]:
+    """Root mean square distance of each parameter's estimates in explanations `near` from that
+    which is given.
+
+    Which of them is right, if one is, is in no standard error: between models it adds to that
+    within one (S. T. Buckland, K. P. Burnham and N. H. Augustin, Biometrics 53, 1997, eq. 9, with
+    equal weights).
+    """
+    # another effect may have the same name for something else
+    of = {p.name: e.key for e in given.effects for p in e.parameters}
 
     def apart(name: str, value: float) -> float:
         squares = [(h.values[name] - value) ** 2 for h in near
                    if name not in of or of[name] in h.key]
         return float(np.sqrt(np.mean(squares)))
 
-    return {name: apart(name, value) for name, value in given.hypothesis.values.items()}
+    return {name: apart(name, value) for name, value in given.values.items()}

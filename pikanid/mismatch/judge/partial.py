@@ -11,7 +11,13 @@ from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Again, idle, no_size, worth
-from pikanid.mismatch.judge.explanations import Explanations, Weighed, dominance, spread
+from pikanid.mismatch.judge.explanations import (
+    Explanations,
+    Weighed,
+    dominance,
+    not_ruled_out,
+    spread,
+)
 from pikanid.mismatch.judge.kinds import Kind, holds, kinds_in, members
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import PartSettings
@@ -151,7 +157,7 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     return Part(tuple(sorted(present, key=lambda p: -p.dominance)),
                 doubtful, fewest.hypothesis, explained.overdispersion, fewest.share,
-                spread(fewest, found, rule))
+                spread(fewest.hypothesis, not_ruled_out(fewest, found, rule)))
 
 
 def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:

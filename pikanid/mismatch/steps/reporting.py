@@ -14,6 +14,7 @@ from pikanid.mismatch.fitting.as_estimate import as_estimate, widened
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import idle
+from pikanid.mismatch.judge.explanations import spread
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.advice import advice
@@ -41,10 +42,11 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     counts = _overdispersion(case, answer)
     before = case.before if answer.verdict == "none" else widened(
         case.before, overdispersion([case.base]))
-    spread = answer.part.spread if answer.part is not None else {}
-    after = (widened(as_estimate(best, case.before), counts, spread) if answer.given else before)
+    apart = (answer.part.spread if answer.part is not None else
+             spread(best, answer.given) if len(answer.given) > 1 else {})
+    after = widened(as_estimate(best, case.before), counts, apart) if answer.given else before
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
-                                   case.settings, counts, spread)
+                                   case.settings, counts, apart if answer.part else {})
     proof = _proof(case, answer, best)
     alone = not smaller(case.detected().p_value, alpha)
     if alone and not answer.given and proof is not None and proof.p_value < alpha:
