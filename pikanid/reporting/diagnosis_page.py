@@ -134,8 +134,8 @@ def _explanation(h: Explanation, odds: str) -> str:
 
 
 def _parameters(dx: Diagnosis) -> str:
-    """Of the model, before and after."""
-    if not dx.hypotheses:
+    """Of the model, before and after, or where nothing is missing."""
+    if dx.mismatch and not dx.hypotheses:
         return ""
     return "<h2>The model's parameters</h2>" + tabled(parameters(dx))
 

@@ -66,7 +66,7 @@ class Diagnosis(DiagnosisData):
             "alpha": self.alpha,
             "exchanged": self.exchanged,
             "where": {"channel": self.where.channel, "channels": list(self.where.channels),
-                      "equation": self.where.equation,
+                      "equation": self.where.equation if self.mismatch else "",
                       "depends_on": list(self.where.depends_on),
                       "time": [list(span) for span in self.where.time],
                       "static_law": self.where.static_law,

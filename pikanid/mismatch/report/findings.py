@@ -263,10 +263,12 @@ class DiagnosisData:
             return head + f"surely {enumerated([p.title for p in sure])}{more}. " \
                 f"{self.remainder.sentence()}."
         if self.verdict == "unconfirmed":
-            likely = self.hypotheses[0].probability >= self.settings.verdict.guessed
-            lead = "perhaps" if likely else "nothing in the catalogue explains it; closest comes"
             doubt = f": {self.doubt}." if self.doubt else " on other data."
-            return f"{head}{lead} {_first(titles)}, not confirmed{doubt}"
+            if self.hypotheses[0].probability >= self.settings.verdict.guessed:
+                return f"{head}perhaps {_first(titles)}, not confirmed{doubt}"
+            near = enumerated(self.closest.effects) if self.closest else _first(titles)
+            return (f"{head}nothing in the catalogue explains it; closest comes {near}, "
+                    f"not confirmed{doubt}")
         return head + "nothing in the catalogue explains it."
 
     @property

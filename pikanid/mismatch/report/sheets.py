@@ -29,8 +29,11 @@ def held_out(dx: DiagnosisData) -> Sheet:
 
 
 def parameters(dx: DiagnosisData) -> Sheet:
-    """Of the nominal model, before and after."""
+    """Of the nominal model, before and after; where nothing is missing, its estimates."""
     before, after = (_estimates(found) for found in (dx.before, dx.after))
+    if not dx.mismatch:
+        return Sheet(("parameter", "estimate ± std. error", "unit"), tuple(
+            (f.label, before[f.label], unit_text(f.unit) or "-") for f in dx.before.free))
     return Sheet(("parameter", "before", "after", "unit"), tuple(
         (f.label, before[f.label], after[f.label], unit_text(f.unit) or "-")
         for f in dx.after.free if f.label in before))

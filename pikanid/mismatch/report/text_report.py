@@ -41,7 +41,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
             lines.append(f"  {left}{e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
                 lines.append(f"    {name} = {with_unit(rounded(v.value, v.std), v.unit)}")
-    lines += _of_model(dx) if dx.hypotheses else []
+    lines += _of_model(dx) if dx.hypotheses or not dx.mismatch else []
     lines += [f"Not: {title}: {why}" for title, why in dx.not_given[:4]]
     if dx.held_out is not None and dx.hypotheses:
         p = dx.held_out
@@ -62,9 +62,9 @@ def lines_of(dx: DiagnosisData) -> list[str]:
 
 
 def _of_model(dx: DiagnosisData) -> list[str]:
-    """The model's parameters before and after, in a line; none where it has none."""
+    """The model's parameters before and after, or alone, in a line; none where it has none."""
     units = {f.label: f.unit for f in dx.after.free}
-    told = [f"{name} = {with_unit(f'{before} -> {after}', units[name])}"
-            for name, before, after, _ in parameters(dx).rows]
+    told = [f"{name} = {with_unit(' -> '.join(values), units[name])}"
+            for name, *values, _ in parameters(dx).rows]
     more = f"; and {len(told) - TOLD} more" if len(told) > TOLD else ""
     return [f"Model: {'; '.join(told[:TOLD])}{more}"] if told else []
