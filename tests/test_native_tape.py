@@ -31,6 +31,7 @@ CORNERED: dict[str, dict[str, float]] = {
     "-a*sign(theta_dot) - b*theta*sign(theta_dot - w)": {"a": 2.0, "b": 3.0, "w": 0.1},
 }
 SMOOTH: dict[str, dict[str, float]] = {
+    "-k*max(theta - w, 0)**3 + b*max(-theta - w, 0)**4": {"k": 2e5, "b": 5e6, "w": 0.02},
     "a*exp(-theta**2)*tanh(theta_dot) + a**3/(2 + theta**4)": {"a": 0.7},
     "a*log(2 + b*theta) + sqrt(a + theta**2)*atan(b*theta_dot)": {"a": 0.4, "b": 0.2},
     "a*asin(theta/3) + b*acos(theta/4)*atan2(theta, 2 + theta_dot**2)": {"a": 0.4, "b": 0.2},

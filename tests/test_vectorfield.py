@@ -70,6 +70,18 @@ def test_kinked_terms_away_from_their_kinks(name: str) -> None:
         np.testing.assert_allclose(fp[far, :, j], slope[far], rtol=1e-7, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", TERMS)
+def test_a_slope_by_one_parameter_is_that_of_all(name: str) -> None:
+    model, count = slosh(TERMS[name]), 15
+    t, x = RNG.uniform(0, 3, count), RNG.uniform(0.2, 1.0, (count, 2))
+    u, p = RNG.normal(size=(count, 2)), values(model)
+    field = VectorField(model)
+    every = field.rhs_jacobians(t, x, u, p)[1]
+    for k, parameter in enumerate(model.parameter_names):
+        np.testing.assert_allclose(
+            field.rhs_by(parameter, t, x, u, p), every[:, :, k], rtol=1e-12, atol=1e-14)
+
+
 def test_at_a_kink_the_sign_is_zero() -> None:
     model = systems.sloshing().with_term("theta_dot", "-mu*sign(theta_dot)", [Parameter("mu", 2.0)])
     f = VectorField(model).rhs(np.zeros(1), np.array([[0.1, 0.0]]), np.zeros((1, 2)), values(model))

@@ -78,17 +78,42 @@ class NoiseModel:
         ...                                           np.array([0.0, 0.1, 0.3]))]
         [1.0, 0.0, 0.129]
         """
+        return self.whitening(t, given)(rows)
+
+    def whitening(self, t: Array, given: Array | None = None) -> Whitening:
+        """`whiten` at these times, for rows that change while times stay."""
         spreads = self.spreads(given, len(t))
-        rows = rows / (spreads[:, None] if rows.ndim == 2 else spreads)
         if self.rho == 0:
+            return Whitening(spreads)
+        keep = self.rho ** np.maximum(np.rint(np.diff(t) / self.interval), 1.0)
+        return Whitening(spreads, keep, np.sqrt(1 - keep**2))
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """Makes noise at given times white: σ (N,) of the samples, and of all but the first (N-1,) what
+    is kept of the one before, and what is new; neither where the noise is white.
+    """
+
+    spreads: Array
+    kept: Array | None = None
+    new: Array | None = None
+
+    def __call__(self, rows: Array) -> Array:
+        """Rows (N,) or (N, k)."""
+        rows = rows / _beside(self.spreads, rows)
+        if self.kept is None or self.new is None:
             return rows
-        steps = np.maximum(np.rint(np.diff(t) / self.interval), 1.0)
-        keep = self.rho ** steps
-        left = np.sqrt(1 - keep**2)
-        if rows.ndim == 2:
-            keep, left = keep[:, None], left[:, None]
-        rest = (rows[1:] - keep * rows[:-1]) / left
-        return np.concatenate([rows[:1], rest])
+        found = np.empty_like(rows)
+        found[:1] = rows[:1]
+        np.subtract(rows[1:], _beside(self.kept, rows) * rows[:-1], out=found[1:])
+        found[1:] /= _beside(self.new, rows)
+        return found
+
+
+def _beside(values: Array, rows: Array) -> Array:
+    """Values (N,) as they multiply rows (N,) or (N, k)."""
+    return values[:, None] if rows.ndim == 2 else values
 
 
 def estimate(channel: Channel, quiet: tuple[float, float] | None = None,

@@ -9,7 +9,7 @@ J. P. Sethna, arXiv:1201.5885, from the step that failed).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -58,11 +58,10 @@ class Minimum:
     r: np.ndarray
     J: np.ndarray
     converged: bool
+    chi2: float = field(init=False)
 
-    @property
-    def chi2(self) -> float:
-        """Sum of squares."""
-        return float(self.r @ self.r)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "chi2", float(self.r @ self.r))  # asked for again and again
 
     def pinned(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         """(n,) whether a bound (n,) holds a parameter, at it or so close that the way to it hardly

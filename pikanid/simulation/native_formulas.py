@@ -23,6 +23,7 @@ _TWO = (ops.ADD, ops.MUL, ops.DIV, ops.POSITIVE_POWER, ops.POWER_SLOPE, ops.POWE
 _TURNED = {ops.SIN: ops.COS, ops.COS: ops.SIN, ops.SINH: ops.COSH, ops.COSH: ops.SINH}
 _NAN = "0x7FF8000000000000"
 _STEEP = "0x3EB0C6F7A0B5ED8D"  # 1e-6
+_MULTIPLIED = 8  # numerical: exponents up to which products take less time than a power
 
 
 def reached(tape: Tape, seeds: set[int]) -> set[int]:
@@ -37,10 +38,14 @@ def reached(tape: Tape, seeds: set[int]) -> set[int]:
 
 def values(w: Writer, tape: Tape, group: str, known: Known) -> None:
     """Compute a group; `known` gains what it needs and what it computes."""
+    whole = _whole(tape)
     for op, i, j, o in tape.code[group].tolist():
         for k in (i, j) if op in _TWO else (i,):
             _loaded(w, known, k)
-        known[o] = _value(w, op, known[i], known.get(j, ""))
+        if op in (ops.POSITIVE_POWER, ops.POWER_SLOPE) and j in whole:
+            known[o] = _positive(w, known[i], whole[j], slope=op == ops.POWER_SLOPE)
+        else:
+            known[o] = _value(w, op, known[i], known.get(j, ""))
 
 
 def results(w: Writer, tape: Tape, group: str, known: Known) -> list[str]:
@@ -66,7 +71,8 @@ def tangents(w: Writer, tape: Tape, group: str, live: set[int], lanes: int, know
             return value(there[op, i])
         return w.call(_CALLED[op], value(i))
 
-    slopes = [_slopes(w, line, live, value, turned) for line in code]
+    whole = _whole(tape)
+    slopes = [_slopes(w, line, live, value, turned, whole) for line in code]
     for first, width in blocks(lanes):
         kind, wide = f"<{width} x double>", dict[str, str]()
         for (op, _, _, o), by in zip(code, slopes, strict=True):
@@ -86,6 +92,23 @@ def _loaded(w: Writer, known: Known, k: int) -> str:
     if k not in known:
         known[k] = w.load("r", k)
     return known[k]
+
+
+def _whole(tape: Tape) -> dict[int, int]:
+    """The registers of constants that are small whole numbers, from one on."""
+    return {k: int(n) for k, n in zip(*(found.tolist() for found in tape.constants), strict=True)
+            if n in range(1, _MULTIPLIED + 1)}
+
+
+def _positive(w: Writer, x: str, n: int, slope: bool) -> str:
+    """`positive_power`, or `power_slope`, of a small whole exponent: products instead of calls."""
+    if n == 1 and slope:
+        return "1.0"
+    above = w.where(x, "ole", "0.0", "0.0", x)
+    found = above
+    for _ in range(n - 1 - slope):
+        found = w.op("fmul", found, above)
+    return w.op("fmul", f"{n}.0", found) if slope else found
 
 
 def _value(w: Writer, op: int, x: str, y: str) -> str:
@@ -110,10 +133,12 @@ def _value(w: Writer, op: int, x: str, y: str) -> str:
 
 
 def _slopes(w: Writer, line: list[int], live: set[int], value: Callable[[int], str],
-            turned: Callable[[int, int], str]) -> list[tuple[int, str]]:
+            turned: Callable[[int, int], str], whole: dict[int, int]) -> list[tuple[int, str]]:
     """Those arguments of an operation that move, with its partial derivatives; "" stands for one.
     """
     op, i, j, _ = line
+    if op == ops.POSITIVE_POWER and j in whole:
+        return [(i, _positive(w, value(i), whole[j], slope=True))] if i in live else []
     first = [(i, _by_first(w, line, value, turned))] if i in live else []
     second = [(j, _by_second(w, line, value))] if op in _TWO and j in live else []
     return first + second
@@ -185,8 +210,9 @@ def _slope(w: Writer, op: int, x: str, value: str) -> str:
     return w.op("fdiv", "1.0" if op == ops.ASIN else "-1.0", root)
 
 
+# that they change nothing lets the sine and the cosine of an angle be one call
 DECLARED = "\n".join([
-    *(f"declare double @{name}(double)" for name in (
+    *(f"declare double @{name}(double) nounwind readnone" for name in (
         *_CALLED.values(), *(name for name, *_ in _INSIDE.values()), "llvm.fabs.f64")),
     "declare double @pow(double, double)", "declare double @atan2(double, double)"])
 HELPERS = {"log_abs": """

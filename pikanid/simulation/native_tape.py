@@ -152,7 +152,7 @@ def _compiled(text: str) -> bytes:
 
     triple, cpu, features = processor()
     machine = binding.Target.from_triple(triple).create_target_machine(
-        opt=1, cpu=cpu, features=features)
+        opt=2, cpu=cpu, features=features)
     return bytes(machine.emit_object(binding.parse_assembly(text)))
 
 

@@ -15,7 +15,7 @@ import sympy as sp
 
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
-from pikanid.simulation.layout import STEEP
+from pikanid.simulation import numpy_functions
 from pikanid.simulation.lowering import LoweredModel, lower_model, spline_value, switch_symbol
 from pikanid.simulation.structure import Structure
 from pikanid.simulation.tape import can_run, tape
@@ -58,6 +58,13 @@ class VectorField:
         """∂f/∂x (M, n, n) and ∂f/∂p (M, n, P)."""
         return self._functions.jacobians(t, x, u, p, "f")
 
+    def rhs_by(self, name: str, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
+               ) -> np.ndarray:
+        """∂f/∂p (M, n) by one parameter: of a model that is used once, all take far longer to write
+        than to evaluate.
+        """
+        return self._functions.by_parameter(name)(t, x, u, p)
+
     def linearised_rhs(self, rows: Sequence[int], free: Sequence[int]) -> Linearised:
         """E `rows` of f with ∂f/∂x and with ∂f/∂p by the `free` ones."""
         return self._functions.linearised("f", tuple(rows), tuple(free))
@@ -88,6 +95,7 @@ class _Functions:
         self.exprs = exprs
         self._values: dict[str, Callable[..., np.ndarray]] = {}
         self._tables: dict[str, Any] = {}
+        self._slopes: dict[str, Callable[..., np.ndarray]] = {}
         self._plans: dict[tuple[str, tuple[int, ...], tuple[int, ...]], Linearised] = {}
 
     def arguments(self, t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray
@@ -105,9 +113,10 @@ class _Functions:
                 for k, g in enumerate(self.lowered.switches)]
 
     def _lambdify(self, arguments: Sequence[sp.Symbol], exprs: Sequence[sp.Expr]) -> Any:
-        tools = {"positive_power": _positive_power, "power_slope": _power_slope,
-                 "log_abs": _log_abs,
-                 "spline_value": _Splines(self.model, list(arguments))}
+        tools = {"positive_power": numpy_functions.positive_power,
+                 "power_slope": numpy_functions.power_slope,
+                 "log_abs": numpy_functions.log_abs,
+                 "spline_value": numpy_functions.SplineValues(self.model)}
         atoms = sorted(set().union(*(e.atoms(spline_value) for e in exprs)),
                        key=sp.default_sort_key)
         coefficients = {c for a in atoms
@@ -131,13 +140,22 @@ class _Functions:
             self._values[name] = self._vector(self.exprs[name])
         return self._values[name]
 
+    def by_parameter(self, name: str) -> Callable[..., np.ndarray]:
+        """∂f/∂p by the parameter of that name as a function."""
+        if name not in self._slopes:
+            self._slopes[name] = self._vector([e.diff(symbol(name)) for e in self.exprs["f"]])
+        return self._slopes[name]
+
     def _vector(self, exprs: Sequence[sp.Expr]) -> Callable[..., np.ndarray]:
-        function = self._lambdify(self.all_symbols, [*exprs, sp.Integer(0)])
+        signed = any(e.has(*self.switches) for e in exprs) if self.switches else False
+        symbols = self.all_symbols if signed else [TIME, *self.x, *self.u, *self.p]
+        function = self._lambdify(symbols, [*exprs, sp.Integer(0)])
 
         def evaluate(t: np.ndarray, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
             with np.errstate(all="ignore"):
-                columns = function(*self.arguments(t, x, u, p))[:-1]
-            return _columns(columns, len(t))
+                given = self.arguments(t, x, u, p) if signed else [t, *x.T, *u.T, *p]
+                found = function(*given)[:-1]
+            return numpy_functions.columns(found, len(t))
 
         return evaluate
 
@@ -241,55 +259,11 @@ class Linearised:
                 continue
             spline = model.splines[index]
             first = model.parameter_names.index(spline.coefficient_names[0])
-            basis = _basis(spline.knots, spline.degree, np.broadcast_to(z, (count,)), order)
+            basis = numpy_functions.basis(
+                spline.knots, spline.degree, np.broadcast_to(z, (count,)), order)
             own = [k for k in range(spline.size) if first + k in self._column_at]
             jp[:, self._row_at[row], [self._column_at[first + k] for k in own]] += np.reshape(
                 np.broadcast_to(weight, (count,)), (-1, 1)) * basis[:, own]
-
-
-class _Splines:
-    """NumPy evaluation of a model's spline functions from coefficients passed as arguments."""
-
-    def __init__(self, model: Model, arguments: Sequence[sp.Symbol]):
-        self.model = model
-
-    def __call__(self, index: int, order: int, z: np.ndarray, *coefficients: float) -> np.ndarray:
-        spline = self.model.splines[int(index)]
-        return _basis(spline.knots, spline.degree, np.atleast_1d(z), int(order)) @ np.array(
-            coefficients)
-
-
-def _columns(values: Sequence[Any], count: int) -> np.ndarray:
-    """Arrays (M,) and constants side by side (M, len(values))."""
-    out = np.empty((count, len(values)), dtype=np.result_type(float, *values))
-    for k, value in enumerate(values):
-        out[:, k] = value
-    return out
-
-
-def _basis(knots: Sequence[float], degree: int, z: np.ndarray, order: int) -> np.ndarray:
-    from scipy.interpolate import BSpline
-
-    size = len(knots) - degree - 1
-    spline = BSpline(np.asarray(knots, float), np.eye(size), degree, extrapolate=True)
-    return spline(z, nu=order)
-
-
-def _positive_power(base: np.ndarray, n: np.ndarray) -> np.ndarray:
-    with np.errstate(all="ignore"):
-        return np.where(np.asarray(base) > 0, np.power(np.maximum(base, 0.0), n),
-                        np.where(np.asarray(n) == 0, 1.0, 0.0))
-
-
-def _power_slope(base: np.ndarray, n: np.ndarray) -> np.ndarray:
-    with np.errstate(all="ignore"):
-        steep = (np.asarray(n) < 1) & (np.asarray(base) < STEEP)
-        return np.where(steep, 0.0, n * _positive_power(base, np.asarray(n) - 1))
-
-
-def _log_abs(x: np.ndarray) -> np.ndarray:
-    with np.errstate(all="ignore"):
-        return np.where(np.asarray(x) == 0, 0.0, np.log(np.abs(x)))
 
 
 @functools.lru_cache(maxsize=256)

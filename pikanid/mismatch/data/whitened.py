@@ -130,7 +130,13 @@ class Whitened:
         # errors of the last choice of steps, and what is allowed of each where nothing is left [σ]
         self.weighed: list[tuple[float, float]] = []
         self.rows = self.problem.n_samples
-        self.sigma = [self._sigmas(r) for r in range(len(self.simulators))]
+        self._measured = [np.concatenate([s.y for s in e.samples])
+                          for e in self.problem.experiments]
+        self._whitening = [
+            [found[model.outputs[s.output].name].whitening(s.t, s.sigma) for s in e.samples]
+            for e, found in zip(self.problem.experiments, records.levels, strict=True)]
+        # σ (rows,) of every sample of each recording, in the units of its outputs
+        self.sigma = [np.concatenate([w.spreads for w in own]) for own in self._whitening]
         self.work = 0.0
         self._counted: np.ndarray | None = None  # where the last simulation was counted already
 
@@ -186,12 +192,6 @@ class Whitened:
     def _weigh(self, steps: Steps | None, usual: float) -> None:
         if steps is not None:
             self.weighed.append((steps.error, usual))
-
-    def _sigmas(self, r: int) -> np.ndarray:
-        """σ (rows,) of every sample of recording r, in the unit of its output."""
-        levels, outputs = self.records.levels[r], self.problem.model.outputs
-        return np.concatenate([levels[outputs[s.output].name].spreads(s.sigma, len(s.t))
-                               for s in self.problem.experiments[r].samples])
 
     def _steps(self, r: int, theta: np.ndarray, allowed: float, finest: int) -> Steps | None:
         try:
@@ -281,14 +281,13 @@ class Whitened:
 
     def measured(self, r: int) -> np.ndarray:
         """All samples of recording r (rows,)."""
-        return np.concatenate([s.y for s in self.problem.experiments[r].samples])
+        return self._measured[r]
 
     def whiten(self, r: int, rows: np.ndarray) -> np.ndarray:
         """Rows (rows,) or (rows, k) of recording r as white noise of unit variance."""
-        out, first = np.empty_like(rows), 0
-        for s in self.problem.experiments[r].samples:
-            level = self.records.levels[r][self.problem.model.outputs[s.output].name]
-            part = slice(first, first + len(s.t))
-            out[part] = level.whiten(rows[part], s.t, s.sigma)
-            first += len(s.t)
-        return out
+        first, *more = self._whitening[r]
+        if not more:
+            return first(rows)
+        ends = np.cumsum([len(w.spreads) for w in self._whitening[r]])[:-1]
+        return np.concatenate([w(part) for w, part in zip(
+            self._whitening[r], np.split(rows, ends), strict=True)])

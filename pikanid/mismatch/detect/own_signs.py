@@ -43,15 +43,14 @@ def equations_alone(model: Model, candidate: Candidate) -> bool | None:
 def added_forces(model: Model, candidate: Candidate, at: Along) -> list[np.ndarray]:
     """∂f/∂size (L, n) at no effect, at each of the candidate's probes."""
     extended = with_parts(candidate.applied(model))
-    size, rows = candidate.parameters[0], range(len(extended.states))
+    size = candidate.parameters[0]
     field = VectorField(extended)
     found = []
     for probe in candidate.probes:
         values = {**extended.values, **dict(zip(model.parameter_names, at.p, strict=True)),
                   **probe, size.name: size.value}
         p = np.array([values[n] for n in extended.parameter_names])
-        found.append(field.rhs_jacobians(at.t, at.x, at.u, p)[1][
-            :, rows, extended.parameter_names.index(size.name)])
+        found.append(field.rhs_by(size.name, at.t, at.x, at.u, p))
     return found
 
 

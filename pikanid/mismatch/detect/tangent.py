@@ -255,7 +255,6 @@ class Tangent:
         if site.suffix not in self.levers:
             one = Parameter(site.name("unit_force"), 0.0, site.force_unit)
             pushed = self.model.with_parameters(one)
-            slopes = VectorField(site.pushed(pushed, one.name)).rhs_jacobians(
-                self.t, self.x, self.u, np.append(self.p, 0.0))[1]
-            self.levers[site.suffix] = slopes[:, :, -1]
+            self.levers[site.suffix] = VectorField(site.pushed(pushed, one.name)).rhs_by(
+                one.name, self.t, self.x, self.u, np.append(self.p, 0.0))
         return self.levers[site.suffix]
