@@ -160,3 +160,10 @@ def test_noise_is_no_louder_than_what_a_fit_leaves() -> None:
     found = {name: refined(level, Channel("y", t, values, "rad"), t, values, 30.0, None, DEFAULTS)
              for name, values in (("white", white), ("slow", slow), ("dull", dull))}
     assert max(found["white"].excess, found["slow"].excess) < 0.15 < 0.5 < found["dull"].excess
+
+
+def test_a_quiet_stretch_as_long_as_the_recording_is_refused() -> None:
+    train = pk.simulate(motor(), pk.Recording.from_arrays(
+        0.01 * np.arange(300), {"u": np.ones(300)}, units={"u": "V"}), sigma=0.1)
+    with pytest.raises(pk.errors.BadSetting, match="until 5 s, and a recording ends at 2"):
+        pk.diagnose(motor(), train, quiet=(0.0, 5.0))

@@ -46,6 +46,11 @@ def not_a_range(text: str, example: str) -> str:
     return f"{short(text)!r} is no range: give two values with a colon between them, as {example}."
 
 
+def quiet_throughout(end: float, stop: float) -> str:
+    return (f"The quiet stretch lasts until {end:g} s, and a recording ends at {stop:g} s: nothing "
+            "would move in it.  Give a shorter one (--quiet-until).")
+
+
 def no_room_for_profile(duration: float, quiet: float, frequency: float, dt: float) -> str:
     return (f"No profile fits into {duration:g} s with {quiet:g} s of rest and samples every "
             f"{dt:g} s for motion at {frequency:.3g} Hz: leave four periods of it, and "

@@ -72,7 +72,8 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         BadModel: No state reaches an output, or nothing is free.
         BadRecording: A channel is missing or unusable; there are too few samples; train and
             held-out are the same.
-        BadSetting: alpha is no probability, settings are none, or workers is not positive.
+        BadSetting: alpha is no probability, settings are none, workers is not positive, or a
+            recording ends within the quiet stretch.
         SimulationFailed: The model cannot be simulated, or not as exactly as the noise asks.
 
     >>> import pikanid as pk
@@ -92,6 +93,8 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         raise errors.BadSetting(errors.bad_value("workers", workers, "at least 1"))
     if not a_model(model).free_names:
         raise errors.BadModel(errors.nothing_free(model.name))
+    if quiet is not None and (stop := min(r.stop for r in several(train))) <= quiet[1]:
+        raise errors.BadSetting(errors.quiet_throughout(quiet[1], stop))
     later = None if held_out is None else several(held_out)
     with blas_on_one_thread():
         opened = partial(open_case, model, tell=tell, settings=settings,

@@ -40,8 +40,9 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
     best = answer.given[0] if answer.given else case.base
     counts = _overdispersion(case, answer)
-    before = case.before if answer.verdict == "none" else widened(
-        case.before, overdispersion([case.base]))
+    # its standard errors count the colour of the noise, which those of plain least squares do not
+    before = widened(as_estimate(case.base, case.before),
+                     1.0 if answer.verdict == "none" else overdispersion([case.base]))
     apart = (answer.part.spread if answer.part is not None else
              spread(best, answer.given) if len(answer.given) > 1 else {})
     after = widened(as_estimate(best, case.before), counts, apart) if answer.given else before
