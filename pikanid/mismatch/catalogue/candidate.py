@@ -136,7 +136,7 @@ class Candidate:
             what it adds to the model; its `directions` then say no more than where a fit begins.
         undoes: Id of effects on the same channel that it is the contrary of.
         begins: Names of its parameters that only say how a recording begins; without them that is
-            an assumption, which costs no evidence either.
+            assumed.
     """
 
     ids: tuple[str, ...]

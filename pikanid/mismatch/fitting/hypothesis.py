@@ -159,6 +159,11 @@ class Hypothesis:
         return {f.name: float(v) for f, v in zip(self.whitened.problem.free, np.sqrt(np.diag(
             self.covariance)), strict=True)}
 
+    @property
+    def assumed(self) -> float:
+        """The penalty for parameters that only say how a recording begins: others assume that."""
+        return sum(len(e.begins) for e in self.effects) * float(np.log(max(self.whitened.rows, 1)))
+
     def improves_on(self, known: Hypothesis) -> bool:
         """Whether it is closer than another fit of the same effects, by more than fits stop at."""
         chi2, rows = known.minimum.chi2, max(known.whitened.rows, 1)
@@ -227,7 +232,7 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         best = renewed(whitened, best, closest, limit, beyond)
     if best is None:
         return None
-    free = sum(max(len(e.parameters) - len(e.begins), 1) for e in effects)
+    free = sum(max(len(e.parameters), 1) for e in effects)
     penalty = price(free, len(effects), whitened.rows, choices, records.settings.choice_weight)
     found = Hypothesis(tuple(effects), model, whitened, best, penalty)
     for otherwise in (turned, read_otherwise):

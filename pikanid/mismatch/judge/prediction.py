@@ -134,8 +134,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
     sized = np.concatenate([g / sigma for g, sigma in zip(gaps, whitened.sigma, strict=True)])
     return HeldOut(_rmse(residuals), float(np.sqrt(np.mean(sized**2))), tests, together, chi2,
                    chi2 + room(found.J, shared, fit, functools.partial(
-                       elsewhere, prior, hypothesis, found.theta[shared]),
-                       sum(f.name in e.begins for f in free for e in effects)),
+                       elsewhere, prior, hypothesis, found.theta[shared])),
                    samples.t, samples.y, predicted, moved, _rmse(_residuals(whitened, closer)),
                    residuals, found.r[: whitened.rows], _inert(whitened, found, nominal),
                    _motion(whitened, gaps))

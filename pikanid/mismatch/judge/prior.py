@@ -86,7 +86,7 @@ def _linearised(theta: np.ndarray, J: np.ndarray, r: np.ndarray, inside: tuple[i
 
 
 def room(J: np.ndarray, shared: Sequence[int], fit: Prior,
-         there: Callable[[], Prior | None] = lambda: None, given: int = 0) -> float:
+         there: Callable[[], Prior | None] = lambda: None) -> float:
     """What the parameters' uncertainty costs of the probability density of a recording.
 
     Shared ones: the logarithm of how much narrower the recording makes what a fit has left of them.
@@ -100,7 +100,6 @@ def room(J: np.ndarray, shared: Sequence[int], fit: Prior,
         shared: Places (n,) of the parameters that both have.
         fit: What a fit says, at its estimates.
         there: What it says where J was taken.
-        given: How many of the others are no choice: others assume them unasked.
     """
     own = [k for k in range(J.shape[1]) if k not in shared]
 
@@ -116,7 +115,7 @@ def room(J: np.ndarray, shared: Sequence[int], fit: Prior,
         both[len(J) - len(shared):] = 0.0
         both[len(J) - len(shared):, shared] = other.root
         cost = min(cost, narrower(both, other))
-    return cost + (len(own) - given) * float(np.log(len(J)))
+    return cost + len(own) * float(np.log(len(J)))
 
 
 def _volume(J: np.ndarray) -> float:

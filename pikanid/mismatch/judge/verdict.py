@@ -73,7 +73,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     if not tried or not below(tried[0].score(scale), base.score(scale)):
         return Answer("unnamed", (), tuple(tried[:3]))
     lowest = min(_handicapped(h, scale, asks) for h in tried)
-    close = [h for h in tried if below(h.score(scale), lowest + within)][:budget.tested]
+    close = [h for h in tried
+             if below(h.score(scale) - h.assumed, lowest + within)][:budget.tested]
     near = integer_laws(close, asks)
     for h in (h for h in close if h not in near):
         spare[h.key] = "its exponent is a whole number: that law has a name of its own"
@@ -286,7 +287,9 @@ def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
     """Without those that predict the held-out recording clearly worse than another does."""
     found = {h.key: total(h) for h in given}
     best = min(found.values())
-    kept = [h for h in given if below(found[h.key] - _handicap(h, asks), best + asks.indistinct)]
+    # what says how recordings begin costs in the one and in the other
+    kept = [h for h in given if below(
+        found[h.key] - _handicap(h, asks) - 2 * h.assumed, best + asks.indistinct)]
     for h in given:
         if h not in kept:
             reasons[h.key] = "predicts the held-out recording worse"
