@@ -25,9 +25,9 @@ def driven(about: float, seed: int = 0) -> pk.Recording:
     return pk.Recording.from_arrays(0.05 * np.arange(400), {"u": u}, units={"u": "V"})
 
 
-def called(name: str, *recordings: pk.Recording) -> Candidate:
+def called(name: str, *recordings: pk.Recording, channel: str = "input") -> Candidate:
     return next(c for c in candidates(sites(MODEL, recordings))
-                if c.ids == (name,) and c.channel == "input")
+                if c.ids == (name,) and c.channel == channel)
 
 
 @pytest.mark.parametrize("name", ["actuator_lag", "hysteresis"])
@@ -58,3 +58,17 @@ def test_each_recording_begins_by_itself() -> None:
     est = pk.NLS().fit(model.with_values(tau_a=0.1), made)
     for name, of, true in (("tau_a", None, 0.3), ("d_lag", 0, 1.0), ("d_lag", 1, -0.5)):
         assert abs(est.value(name, of) - true) < 4 * est.std(name, of) < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["actuator_lag", "sensor_lag"])
+def test_a_beginning_that_nobody_knows_decides_nothing(name: str) -> None:
+    """Where an actuator may begin anywhere, its lag and one of the sensor do about as well."""
+    lag = called(name, driven(2.0), channel="input" if name == "actuator_lag" else "sensor")
+    truth = lag.applied(MODEL).with_values(
+        **{lag.parameters[0].name: 0.3, **({"d_lag": -1.0} if name == "actuator_lag" else {})})
+    train, later = (pk.simulate(truth, driven(2.0, seed), sigma=0.01, seed=seed)
+                    for seed in (1, 2))
+    dx = pk.diagnose(MODEL, train, later)
+    assert dx.verdict in ("named", "set")
+    assert any(name in e.ids for h in dx.hypotheses for e in h.effects)

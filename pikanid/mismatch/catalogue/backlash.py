@@ -44,9 +44,10 @@ def _behind(site: Site, u: str) -> Candidate:
                                               scales=False))
         return found
 
+    first = f", {begun.name} half plays above it at first" if operating else ""
     return Candidate(
-        ("hysteresis",), "backlash of the input", f"{u} behind a play of ±{half.name}", "input",
-        site, (half, begun) if operating else (half,), lambda m: m.map_input(
+        ("hysteresis",), "backlash of the input", f"{u} behind a play of ±{half.name}{first}",
+        "input", site, (half, begun) if operating else (half,), lambda m: m.map_input(
             u, backlash=half.name, backlash_start=begun.name if operating else None), directions,
         ",".join(filter(None, ("backlash", site.variant(u)))),
         begins=(begun.name,) if operating else ())

@@ -185,7 +185,8 @@ def lags(site: Site) -> list[Candidate]:
                      f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name)
         # in operation an actuator is not in balance with what it is told at first
         found.append(replace(
-            lag, parameters=(t_u, begun), extend=partial(_behind, u, t_u.name, begun.name),
+            lag, parameters=(t_u, begun),
+            expression=f"{lag.expression}, {begun.name} above it at first", extend=partial(_behind, u, t_u.name, begun.name),
             begins=(begun.name,))
             if u in site.operating else lag)
     return found
