@@ -186,8 +186,8 @@ def lags(site: Site) -> list[Candidate]:
         # in operation an actuator is not in balance with what it is told at first
         found.append(replace(
             lag, parameters=(t_u, begun),
-            expression=f"{lag.expression}, {begun.name} above it at first", extend=partial(_behind, u, t_u.name, begun.name),
-            begins=(begun.name,))
+            expression=f"{lag.expression}, {begun.name} above it at first",
+            extend=partial(_behind, u, t_u.name, begun.name), begins=(begun.name,))
             if u in site.operating else lag)
     return found
 

@@ -83,9 +83,7 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     names = titles_apart(given)
     text = f"To tell {' from '.join(names)}: "
     if len(driven) != 1 or not rate > 0:
-        return text + ("let it move freely from starts at least three times apart, and long."
-                       if rate > 0 else "record it from initial values at least three times apart, "
-                       "until all is steady.")
+        return f"{text}record {explore(bool(driven), rate)}."
     models = {name: e.model for name, e in zip(names, given, strict=True)}
     found = _best(models, records, driven[0], rate, workers)
     if found is None:
