@@ -213,13 +213,13 @@ def test_symbols_from_elsewhere_become_the_models_own() -> None:
                                   signed_power(X, 1.5), clip(X, -1, 2), clip(X * Y, -0.2, 0.3),
                                   clip(X, -Y, Y), log_abs(X) * Y])
 def test_derivatives_of_own_functions_agree_with_differences(expr: sp.Expr) -> None:
-    from pikanid.simulation.vectorfield import _log_abs
+    from pikanid.simulation import numpy_functions
 
     def power(a: float, n: float) -> float:
         return abs(a) ** n
 
     tools = {"abs_power": power, "signed_power": lambda a, n: np.sign(a) * power(a, n),
-             "clip": lambda a, lo, hi: min(max(a, lo), hi), "log_abs": _log_abs}
+             "clip": lambda a, lo, hi: min(max(a, lo), hi), "log_abs": numpy_functions.log_abs}
     value = sp.lambdify([X, Y], expr, [tools, "numpy"])
     for q, shift in ((X, (1, 0)), (Y, (0, 1))):
         slope = sp.lambdify([X, Y], expr.diff(q), [tools, "numpy"])

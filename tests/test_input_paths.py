@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from random import Random
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -192,9 +190,7 @@ def test_recorded_rates_below_the_limit_change_nothing() -> None:
 
 
 def test_a_play_wider_than_the_input_leaves_nothing_to_look_for_in_it() -> None:
-    level = cast(NoiseModel, SimpleNamespace(
-        sigma=0.002, whiten=lambda r, t, given=None: r,
-        spreads=lambda given, n: np.full(n, 0.002)))
+    level = NoiseModel(0.002, 0.0, 0.0, 0.01, "given")
     records = Records((pk.simulate(loose(), wandering(), sigma=0.002, seed=1),),
                       ({"theta": level},), DEFAULTS)
     model = loose().with_values(b=9.0)

@@ -183,12 +183,14 @@ def lags(site: Site) -> list[Candidate]:
 
         lag = _input(site, u, "actuator_lag", "a lag of the actuator", (t_u,),
                      f"{u} behind a lag {t_u.name}", pushed, "lag", lag=t_u.name)
-        # in operation an actuator is not in balance with what it is told at first
-        found.append(replace(
-            lag, parameters=(t_u, begun),
-            expression=f"{lag.expression}, {begun.name} above it at first",
-            extend=partial(_behind, u, t_u.name, begun.name), begins=(begun.name,))
-            if u in site.operating else lag)
+        found.append(lag)
+        if u in site.operating:
+            # an actuator need not be in balance with what it is told at first
+            found.append(replace(
+                lag, parameters=(t_u, begun), variant=",".join(filter(None, (
+                    "begun", lag.variant))), covers={lag.key: {begun.name: 0.0}},
+                expression=f"{lag.expression}, {begun.name} above it at first",
+                extend=partial(_behind, u, t_u.name, begun.name), begins=(begun.name,)))
     return found
 
 
