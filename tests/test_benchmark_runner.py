@@ -181,7 +181,7 @@ def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
                 [sys.executable, "-m", f"distributed.cli.dask_{module}", *options, *more],
                 stdout=log, stderr=log, env={**os.environ, "PYTHONPATH": path}))
             for _ in range(300):
-                if said.exists():
+                if said.exists() and said.stat().st_size:  # it is there before it is written
                     break
                 time.sleep(0.1)
         try:
