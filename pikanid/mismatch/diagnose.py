@@ -93,17 +93,18 @@ def diagnose(model: Model, train: Recordings, held_out: Recordings | None = None
         raise errors.BadSetting(errors.bad_value("workers", workers, "at least 1"))
     if not a_model(model).free_names:
         raise errors.BadModel(errors.nothing_free(model.name))
-    if quiet is not None and (stop := min(r.stop for r in several(train))) <= quiet[1]:
+    recordings = several(train)
+    if quiet is not None and (stop := min(r.stop for r in recordings)) <= quiet[1]:
         raise errors.BadSetting(errors.quiet_throughout(quiet[1], stop))
     later = None if held_out is None else several(held_out)
     with blas_on_one_thread():
         opened = partial(open_case, model, tell=tell, settings=settings,
                          workers=threads(workers, settings.budget.threads))
-        case = opened(several(train), later, quiet)
+        case = opened(recordings, later, quiet)
         found = _diagnosed(case, quiet, tell)
         if later is not None and case.proves and found.verdict not in SURE:
             tell("recordings exchanged")
-            found = _exchanged(case, partial(opened, later, several(train), None), tell) or found
+            found = _exchanged(case, partial(opened, later, recordings, None), tell) or found
     return replace(found, seconds=time.perf_counter() - begun)
 
 

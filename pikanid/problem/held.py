@@ -152,6 +152,13 @@ class Acting(NamedTuple):
     open: PiecewiseInput
     ramp: PiecewiseInput
 
+    def parts(self, half: float, rate: float = np.inf, start: float = np.nan
+              ) -> list[tuple[PiecewiseInput, float]]:
+        """The signals, each with what it is multiplied by in v."""
+        return [(self.carrier, 1.0), (self.side, half),
+                (self.open, half * start if np.isfinite(start) else 0.0),
+                (self.ramp, rate if np.isfinite(rate) else 0.0)]
+
 
 def acting(held: HeldInput, half: float | None = None, rate: float = np.inf,
            start: float = np.nan) -> Acting:
@@ -182,7 +189,7 @@ def acting(held: HeldInput, half: float | None = None, rate: float = np.inf,
         slopes[:-1] = np.diff(u) / np.diff(held.time)
     knots, carrier, rates, side = np.asarray(held.time, float), u, slopes, np.zeros(len(u))
     ramp = ramp_rates = untouched = moves = shifts = np.zeros(len(u))
-    begins = min(max(float(start), -1.0), 1.0)
+    begins = float(np.clip(start, -1.0, 1.0))
     if half is not None:
         knots, carrier, rates, side, untouched, moves, shifts = play(
             knots, carrier, rates, float(half), begins)
@@ -190,7 +197,7 @@ def acting(held: HeldInput, half: float | None = None, rate: float = np.inf,
     if np.isfinite(rate):
         knots, carrier, rates, side, ramp, ramp_rates, untouched = limited(
             knots, carrier, rates, side, untouched, moves, shifts, float(half or 0.0), float(rate))
-    if begins == begins:
+    if np.isfinite(begins):
         side = side - begins * untouched
     still = np.zeros(len(knots))
     return Acting(PiecewiseInput(knots, carrier, rates), PiecewiseInput(knots, side, still),

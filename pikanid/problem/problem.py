@@ -87,13 +87,9 @@ class Experiment:
         found: list[list[tuple[HeldInput | PiecewiseInput, float]]] = []
         for held, item, half, rate, start in zip(self.held, self.model.inputs,
                                                  *paths(self.model, values), strict=True):
-            if not item.shaped:
-                found.append([(held, 1.0)])
-                continue
-            acts = acting(held, None if item.backlash == 0 else half, rate, start)
-            begins = half * start if np.isfinite(start) else 0.0
-            found.append([(acts.carrier, 1.0), (acts.side, half), (acts.open, begins),
-                          (acts.ramp, rate if np.isfinite(rate) else 0.0)])
+            play = None if item.backlash == 0 else half
+            found.append([*acting(held, play, rate, start).parts(half, rate, start)]
+                         if item.shaped else [(held, 1.0)])
         return found
 
     def initial(self, p: np.ndarray) -> np.ndarray:

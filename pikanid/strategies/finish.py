@@ -41,12 +41,13 @@ def finish(strategy: str, problem: Problem, shooting: Shooting, theta: np.ndarra
     scale = float(r @ r) / adequacy.dof if adequacy.source != "given" else 1.0
     at_bound = met(theta, problem.lower, problem.upper)
     shown = Directions.of(jacobian, ~at_bound)
-    cov = shown.covariance * scale
-    covariance = cov if covariance is None else covariance
-    if at_bound.any():
-        cov, covariance = (
-            with_bounds(c, jacobian / scale**0.5, r / scale**0.5, theta, problem.lower,
-                        problem.upper, at_bound) for c in (cov, covariance))
+
+    def wider(known: np.ndarray) -> np.ndarray:
+        return with_bounds(known, jacobian / scale**0.5, r / scale**0.5, theta, problem.lower,
+                           problem.upper, at_bound) if at_bound.any() else known
+
+    cov = wider(shown.covariance * scale)
+    covariance = cov if covariance is None else wider(covariance)
     fits, trajectories = evaluate(problem, shooting, theta, covariance)
     notes = [*warnings, *problem.model.unit_disagreements]
     if not converged:

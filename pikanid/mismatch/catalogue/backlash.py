@@ -34,13 +34,10 @@ def _behind(site: Site, u: str) -> Candidate:
         found = []
         for size in top * np.array(SIZES) if top else ():
             for start in STARTS if operating else (np.nan,):
-                acts = acting(d, size, start=start)
-                moved = acts.carrier.at(view.t) + size * acts.side.at(view.t)
-                point = {half.name: float(size)}
-                if operating:
-                    moved += start * size * acts.open.at(view.t)
-                    point[begun.name] = start
-                found.append(TangentDirection(point, push={u: moved - d.values}, one_sided=True,
+                acts = acting(d, size, start=start).parts(size, start=start)
+                moved = sum((factor * part.at(view.t) for part, factor in acts), -d.values)
+                point = {half.name: float(size)} | ({begun.name: start} if operating else {})
+                found.append(TangentDirection(point, push={u: moved}, one_sided=True,
                                               scales=False))
         return found
 
