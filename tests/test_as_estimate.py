@@ -8,7 +8,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.as_estimate import as_estimate
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 from pikanid.strategies.nls import NLS

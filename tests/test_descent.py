@@ -14,7 +14,8 @@ from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.descent import descended
 from pikanid.mismatch.fitting.extended import extended
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, read_otherwise, turned
+from pikanid.mismatch.fitting.fit import fitted, read_otherwise, turned
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.screen import Screen, law
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case

@@ -10,7 +10,8 @@ import pytest
 
 import pikanid as pk
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.loosened import loosened
 from pikanid.mismatch.judge.doubt import why_not
 from pikanid.mismatch.settings.settings import DEFAULTS

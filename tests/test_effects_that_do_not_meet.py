@@ -13,7 +13,7 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.detect.tangent import directions
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 

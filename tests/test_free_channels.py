@@ -8,7 +8,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.beyond.free_channels import _left, sure_channels
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import Model, systems

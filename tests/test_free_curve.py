@@ -18,7 +18,8 @@ from pikanid.mismatch.beyond.patch import FreeCurve
 from pikanid.mismatch.catalogue.channels import sensor_nonlinearity
 from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.whitened import Records
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 

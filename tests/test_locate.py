@@ -9,7 +9,8 @@ import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.whitened import Records
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.settings.settings import DEFAULTS

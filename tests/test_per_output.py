@@ -12,7 +12,7 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.whitened import Records
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.report.findings import OutputError, Proof
 from pikanid.mismatch.report.locate import affected, loud_windows

@@ -12,7 +12,7 @@ import pikanid as pk
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.extended import extended
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.lowest import lowest
 from pikanid.mismatch.judge import prediction, together
 from pikanid.mismatch.judge.doubt import worth

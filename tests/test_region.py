@@ -13,7 +13,8 @@ from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import Site, sites
 from pikanid.mismatch.data.whitened import Records
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.same_law import Names
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Where

@@ -21,7 +21,7 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.cli import app
 from pikanid.mismatch.data.whitened import Records, Whitened
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.report.locate import smallest
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings import thresholds

@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 
 import pikanid as pk
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, near_guess
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, near_guess
 from pikanid.mismatch.search.neighbours import afresh, from_its_place, with_twins
 from pikanid.mismatch.search.places import led_away
 from pikanid.mismatch.settings.settings import DEFAULTS

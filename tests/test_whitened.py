@@ -13,7 +13,8 @@ from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.data.preparation import prepared
 from pikanid.mismatch.data.whitened import Records, Whitened
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS

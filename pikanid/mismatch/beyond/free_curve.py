@@ -11,7 +11,8 @@ from pikanid.mismatch.beyond.patch import FreeCurve
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.closest import Closest
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.model import Model
 
 FINE = 12  # numerical: pieces of a curve, for a law that acts in a tenth of the range

@@ -24,7 +24,8 @@ from pikanid.mismatch.beyond.patch import Difference, FreeCurve
 from pikanid.mismatch.beyond.region import Course, Interval, course
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.model import Model
 from pikanid.model.parts import Parameter

@@ -27,7 +27,7 @@ from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
 from pikanid.mismatch.catalogue.site import sites
 from pikanid.mismatch.design.response import Sigma
 from pikanid.mismatch.design.sizing import Sized, recorded, sized
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import Model

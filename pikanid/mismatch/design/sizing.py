@@ -12,7 +12,8 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.design.response import SHARE, Sigma
 from pikanid.mismatch.fitting.descent import start_from
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model

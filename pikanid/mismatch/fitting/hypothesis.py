@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
-from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.descent import (
-    Start,
-    basin_hopping,
-    descended,
-    per_row,
     place,
-    renewed,
 )
-from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.fitting.lowest import lowest
-from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
-from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
 from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
+ENDLESS = 1e3  # numerical: standard errors of a size, relative to it, beyond any valley's
 
 
 @dataclass(frozen=True)
@@ -164,6 +154,14 @@ class Hypothesis:
         """The penalty for parameters that only say how a recording begins: others assume that."""
         return sum(len(e.begins) for e in self.effects) * float(np.log(max(self.whitened.rows, 1)))
 
+    def determines(self, effect: Candidate) -> bool:
+        """Whether the recordings hold the size of an effect: one that has no end could be any, as
+        of a play that is wider than the motion.
+        """
+        size = effect.parameters[0] if effect.parameters else None
+        return size is None or not size.free or not (
+            self.std[size.name] > ENDLESS * abs(self.values[size.name] - size.value))
+
     def improves_on(self, known: Hypothesis) -> bool:
         """Whether it is closer than another fit of the same effects, by more than fits stop at."""
         chi2, rows = known.minimum.chi2, max(known.whitened.rows, 1)
@@ -181,65 +179,6 @@ def _inverse(J: np.ndarray) -> np.ndarray:
     _, s, vt = np.linalg.svd(J / norms, full_matrices=False)
     inverse = vt.T / np.maximum(s, 1e-9 * (s[0] or 1.0) if len(s) else 1.0) ** 2 @ vt
     return np.asarray(inverse / np.outer(norms, norms))
-
-
-def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
-           starts: Sequence[Start | Mapping[str, float]], choices: int,
-           closest: Closest | None = None, settled: frozenset[str] = frozenset()
-           ) -> Hypothesis | None:
-    """Refit the nominal model with effects added.
-
-    Args:
-        nominal: Without effects.
-        effects: To add.
-        records: To fit.
-        starts: From where; parameters not named begin at the model's values.
-        choices: Number of effects to choose from.
-        closest: χ² of the closest fit so far: one that stays far above is not carried through, and
-            simulations need not be much more accurate than it is.
-        settled: Keys of effects that need not be looked for beyond the hills about the start.
-
-    Returns:
-        The best local fit, or None where no start can be simulated or no model holds all effects.
-    """
-    try:
-        model = extended(nominal, effects)
-    except errors.BadUnit:
-        return None
-    whitened = Whitened(model, records)
-    rows = max(whitened.rows, 1)
-    closest = closest or Closest()
-    fits, budget = records.settings.fits, records.settings.budget
-    limit = closest.ask(
-        lambda chi2: budget.iterations if per_row(chi2, rows) < fits.gross else budget.hurried)
-
-    def beyond(size: float) -> bool:
-        return closest.ask(lambda chi2: size > fits.far * (chi2 + rows))
-
-    best = descended(whitened, starts, closest, limit, beyond)
-    hilly = [e for e in effects if (e.other_minima or e.absent) and e.key not in settled]
-    failed_search = hits(hilly) and bool(starts) and (
-        best is None or (lost(best.chi2, rows, records.settings) and (
-            len(effects) == 1 or not beyond(best.chi2))))
-    whole = progressive_horizon(
-        whitened, hilly, place(whitened, starts[0])) if failed_search else None
-    if whole is not None and (best is None or whole.chi2 < best.chi2):
-        best = whole
-    elif best is not None and not beyond(best.chi2):
-        for effect in hilly:
-            best = basin_hopping(whitened, best, effect, limit)
-    if hilly:
-        best = renewed(whitened, best, closest, limit, beyond)
-    if best is None:
-        return None
-    free = sum(max(len(e.parameters), 1) for e in effects)
-    penalty = price(free, len(effects), whitened.rows, choices, records.settings.choice_weight)
-    found = Hypothesis(tuple(effects), model, whitened, best, penalty)
-    for otherwise in (turned, read_otherwise):
-        other = otherwise(found.effects)
-        if other != found.effects and not beyond(found.minimum.chi2):
-            found = _instead(found, other, nominal, closest, limit, beyond) or found
-    return found
 
 
 def near_guess(nominal: Model, records: Records) -> Hypothesis | None:
@@ -266,33 +205,3 @@ def unfitted(nominal: Model, records: Records, values: Mapping[str, float]) -> H
     found = whitened.residual(theta) if whitened.choose_steps(
         theta, misfit=records.settings.fits.gross) else None
     return found and Hypothesis((), nominal, whitened, Minimum(theta, *found, False), 0.0)
-
-
-def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, closest: Closest,
-             limit: int, beyond: Callable[[float], bool]) -> Hypothesis | None:
-    """The fit with the same effects put together in another way, where that is closer."""
-    model = extended(nominal, effects)
-    whitened = Whitened(model, found.whitened.records)
-    theta, least = place(whitened, found.point), whitened.settings.fits.other_order
-    if not closest.choose_steps(whitened, theta, partial(per_row, rows=max(whitened.rows, 1))) or \
-            abs(whitened.chi2(theta) - found.minimum.chi2) < least:
-        return None
-    best = descended(whitened, [found.point], closest, limit, beyond)
-    if best is None or best.chi2 > found.minimum.chi2 - least:
-        return None
-    return Hypothesis(effects, model, whitened, best, found.penalty)
-
-
-def read_otherwise(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
-    """Several effects, those with another reading in that one."""
-    return tuple(replace(e, extend=e.other, other=e.extend)
-                 if e.other is not None and len(effects) > 1 else e for e in effects)
-
-
-def turned(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
-    """What happens to inputs, and to outputs, in the opposite order: a sensor that bends and drifts
-    may bend first.
-    """
-    last = {channel: [e for e in effects if e.channel == channel]
-            for channel in ("input", "sensor")}
-    return tuple(last[e.channel].pop() if e.channel in last else e for e in effects)

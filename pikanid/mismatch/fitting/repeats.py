@@ -17,7 +17,7 @@ from pikanid.formula.expressions import TIME
 from pikanid.mismatch.data.noise_level import GRID, likeliest
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.detect.remainder import condensed
-from pikanid.mismatch.fitting.hypothesis import fitted
+from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model

@@ -54,6 +54,8 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     for e in h.effects:
         rest = h.key - {e.key}
         sizes = [p for p in e.parameters if p.free]
+        if not h.determines(e):
+            return f"the recording does not determine {sizes[0].name} of {e.name}: any is as good"
         if h.symbolic and len(sizes) > 1:
             size, error = h.values[sizes[0].name], h.std[sizes[0].name]
             if below(abs(size), asks.sized * error):

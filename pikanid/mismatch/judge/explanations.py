@@ -84,13 +84,19 @@ def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
     if nominal is None or len(found) < 2 or below(nominal.predicted.chi2 - len(
             nominal.predicted.rest), settings.least_proof):
         return None
+    # what predicts worse than no effect at all is no rival either
+    most = settings.verdict.worse * nominal.predicted.misfit
+    found = [w for w in found if not smaller(most, w.predicted.misfit)]
     found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
     return Explanations(tuple(found), counts)
 
 
 def lasting(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Without those that hold a formula, or what happens once, which swallows remainders."""
-    return [h for h in ranked if not h.symbolic and all(e.lasts for e in h.effects)]
+    """Without those that hold a formula, or what happens once, which swallows remainders, or an
+    effect that could have any size.
+    """
+    return [h for h in ranked if not h.symbolic and all(
+        e.lasts and h.determines(e) for e in h.effects)]
 
 
 def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:

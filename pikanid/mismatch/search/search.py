@@ -14,7 +14,8 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below, in_order
 from pikanid.mismatch.fitting.descent import Start
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted, near_guess
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, near_guess
 from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
 from pikanid.mismatch.search import neighbours, places

@@ -35,7 +35,8 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import smaller
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.explanations import Explanations
 from pikanid.mismatch.judge.kinds import Kind, kinds_of, members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over

@@ -18,7 +18,8 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.extended import extended
-from pikanid.mismatch.fitting.hypothesis import Hypothesis, fitted
+from pikanid.mismatch.fitting.fit import fitted
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import worth
 from pikanid.mismatch.judge.prediction import held_out
 
