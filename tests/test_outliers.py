@@ -61,9 +61,9 @@ def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
     before, _ = without_outliers(whole, "y", DEFAULTS)
     seen = np.isfinite(before["y"].values)
     residual = (0, "y", t[seen], (y - motion)[seen])
-    records, count = without_lone(Records((before,), ({},), DEFAULTS), [residual])
+    records = without_lone(Records((before,), ({},), DEFAULTS), [residual])
     left = np.flatnonzero(~np.isfinite(records.recordings[0]["y"].values))
-    assert count == (~np.isin(hit, np.flatnonzero(~seen))).sum() - np.isfinite(
+    assert len(records.left_out) == (~np.isin(hit, np.flatnonzero(~seen))).sum() - np.isfinite(
         records.recordings[0]["y"].values[hit]).sum()
     assert np.isin(hit, left).mean() > 0.85
     assert len(left) < len(hit) + 3
@@ -142,9 +142,9 @@ def test_two_neighbours_do_not_hide_each_other() -> None:
     residual = SIGMA * noise(500, seed=2)
     residual[[219, 220]] += np.array([12.0, 15.0]) * SIGMA
     whole = Recording.from_arrays(t, {"y": residual})
-    records, count = without_lone(Records((whole,), ({},), DEFAULTS), [(0, "y", t, residual)])
+    records = without_lone(Records((whole,), ({},), DEFAULTS), [(0, "y", t, residual)])
     gone = np.flatnonzero(np.isnan(records.recordings[0]["y"].values))
-    assert {219, 220} <= set(gone.tolist()) and count == len(gone) <= 3
+    assert {219, 220} <= set(gone.tolist()) and len(records.left_out) == len(gone) <= 3
 
 
 def test_a_clipped_peak_is_no_run_of_outliers() -> None:
@@ -157,10 +157,10 @@ def test_a_clipped_peak_is_no_run_of_outliers() -> None:
     r[alone] += SIGMA * np.array([30.0, 30.0, -40.0, 25.0])
     recording = Recording.from_arrays(t, {"y": r}, {"y": "rad"})
     records = Records((recording,), ({"y": NoiseModel(SIGMA, 0.4, 0.0, 0.01, "")},), DEFAULTS)
-    kept, count = without_lone(records, [(0, "y", t, r)])
+    kept = without_lone(records, [(0, "y", t, r)])
     gone = np.flatnonzero(np.isnan(kept.recordings[0]["y"].values))
     assert set(alone) <= set(gone) and not set(hump) & set(gone)
-    assert count == len(gone) <= 6
+    assert len(kept.left_out) == len(gone) <= 6
 
 
 def test_a_setting_says_from_how_many_samples_on_one_can_be_alone() -> None:
@@ -183,7 +183,8 @@ def test_outliers_of_the_held_out_recording_are_no_mismatch() -> None:
         model, *(rec.with_channels(replace(rec["theta"], values=values, sigma=None))
                  for rec, values in ((train, train["theta"].values), (later, bad))), workers=1)
     assert found.verdict == "none"
-    assert any("of the held-out recording can be seen" in note for note in found.notes)
+    assert any(note.startswith("Held-out recording '") and "outliers of" in note
+               for note in found.notes)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -195,8 +196,8 @@ def test_beside_a_missing_sample_none_is_an_outlier(seed: int) -> None:
     y[400:440] = np.nan
     y[900] += 0.5
     run = Recording.from_arrays(t, {"y": y})
-    clean, count = without_outliers(run, "y", DEFAULTS)
-    assert count == 1 and np.isnan(clean["y"].values[900])
+    clean, found = without_outliers(run, "y", DEFAULTS)
+    assert len(found) == 1 and np.isnan(clean["y"].values[900])
 
 
 @pytest.mark.parametrize("draw", ["uniform", "exponential"])

@@ -59,4 +59,5 @@ def test_a_play_wider_than_the_motion_could_have_any_size(insulated: bool) -> No
     said = why_not(found, [found, case.base], case.predicted, lambda *asked: 0.0, 1.0, DEFAULTS)
     assert ("any is as good" in said) is insulated
     if not insulated:
-        assert found.values["half_play_T_a"] == pytest.approx(2.0, abs=4 * found.std["half_play_T_a"])
+        off = found.values["half_play_T_a"] - 2.0
+        assert abs(off) < 4 * found.std["half_play_T_a"] < 0.5

@@ -85,14 +85,13 @@ class Case:
         here = self.model.with_values({n: best.values[n] for n in self.model.free_names})
         rate = sites(here, self.records.recordings)[0].rate
         explained = self.adequate(best)
-        new, count = with_refined_noise(self.records, fit, rate, quiet, explained)
-        note_outliers(count, "the recording", self.notes)
+        new = with_refined_noise(self.records, fit, rate, quiet, explained)
         if not explained:
             # high frequencies tell little of the colour of noise: it may be all that is left
-            other, _ = with_refined_noise(self.records, fit, rate, quiet, True)
+            other = with_refined_noise(self.records, fit, rate, quiet, True)
             if not self._same(other, new) and self._clears(best, other):
                 new = other
-        if self._same(self.records, new) and not count:
+        if self._same(self.records, new) and new.left_out == self.records.left_out:
             return heard
         self.records = new
         self.resumed(self.search)
@@ -133,10 +132,9 @@ class Case:
         prediction = None if best.far else self.predicted(best)
         if self.later is None or prediction is None:
             return
-        self.later, count = without_lone(self.later, prediction.residuals,
-                                         self.model.input_names)
-        if count:
-            note_outliers(count, "the held-out recording", self.notes)
+        before = self.later
+        self.later = without_lone(before, prediction.residuals, self.model.input_names)
+        if self.later.left_out != before.left_out:
             self.predictions.clear()
 
     def adequate(self, h: Hypothesis) -> bool:
@@ -202,10 +200,3 @@ class Case:
         return all(abs(np.log(a[o].sigma / b[o].sigma)) < noise.same
                    and abs(a[o].rho - b[o].rho) < noise.same_correlation
                    for a, b in zip(one.levels, other.levels, strict=True) for o in a)
-
-
-def note_outliers(count: int, where: str, notes: list[str]) -> None:
-    """Add a sentence about outliers that were left out to the notes, if there were any."""
-    if count:
-        these = "outliers" if count > 1 else "outlier"
-        notes.append(f"Beside a fit, {count} more {these} of {where} can be seen: left out.")

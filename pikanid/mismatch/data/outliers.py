@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import binom
 
 from pikanid import errors
+from pikanid.mismatch.data.left_out import LeftOut
 from pikanid.mismatch.data.stretches import as_one
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
@@ -33,9 +34,9 @@ CUBIC = np.array([-4.0, 9.0, 0.0, 0.0, 0.0, 9.0, -4.0]) / 10.0  # numerical: but
 
 
 def without_outliers(recording: Recording, output: str, settings: Settings,
-                     inputs: Sequence[str] = ()) -> tuple[Recording, int]:
+                     inputs: Sequence[str] = ()) -> tuple[Recording, list[LeftOut]]:
     """The recording without samples that leave the cubic through their neighbours, where they lie
-    in time, and how many.
+    in time, and which these are.
 
     The worst goes first: beside a spike its neighbours look bad as well.  None goes where they
     cluster.
@@ -44,11 +45,11 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
     seen = np.flatnonzero(np.isfinite(channel.values))
     y = channel.values[seen].copy()
     if len(y) < noise.least_alone:
-        return recording, 0
+        return recording, []
     try:
         sigma, _ = high_band_sigma(channel, settings.rounding)
     except errors.BadRecording:
-        return recording, 0
+        return recording, []
     # where σ is known sample by sample, an uncertain one is no outlier
     given = channel.sigma[seen] if isinstance(channel.sigma, np.ndarray) else 0.0
     own = np.maximum(sigma, given) * np.ones(len(y))
@@ -78,10 +79,11 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
         for near in range(max(j - 4, 0), min(j + 1, len(gap))):
             gap[near] = weights[near] @ y[near:near + 5]
     if not bad or len(bad) > noise.most_outliers * len(y) or _cluster(bad, len(y), noise.clustered):
-        return recording, 0
+        return recording, []
     values = channel.values.copy()
     values[seen[bad]] = np.nan
-    return recording.with_channels(replace(channel, values=values)), len(bad)
+    return recording.with_channels(replace(channel, values=values)), [
+        LeftOut(output, recording.name, float(channel.time[seen[k]])) for k in bad]
 
 
 def _cluster(bad: Sequence[int] | np.ndarray, count: int, by_chance: float) -> bool:
@@ -158,16 +160,17 @@ def with_humps(residual: np.ndarray, kept: np.ndarray, together: int) -> np.ndar
 
 
 def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np.ndarray]],
-                 inputs: Sequence[str] = ()) -> tuple[Records, int]:
-    """Records without the samples that are alone in residuals, and how many; of a residual where
-    they cluster none.
+                 inputs: Sequence[str] = ()) -> Records:
+    """Records without the samples that are alone in residuals; of a residual where they cluster all
+    are kept.
 
     Args:
         records: Any.
         seen: Number of the recording, output, times (N,) and residual (N,) there.
         inputs: Of the model.
     """
-    recordings, count, noise = list(records.recordings), 0, records.settings.noise
+    recordings, noise = list(records.recordings), records.settings.noise
+    found = list(records.left_out)
     of = {(r, name): (t, left) for r, name, t, left in seen}
     names = list(dict.fromkeys(name for _, name in of))
     for own, name in ((own, name) for own in records.stretches for name in names):
@@ -187,7 +190,9 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
         if len(gone) and not most and not _cluster(gone, len(t), noise.clustered):
             for r in own:
                 channel = recordings[r][name]
-                recordings[r] = recordings[r].with_channels(replace(channel, values=np.where(
-                    np.isin(channel.time, t[gone]), np.nan, channel.values)))
-            count += len(gone)
-    return replace(records, recordings=tuple(recordings)), count
+                here = np.isin(channel.time, t[gone]) & np.isfinite(channel.values)
+                recordings[r] = recordings[r].with_channels(replace(
+                    channel, values=np.where(here, np.nan, channel.values)))
+                found += [LeftOut(name, recordings[r].name, float(at))
+                          for at in channel.time[here]]
+    return replace(records, recordings=tuple(recordings), left_out=tuple(found))

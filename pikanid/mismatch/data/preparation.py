@@ -35,16 +35,14 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
 
     Where `together` is more than one, that many samples of an output become one.
     """
-    done, every = [], []
+    done, every, left_out = [], [], []
     for recording in recordings:
         found: dict[str, NoiseModel] = {}
         for output in model.outputs:
             channel = recording.as_output(output.name, output.unit or None)
-            recording, count = without_outliers(
+            recording, outliers = without_outliers(
                 recording.with_channels(channel), output.name, settings, model.input_names)
-            if count:
-                what = "1 outlier" if count == 1 else f"{count} outliers"
-                notes.append(f"Recording '{recording.name}': {what} of '{output.name}' left out.")
+            left_out += outliers
             again = repeated(recording[output.name].values, settings.rounding)
             if together > 1:
                 recording = recording.with_channels(averaged(recording[output.name], together))
@@ -67,7 +65,7 @@ def prepared(model: Model, recordings: tuple[Recording, ...], quiet: tuple[float
                              f"{EXACT:.0e} of its half range counts as that.")
         done.append(recording)
         every.append(found)
-    return Records(tuple(done), tuple(every), settings)
+    return Records(tuple(done), tuple(every), settings, left_out=tuple(left_out))
 
 
 def beginnings(model: Model, recordings: tuple[Recording, ...], what: str, notes: list[str],
@@ -167,15 +165,12 @@ def averaged(channel: Channel, count: int) -> Channel:
 
 def with_refined_noise(records: Records, fit: Estimate, rate: float,
                        quiet: tuple[float, float] | None, explained: bool = False
-                       ) -> tuple[Records, int]:
-    """Noise levels again, from what a fit leaves, and without the outliers that it shows; how many
-    these are.
-    """
+                       ) -> Records:
+    """Noise levels again, from what a fit leaves, and without the outliers that it shows."""
     outputs = [(r, name) for r, found in enumerate(records.levels) for name in found]
     fits = dict(zip(outputs, fit.fits, strict=True))
     inputs = fit.fitted_model.input_names
-    records, count = without_lone(records, [(*key, f.t, f.residual) for key, f in fits.items()],
-                                  inputs)
+    records = without_lone(records, [(*key, f.t, f.residual) for key, f in fits.items()], inputs)
     samples = sum(len(f.t) for f in fit.fits)
     freedom = max(samples - len(fit.theta), 1) / max(samples, 1)
     levels: list[dict[str, NoiseModel]] = []
@@ -193,7 +188,7 @@ def with_refined_noise(records: Records, fit: Estimate, rate: float,
                             records.settings, explained, freedom)
             new[name] = loud_enough(again, recording[name])
         levels += [new] * len(own)
-    return replace(records, levels=tuple(levels)), count
+    return replace(records, levels=tuple(levels))
 
 
 def set_aside(train: tuple[Recording, ...], model: Model, notes: list[str], noise: NoiseSettings

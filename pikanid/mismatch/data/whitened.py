@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pikanid import errors
+from pikanid.mismatch.data.left_out import LeftOut
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.noise.level import NoiseModel
@@ -30,6 +31,7 @@ class Records:
     """Recordings as they are judged: without outliers, each output with its noise level, by which
     settings, and what the nominal model's parameters were given as, which tells their sizes.
     Of segments of longer recordings `cut_from` says which; empty, each is a recording of its own.
+    `left_out` holds the outliers.
     """
 
     recordings: tuple[Recording, ...]
@@ -37,6 +39,7 @@ class Records:
     settings: Settings
     guess: Mapping[str, float] = field(default_factory=dict)
     cut_from: tuple[int, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
     def owners(self) -> tuple[int, ...]:

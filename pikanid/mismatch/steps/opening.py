@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
-from pikanid.mismatch.case import Case, note_outliers
+from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.bound_effects import (
     bound_to,
     motion_along,
@@ -96,8 +96,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
         before = replace(nls, starts=1).fit(before.fitted_model, with_sigma(records, model))
     nominal = before.fitted_model
     rate = sites(nominal, records.recordings)[0].rate
-    records, count = with_refined_noise(records, before, rate, quiet)
-    note_outliers(count, "the recording", notes)
+    records = with_refined_noise(records, before, rate, quiet)
     held, excuse = None, ""
     if later is not None:
         held = prepared(model, later, None, notes, settings, together, records.levels[0])

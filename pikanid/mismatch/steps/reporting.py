@@ -9,6 +9,7 @@ from pikanid.mismatch.beyond.latent_force import force_over_time
 from pikanid.mismatch.beyond.local_force import local_force
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.data.left_out import left_out_sentences
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate, widened
 from pikanid.mismatch.fitting.decisions import below, smaller
@@ -36,6 +37,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     """The diagnosis of a case, with proof, place, advice and notes."""
     alpha, asked = case.settings.alpha, case.settings.least_proof
     case.notes += case.model.unit_disagreements
+    for records, which in ((case.records, ""), (case.later, "held-out")):
+        case.notes += left_out_sentences(records.left_out, which) if records else []
     if case.excuse:
         case.notes.append(f"{case.excuse[0].upper()}{case.excuse[1:]}: it is left out.")
     best = answer.given[0] if answer.given else case.base

@@ -1,0 +1,49 @@
+"""Samples that were left out as outliers, and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+NAMED = 5  # layout: outliers whose times are told one by one
+APART = 3  # layout: recordings that have a sentence each
+
+
+@dataclass(frozen=True, order=True)
+class LeftOut:
+    """One sample: of which output and recording, and when [s]."""
+
+    output: str
+    recording: str
+    time: float
+
+
+def left_out_sentences(found: Sequence[LeftOut], which: str = "") -> list[str]:
+    """How many outliers were left out, of which recordings and outputs; of few also when.
+
+    Args:
+        found: In any order.
+        which: Before "recording".
+
+    >>> left_out_sentences([LeftOut("y", "run", 3.0), LeftOut("y", "run", 1.25)])
+    ["Recording 'run': 2 outliers of 'y' left out, at 1.25 and 3 s."]
+    """
+    which = f"{which} recording".strip()
+    return [line for output, each in groupby(sorted(found), lambda one: one.output)
+            for line in _of_output(output, list(each), which)]
+
+
+def _of_output(output: str, found: Sequence[LeftOut], which: str) -> Iterator[str]:
+    times = {name: [one.time for one in each]
+             for name, each in groupby(found, lambda one: one.recording)}
+    if len(times) > APART:
+        yield (f"{len(found)} outliers of '{output}' left out in {len(times)} "
+               f"{which}s: {', '.join(f'{len(t)} in {n!r}' for n, t in times.items())}.")
+        return
+    for name, at in times.items():
+        count = "1 outlier" if len(at) == 1 else f"{len(at)} outliers"
+        *before, last = (f"{t:.6g}" for t in at)
+        when = (f", at {', '.join(before)}{' and ' if before else ''}{last} s"
+                if len(at) <= NAMED else f", between {at[0]:.6g} and {last} s")
+        yield f"{which.capitalize()} '{name}': {count} of '{output}' left out{when}."
