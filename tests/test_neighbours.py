@@ -14,11 +14,13 @@ from opened import case, hypothesis, keys
 
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.same_law import signature
+from pikanid.mismatch.search.leaders import closest_of_each
 from pikanid.mismatch.search.neighbours import (
-    closest_of_each,
     with_curves,
     with_parts,
     with_relatives,
+    with_shapes,
     with_simpler,
     with_sums,
     with_twins,
@@ -47,6 +49,20 @@ def test_laws_that_hold_others_are_neighbours_both_ways(case: Case) -> None:
     power = hypothesis(case, "power_drag", c_n=0.01)
     simpler = [keys(effects) for effects, _ in with_simpler(power, case.candidates)]
     assert simpler == [{"coulomb_friction"}, {"quadratic_drag"}]
+
+
+def test_the_shape_of_a_law_is_nuisance(case: Case) -> None:
+    """Leaving it open is no other name, and costs nothing beside names that assume it."""
+    ideal = hypothesis(case, "coulomb_friction", "sensor_offset", c=0.05)
+    jobs = list(with_shapes(ideal, case.candidates))
+    assert [keys(effects) for effects, _ in jobs] == [
+        {"coulomb_friction[rounded]", "sensor_offset"}]
+    rounded = hypothesis(case, "coulomb_friction[rounded]", "sensor_offset", c=0.05)
+    assert not list(with_shapes(rounded, case.candidates))
+    assert signature(rounded) == signature(ideal) != signature(
+        hypothesis(case, "quadratic_drag", "sensor_offset"))
+    assert ideal.assumed == rounded.begun == 0.0
+    assert rounded.assumed == pytest.approx(np.log(rounded.whitened.rows))
 
 
 def test_a_law_that_is_a_sum_is_split_into_its_parts(case: Case) -> None:

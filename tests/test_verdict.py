@@ -33,7 +33,6 @@ def effect(name: str, known: bool = True) -> Candidate:
 A, B, GUARD = effect("a"), effect("b"), effect("outside", known=False)
 LAW = effect(f"{SYMBOLIC}k*q**2")
 
-
 # Relative errors of every χ² and deviance, as of a processor that adds in another order: none, one
 # rounding up or down, any of that size, and errors just above the dead band, which show that no
 # case below sits on an edge.
@@ -64,7 +63,8 @@ def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothe
     r = np.full(ROWS, np.sqrt(chi2 / ROWS))
     whitened = cast(Whitened, SimpleNamespace(
         rows=ROWS, problem=SimpleNamespace(free=free, lower=-np.inf, upper=np.inf),
-        records=SimpleNamespace(spread=spread, guess={}), settings=DEFAULTS))
+        records=SimpleNamespace(spread=spread, guess={}), settings=DEFAULTS,
+        sizes=np.ones(len(free))))
     found = Minimum(np.ones(len(free)), r, 100.0 * np.eye(ROWS, len(free)), True)
     return Hypothesis(tuple(effects), sloshing(), whitened, found, 14.0 * len(effects))
 

@@ -150,9 +150,19 @@ class Hypothesis:
             self.covariance)), strict=True)}
 
     @property
-    def assumed(self) -> float:
+    def begun(self) -> float:
         """The penalty for parameters that only say how a recording begins: others assume that."""
-        return sum(len(e.begins) for e in self.effects) * float(np.log(max(self.whitened.rows, 1)))
+        return sum(len(e.begins) for e in self.effects) * self._each
+
+    @property
+    def assumed(self) -> float:
+        """The same, and for the shapes of laws, which are nuisance: ideal ones assume them."""
+        return self.begun + sum(len(e.parameters) - 1 for e in self.effects if e.refines
+                                ) * self._each
+
+    @property
+    def _each(self) -> float:
+        return float(np.log(max(self.whitened.rows, 1)))
 
     def determines(self, effect: Candidate) -> bool:
         """Whether the recordings hold the size of an effect: one that has no end could be any, as

@@ -68,6 +68,17 @@ class Names(NamedTuple):
                      tuple(dict.fromkeys((*self.words, *words))))
 
 
+def signature(h: Hypothesis) -> frozenset[str]:
+    """Its effects, whatever their shapes are and which of twins they are."""
+    return frozenset(map(_group, h.effects))
+
+
+def _group(e: Candidate) -> str:
+    if e.alike:
+        return e.alike
+    return e.ids[0] + e.site.suffix if e.refines else e.key
+
+
 def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: VerdictSettings
                  ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, Names]]]:
     """Hypotheses that differ in twins only become one; what stands for what is noted.
@@ -75,22 +86,16 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
     open, and an effect with a limit has that where it is narrow.  An entry in two shapes is one.
     """
-    def group(e: Candidate) -> str:
-        if e.alike:
-            return e.alike
-        return e.ids[0] + e.site.suffix if e.refines else e.key
-
     first: dict[frozenset[str], Hypothesis] = {}
     twins: dict[frozenset[str], dict[str, Names]] = {}
     absorbed = set()
     for h in known:
-        signature = frozenset(group(e) for e in h.effects)
-        leader = first.setdefault(signature, h)
+        leader = first.setdefault(signature(h), h)
         table = twins.setdefault(
             leader.key, {e.key: Names(e.names, (e.name,)) for e in leader.effects})
         for e in leader.effects:
             for o in h.effects:
-                if group(o) == group(e):
+                if _group(o) == _group(e):
                     # another shape or side of an entry goes by its name
                     new = e.alike and not {*o.names} <= {*table[e.key].ids}
                     table[e.key] = table[e.key].and_also(o.names, *([o.name] if new else []))

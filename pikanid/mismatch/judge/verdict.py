@@ -16,7 +16,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Again, Predict, gained, speaks, why_not
 from pikanid.mismatch.judge.partial import Part
 from pikanid.mismatch.judge.prediction import HeldOut
-from pikanid.mismatch.judge.same_law import Names, integer_laws, merged_twins
+from pikanid.mismatch.judge.same_law import Names, integer_laws, merged_twins, signature
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import VerdictSettings
 
@@ -172,7 +172,8 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         doubt = doubt or "where all of these would do, a law that nobody has listed may"
     verdict: Verdict = ("unconfirmed" if doubt or not proves
                         else "named" if len(merged) == 1 else "set")
-    others = [h for h in tried if h not in merged][:5]
+    told = set(map(signature, merged))
+    others = [h for h in tried if signature(h) not in told][:5]
     return Answer(verdict, _most_probable_first(merged, predict, scale, asks), tuple(others), twins,
                   {**spare, **reasons}, doubt,
                   tuple(h for h in outside if not any(h is o for o in merged)))
@@ -288,8 +289,8 @@ def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
     found = {h.key: total(h) for h in given}
     best = min(found.values())
     # what says how recordings begin costs in the one and in the other
-    kept = [h for h in given if below(
-        found[h.key] - _handicap(h, asks) - 2 * h.assumed, best + asks.indistinct)]
+    kept = [h for h in given if below(found[h.key] - _handicap(h, asks) - h.assumed - h.begun,
+                                      best + asks.indistinct)]
     for h in given:
         if h not in kept:
             reasons[h.key] = "predicts the held-out recording worse"

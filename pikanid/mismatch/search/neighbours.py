@@ -10,7 +10,6 @@ from dataclasses import replace
 
 from pikanid.mismatch.catalogue.candidate import CURVES, Candidate
 from pikanid.mismatch.detect.tangent import directions
-from pikanid.mismatch.fitting.decisions import in_order
 from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.screen import Screen, as_strong
@@ -72,6 +71,16 @@ def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     for effect in h.effects:
         for other in candidates:
             if effect.key in other.covers:
+                yield _wider(h, effect, other, effect.key)
+
+
+def with_shapes(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
+    """With the shape of one of its effects left open: what an ideal law lacks another effect may
+    make up for.
+    """
+    for effect in h.effects:
+        for other in candidates:
+            if other.refines and effect.key in other.covers and effect.ids == other.ids:
                 yield _wider(h, effect, other, effect.key)
 
 
@@ -244,48 +253,6 @@ def with_walls(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
             yield (*_rest(h, effect), wall), [
                 {**h.point, place: limit, stiffness: at}
                 for at in sorted({level[stiffness] for level in wall.levels})]
-
-
-def leading(ranked: Iterable[Hypothesis]) -> list[Hypothesis]:
-    """Hypotheses to extend, best first: none that only adds effects to a better one."""
-    found: list[Hypothesis] = []
-    for h in ranked:
-        if h.effects and not any(o.key < h.key for o in found):
-            found.append(h)
-    return found
-
-
-def wide(h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
-    """Whether a law that one of its effects contains does nearly as well in that one's place: then
-    more is added to the simpler one.
-    """
-    far = h.whitened.settings.fits.far
-    simpler = (fits.get(h.key - {e.key} | {part}) for e in h.effects for part in e.covers)
-    return any(o is not None and o.minimum.chi2 < far * h.minimum.chi2 for o in simpler)
-
-
-def to_extend(ranked: Sequence[Hypothesis], fits: Mapping[frozenset[str], Hypothesis]
-              ) -> list[Hypothesis]:
-    """Hypotheses that effects are added to, best first: the leading ones that are not wide.
-
-    From far off all that is left counts for a few rows, and a price is more than any gain: there
-    what leaves least comes first.
-    """
-    if ranked[0].far:
-        ranked = in_order(ranked, lambda h: h.minimum.chi2, Hypothesis.place)
-    return [h for h in leading(ranked) if not wide(h, fits)] or [*ranked[:1]]
-
-
-def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:
-    """The hypothesis that fits best of each number of effects from two on, most effects first.
-
-    What a first step out of a large misfit does not see can come to light beside another effect,
-    which then has to go.
-    """
-    several = [h for h in fits if len(h.effects) > 1 and h.known]
-    counts = sorted({len(h.effects) for h in several}, reverse=True)
-    return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
-            for n in counts]
 
 
 def _rest(h: Hypothesis, effect: Candidate) -> tuple[Candidate, ...]:

@@ -18,7 +18,7 @@ from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, near_guess
 from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
-from pikanid.mismatch.search import neighbours, places
+from pikanid.mismatch.search import leaders, neighbours, places
 from pikanid.mismatch.search.neighbours import Job
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, kept, law, nothing
@@ -89,7 +89,7 @@ class Search:
             screen = Screen(base := self.base(), every, self.records.guess)
             self._fit_all([((c,), starts) for c, starts in screen.singles(
                 budget.singles, always=entry if base.far else law)], again=count > 0, always=True)
-            self._fit_all([((), [h.point]) for h in neighbours.leading(self.ranked())[
+            self._fit_all([((), [h.point]) for h in leaders.leading(self.ranked())[
                 :budget.leading]], again=True, always=True)
             if self.base() is base:
                 break  # else effects had led out of a minimum that only the nominal model was in
@@ -120,7 +120,7 @@ class Search:
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
             near = rows + settings.fits.far * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
-            simple = neighbours.to_extend(self.ranked(), self.fits)
+            simple = leaders.to_extend(self.ranked(), self.fits)
             for h in simple[: budget.leading if count == 1 else 1]:
                 if len(h.effects) < budget.effects and (h is simple[0] or h.minimum.chi2 < near):
                     self._extend(h, budget.beside_one if count == 1 else budget.beside_more,
@@ -133,7 +133,7 @@ class Search:
         if not (best := self.ranked()[0]).known:
             self._exchange(best, anyway=True)
         if not (self.ranked()[0].known and adequate(self.ranked()[0])):
-            for h in neighbours.leading(self.ranked())[:budget.leading]:
+            for h in leaders.leading(self.ranked())[:budget.leading]:
                 self._fit_all([job for job in neighbours.with_wider(h, self.candidates)
                                if all(e.known for e in job[0])], again=True, always=True)
         best = self.ranked()[0]
@@ -159,12 +159,12 @@ class Search:
                 self._fit_all([job], again=not job[0][-1].known, always=True)
         return self.ranked()
 
-    def _contenders(self, wide: float = 1.0) -> Iterator[Hypothesis]:
-        """The hypotheses that score about as well as the best, within so many times that."""
+    def _contenders(self, wide: float = 1.0, anyway: bool = False) -> Iterator[Hypothesis]:
+        """The hypotheses about as good as the best, within so many times that."""
         scale, ranked = self.scale(), self.ranked()
         reach = ranked[0].score(scale) + wide * self.settings.verdict.indistinct
         for h in ranked[:self.settings.budget.rivals]:
-            if below(h.score(scale), reach) and not self.budget_exhausted:
+            if below(h.score(scale), reach) and (anyway or not self.budget_exhausted):
                 yield h
 
     def _simplify(self) -> None:
@@ -172,7 +172,7 @@ class Search:
         what led there may have been no more than a way out of a local minimum.
         """
         if self.ranked()[0].far:
-            for closest in neighbours.closest_of_each(self.fits.values()):
+            for closest in leaders.closest_of_each(self.fits.values()):
                 self._fit_all([*neighbours.without_one(closest)], again=True, always=True)
         for _ in range(self.settings.budget.effects):
             best = self.ranked()[0]
@@ -183,7 +183,6 @@ class Search:
 
     def _exchange(self, best: Hypothesis, anyway: bool = False) -> None:
         """Put others in the place of each effect: rivals that no path led to."""
-        # each effect alone was tried in the beginning, but with another noise perhaps
         for effect in best.effects if len(best.effects) > 1 or anyway else ():
             rest = tuple(e for e in best.effects if e is not effect)
             without = self._fit(rest, [best.point])
@@ -203,6 +202,8 @@ class Search:
                          *places.elsewhere(h, self.candidates),
                          *neighbours.from_its_place(h, self._contenders(wide), self.base())), h.key)
             self._exchange(h, anyway=True)
+        self._fit_all([job for h in self._contenders(anyway=True)
+                       for job in neighbours.with_shapes(h, self.candidates)], always=True)
         return {h.fit for h in self.fits.values()} != before
 
     def refine(self, jobs: Iterable[Job], settled: frozenset[str] = frozenset()) -> bool:
