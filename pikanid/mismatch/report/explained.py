@@ -17,7 +17,7 @@ from pikanid.mismatch.settings.settings import Settings
 
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
-                 settings: Settings, overdispersion: float, spread: Mapping[str, float]
+                 settings: Settings, overdispersion: float, spread: Mapping[str, float], time: str
                  ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
     """Given and rejected hypotheses, for reports.
 
@@ -28,6 +28,7 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         settings: What counts as evidence, and as adequate.
         overdispersion: That variances of parameters are multiplied by.
         spread: By name, whose square is added to those of what is given.
+        time: Unit in which parameters are told.
     """
     pool = [*answer.given, *answer.others]
     if not pool:
@@ -49,7 +50,7 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         effects = tuple(NamedEffect(
             names.ids, " or ".join(names.words), e.expression,
             values_of(e.parameters, h.values, h.std, overdispersion,
-                      spread if h in answer.given else {}), e.channel, e.site.v, e.absent)
+                      spread if h in answer.given else {}, time), e.channel, e.site.v, e.absent)
             for e, names in zip(h.effects, named, strict=True))
         p = predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(

@@ -22,6 +22,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import acts_in
 from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Where
+from pikanid.mismatch.report.own_time import SECOND, told_in
 from pikanid.mismatch.report.part import Value, values_of
 from pikanid.mismatch.settings.settings import Settings
 
@@ -153,9 +154,10 @@ def _channel_of_shape(answer: Answer, site: Site, shape: ForceShape | None, sett
 
 
 def smallest(base: Hypothesis, candidates: Sequence[Candidate],
-             overdispersion: float = 1.0) -> dict[str, Value]:
+             overdispersion: float = 1.0, time: str = SECOND) -> dict[str, Value]:
     """The size of each effect that would stand out by enough standard errors, by id: of noise and
-    of what is left beside it, by which variances are multiplied.
+    of what is left beside it, by which variances are multiplied.  `time` is the unit in place of
+    seconds.
 
     Only of effects that grow from nothing in proportion to one parameter.
     """
@@ -167,8 +169,9 @@ def smallest(base: Hypothesis, candidates: Sequence[Candidate],
         candidate = found.candidates[owner]
         if length > 0 and sign.scales and candidate.parameters and sign.start:
             name = next(iter(sign.start))
-            unit = next(p.unit for p in candidate.parameters if p.name == name)
-            size = visible / float(length) * abs(sign.start[name])
+            times, unit = told_in(
+                next(p.unit for p in candidate.parameters if p.name == name), time)
+            size = times * visible / float(length) * abs(sign.start[name])
             for key in candidate.ids:
                 if key not in sizes or size < sizes[key].value:
                     sizes[key] = Value(size, 0.0, unit)

@@ -10,6 +10,7 @@ from typing import Any
 
 from pikanid.estimate.rounding import with_unit
 from pikanid.formula.units import parse
+from pikanid.mismatch.report.own_time import SECOND, told_in
 from pikanid.model.parts import Parameter
 from pikanid.pieces.sentences import enumerated
 from pikanid.pieces.time_unit import spans
@@ -203,10 +204,12 @@ class Closest:
 
 def values_of(parameters: tuple[Parameter, ...], values: Mapping[str, float],
               std: Mapping[str, float], overdispersion: float = 1.0,
-              spread: Mapping[str, float] = MappingProxyType({})) -> dict[str, Value]:
+              spread: Mapping[str, float] = MappingProxyType({}), time: str = SECOND
+              ) -> dict[str, Value]:
     """Estimates of an effect's parameters, with variances multiplied by the overdispersion; the
-    square of a spread, by name, is added to them.
+    square of a spread, by name, is added to them.  `time` is the unit in place of seconds.
     """
-    return {p.name: Value(values[p.name], math.hypot(
-                std[p.name] * overdispersion**0.5, spread.get(p.name, 0.0)), parse(p.unit))
-            for p in parameters if p.name in values}
+    told = {p.name: told_in(parse(p.unit), time) for p in parameters if p.name in values}
+    return {name: Value(times * values[name], times * math.hypot(
+                std[name] * overdispersion**0.5, spread.get(name, 0.0)), unit)
+            for name, (times, unit) in told.items()}

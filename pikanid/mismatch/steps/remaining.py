@@ -14,14 +14,14 @@ from pikanid.mismatch.report.locate import loud_windows
 from pikanid.mismatch.report.part import Closest, Present, Remainder, values_of
 
 
-def present(answer: Answer) -> tuple[Present, ...]:
-    """What is surely there, with standard errors that count the remainder."""
+def present(answer: Answer, time: str) -> tuple[Present, ...]:
+    """What is surely there, with standard errors that count the remainder, in a unit of time."""
     if answer.part is None:
         return ()
     h, counts = answer.part.hypothesis, answer.part.overdispersion
     found = []
     for p in answer.part.present:
-        values, wider = (values_of(p.effect.parameters, h.values, h.std, by, spread)
+        values, wider = (values_of(p.effect.parameters, h.values, h.std, by, spread, time)
                          for by, spread in ((1.0, {}), (counts, answer.part.spread)))
         found.append(Present(
             p.family, p.names, _name(p), p.effect.expression, p.alternatives, p.probability,

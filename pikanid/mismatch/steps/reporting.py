@@ -23,6 +23,7 @@ from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import explanations
 from pikanid.mismatch.report.findings import Curves, OutputError, Proof
 from pikanid.mismatch.report.locate import locate, smallest
+from pikanid.mismatch.report.own_time import own_time
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.steps.mislabelled import mislabelled, sampled_otherwise
 from pikanid.mismatch.steps.remaining import closest, present, remainder
@@ -49,8 +50,9 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     apart = (answer.part.spread if answer.part is not None else
              spread(best, answer.given) if len(answer.given) > 1 else {})
     after = widened(as_estimate(best, case.before), counts, apart) if answer.given else before
+    time = own_time(case.model, case.records.recordings)
     given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
-                                   case.settings, counts, apart if answer.part else {})
+                                   case.settings, counts, apart if answer.part else {}, time)
     proof = _proof(case, answer, best)
     alone = not smaller(case.detected().p_value, alpha)
     if alone and not answer.given and proof is not None and proof.p_value < alpha:
@@ -80,14 +82,14 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         answer.verdict, detection.p_value, case.settings,
         locate(case.base, best, answer, site, shape, force, case.candidates, local),
         given, rejected, before, after, proof, tuple(levels),
-        tuple(case.notes), smallest(case.base, case.candidates, counts),
+        tuple(case.notes), smallest(case.base, case.candidates, counts, time),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
                case.search.workers, bool(answer.doubt),
                any(i.default is None for i in case.model.inputs), _idle(case, answer)),
         shape=shape,
         force_over_time=force,
         doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""),
-        present=present(answer), remainder=remainder(case, answer, proof),
+        present=present(answer, time), remainder=remainder(case, answer, proof),
         closest=closest(answer))
 
 
