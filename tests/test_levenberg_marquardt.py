@@ -170,3 +170,15 @@ def test_a_step_that_failed_shows_how_a_valley_bends(steep: float, start: list[f
         ends.append(float(np.abs(found.theta - 1.0).max()))
     assert ends[0] < 1e-6
     assert needed[0] < 0.75 * needed[1] or ends[1] > 0.5  # which never gets there
+
+
+def test_a_step_to_where_squares_overflow_is_none() -> None:
+    """An unstable model grows beyond what can be squared, and no warning is given."""
+    def growing(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        r = np.exp(np.minimum(400.0 * q, 700.0)) - 2.0
+        return r, np.diag(400.0 * (r + 2.0))
+
+    # the first step is to 1, where r is 1e170
+    found = minimise(growing, np.array([-0.01325]), np.array([-1.0]), np.array([2.0]), 60)
+    assert found is not None and found.chi2 < 0.1
+    assert minimise(growing, np.array([1.5]), np.array([1.2]), np.array([2.0])) is None

@@ -27,6 +27,8 @@ EXAMPLES = """Examples:
 
   pikanid diagnose run1.csv --held-out run2.csv --model my.toml --report why.html --json why.json
 
+  pikanid diagnose run1.csv --held-out run2.csv --model my.toml --extended better.toml
+
   pikanid diagnose run1.csv --model pendulum --quiet-until 2s
 
   pikanid diagnose run1.csv --held-out run2.csv --model tanks.toml --catalogue hydraulics.toml
@@ -47,6 +49,8 @@ def diagnose(
     json_: Json = None,
     report: Annotated[str | None, typer.Option(
         metavar="FILE.html", help="write a page for people")] = None,
+    extended: Annotated[str | None, typer.Option(
+        metavar="FILE.toml", help="write the model with what was found, at its estimates")] = None,
     sigma: Sigma = [],  # noqa: B006
     quiet_until: Annotated[float | None, typer.Option(
         metavar="TIME", parser=seconds, help="nothing moves before, as 2s")] = None,
@@ -67,7 +71,8 @@ def diagnose(
     """Find out which physics a model leaves out, and prove it on another recording."""
     named = [*train, *held_out, model, *catalogue, *([settings] if settings else [])]
     check_outputs({"--json": (json_, [".json"]),
-                   "--report": (report, [".html"])},
+                   "--report": (report, [".html"]),
+                   "--extended": (extended, [".toml"])},
                   every_source(*named))
     from pikanid.mismatch.diagnose import diagnose as run
     from pikanid.mismatch.settings.settings import Settings
@@ -91,6 +96,8 @@ def diagnose(
         from pikanid.reporting.diagnosis_page import page
 
         made[report] = page(dx, records[0].name, files_read(*named)).encode()
+    if extended is not None:
+        made[extended] = dx.model.to_toml().encode()
     written(made, json_, dx.to_dict())
     if not quiet and json_ != STDOUT:
         print(dx)

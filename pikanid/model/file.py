@@ -48,13 +48,18 @@ def load(path: str | os.PathLike[str], kind: Callable[..., M]) -> M:
     return from_dict(toml_content(path, wrong), str(path), kind)
 
 
-def save(model: Lookup, path: str | os.PathLike[str]) -> None:
-    """Write a model file; an existing one is replaced only once the new one is complete."""
+def to_toml(model: Lookup) -> str:
+    """The text of a model file."""
     import tomli_w
 
+    return tomli_w.dumps(to_dict(model))
+
+
+def save(model: Lookup, path: str | os.PathLike[str]) -> None:
+    """Write a model file; an existing one is replaced only once the new one is complete."""
     if not isinstance(path, str | os.PathLike):
         raise errors.BadModel(errors.no_path(type(path).__name__))
-    atomically(Path(path), tomli_w.dumps(to_dict(model)).encode())
+    atomically(Path(path), to_toml(model).encode())
 
 
 def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -> M:

@@ -158,6 +158,10 @@ class Model(Operations):
         """The model file's content as a dictionary."""
         return model_file.to_dict(self)
 
+    def to_toml(self) -> str:
+        """The text of a model file (TOML)."""
+        return model_file.to_toml(self)
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write a model file (TOML), atomically."""
         model_file.save(self, path)

@@ -23,6 +23,7 @@ FIRST, LEAST, AGAIN = 1e-3, 1e-9, 1e-6  # numerical: damping at first, at least,
 BENT = 0.1  # numerical: of a step, that a correction to second order may change it by
 UNSEEN = 1e-6  # numerical: change of |r| that a parameter's own size makes, at least
 NEAR = 1e-2  # numerical: change of |r| within which a parameter is at its bound
+SQUARED = 1e150  # numerical: the square of more may be no number
 Evaluate = Callable[[Array], tuple[Array, Array] | None]
 GiveUp = Callable[[int, float, float], bool]  # number of an iteration, |r|² before and after it
 
@@ -114,16 +115,21 @@ def minimise(evaluate: Evaluate, start: Array, lower: Array, upper: Array, limit
     """
     def rows(theta: Array) -> Rows | None:
         at = evaluate(theta)
-        return None if at is None else Rows(*at)
+        return None if at is None or _beyond(at[0]) else Rows(*at)
 
     def alone(theta: Array) -> Rows | None:
         r = glance(theta) if glance is not None else None
-        return None if r is None else Rows(r, np.empty((len(r), 0)))
+        return None if r is None or _beyond(r) else Rows(r, np.empty((len(r), 0)))
 
     found = descend(rows, start, lower, upper, limit, give_up=give_up,
                     enough=lambda at: worth_a_step(at.cost, len(at.r), tolerance), sizes=sizes,
                     bend=Rows.bend, glance=None if glance is None else alone)
     return None if found is None else Minimum(found.theta, found.at.r, found.at.J, found.converged)
+
+
+def _beyond(r: Array) -> bool:
+    """Whether a residual is so large that its square is no number."""
+    return bool(np.max(np.abs(r), initial=0.0) > SQUARED)
 
 
 def worth_a_step(cost: float, rows: int, tolerance: float = 0.02) -> float:

@@ -168,6 +168,6 @@ def _patch(dx: Diagnosis) -> str:
 def _next(dx: Diagnosis) -> str:
     last = ("Trust the model as far as it was excited: predict a recording that is moved in "
             "another way, 'pikanid validate'." if not dx.mismatch else
-            "Use the extended model from here on, and predict a recording that is moved in "
-            "another way with it: 'pikanid validate'.")
+            "Use the extended model from here on ('pikanid diagnose --extended' writes it), and "
+            "predict a recording that is moved in another way with it: 'pikanid validate'.")
     return f"<h2>What to do next</h2><p>{text(dx.next_experiment or last)}</p>"
