@@ -51,6 +51,7 @@ def building() -> list[Row]:
     train, other = (_windows(part) for part in ("train", "held_out"))
     room = pk.systems.thermal_rc().with_values(R=1.0, C=1.8e5)
     dx, seconds = _diagnosed(room, train, other)
+    found = _day_ahead(dx.model, train, other)
     ahead = {"nominal": _day_ahead(room, train, other)}
     ahead["hidden store"] = _day_ahead(_house(), train, other)
     ahead["hidden store that the sun heats"] = _day_ahead(_house("s*I"), train, other)
@@ -59,7 +60,8 @@ def building() -> list[Row]:
     told = [f"{name} {value:.3f}" + (
         "" if name == "nominal" else f" ({1 - (value**2 - noise**2) / before:.0%} explained)")
         for name, value in ahead.items()]
-    return [row("building", dx, seconds, f"a day ahead, fitted by hand: {', '.join(told)} degC")]
+    return [row("building", dx, seconds, f"a day ahead: what was found {found:.3f}; fitted by "
+                f"hand: {', '.join(told)} degC; {laws(dx)}")]
 
 
 def at_once() -> Model:

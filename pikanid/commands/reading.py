@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,7 +80,7 @@ class Reading:
             rec = rec.window(self.start, self.stop)
         if self.decimate > 1:
             rec = rec.decimate(self.decimate, channels=model.output_names)
-        return _with_sigma(rec, model, sigma)
+        return _with_sigma(_units_taken(rec, model), model, sigma)
 
 
 @dataclass(frozen=True)
@@ -140,6 +140,14 @@ def _signals(model: Model) -> list[str]:
 
     return [*model.input_names, *model.output_names, *(
         name for effect in model.effects if isinstance(effect, Effect) for name in effect.channels)]
+
+
+def _units_taken(rec: Recording, model: Model) -> Recording:
+    """With a note on the model's units that are taken because a file states none."""
+    own = {u.name: u.unit for u in model.inputs} | {o.name: o.unit for o in model.outputs}
+    taken = [n for n, unit in own.items() if unit and n in rec and not rec[n].unit]
+    return rec if not taken else replace(rec, notes=(
+        *rec.notes, errors.units_taken(taken, [own[n] for n in taken])))
 
 
 def _with_sigma(rec: Recording, model: Model, texts: Sequence[str]) -> Recording:

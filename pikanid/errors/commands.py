@@ -89,3 +89,10 @@ def note_input_at_rest(excitation: str, names: Sequence[str]) -> str:
     return (f"The excitation {excitation} drives one input: {listed(names)} "
             f"{'stays' if len(names) == 1 else 'stay'} at 0. A recording (--excitation FILE) can "
             "hold all.")
+
+
+def units_taken(names: Sequence[str], units: Sequence[str]) -> str:
+    """The units are the model's, of signals whose file states none."""
+    told = ", ".join(f"'{name}' in {unit}" for name, unit in zip(names, units, strict=True))
+    return (f"No unit is stated of what is read as the model has it: {told}; "
+            f"'--unit {names[0]}={units[0]}' says which it is.")
