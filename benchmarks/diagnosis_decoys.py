@@ -95,7 +95,7 @@ def _close(answer: Mapping[str, Any]) -> set[str]:
 @functools.cache
 def _expressions() -> dict[str, set[str]]:
     """Formulas that every decoy may be reported as, for the rig of the sets."""
-    from pikanid.mismatch.catalogue.site import sites
+    from pikanid.mismatch.catalogue.sites import sites
 
     model = pk.systems.sloshing()
     [site] = sites(model, (pk.excitation.two_pulse(),))

@@ -8,7 +8,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model import Model
 
 MODEL = Model.from_dict({

@@ -15,7 +15,7 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.between import effects_between
 from pikanid.mismatch.catalogue.bound_effects import bound_to, reserved
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import coordinates, sites
+from pikanid.mismatch.catalogue.sites import coordinates, sites
 from pikanid.model import systems
 
 SIGMA = 0.002

@@ -19,7 +19,7 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.friction import _half_derivative
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model import Model, systems
 from pikanid.recording import Recording, excitation
 from pikanid.simulation.vectorfield import VectorField

@@ -10,7 +10,8 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import Site, sites
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import acts_in, needed
 

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.catalogue.bound_effects import bound_to
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model.domains import candidates_of, catalogues_of, not_taken, taken
 from pikanid.model.effect_form import EffectForm
 from pikanid.model.effects_file import read_effects

@@ -14,7 +14,7 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.cli import main
 from pikanid.mismatch.catalogue.bound_effects import bound_to
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.design.effects_shown import effects_shown
 from pikanid.model import Effect, EffectForm
 from pikanid.model.binding import Surroundings, bound

@@ -13,7 +13,7 @@ from pikanid import errors
 from pikanid.cli import main
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.own_effects import own_effects
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.design.effects_shown import effects_figure, effects_shown
 from pikanid.mismatch.design.figure import design_figure
 from pikanid.model.effects_file import from_table, read_effects

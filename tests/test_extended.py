@@ -7,7 +7,7 @@ from dataclasses import replace
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.fitting.extended import extended
 
 

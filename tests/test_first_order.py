@@ -14,7 +14,7 @@ import pikanid as pk
 from pikanid.errors import BadModel
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model.parts import Output
 
 STILL = pk.Recording.from_arrays(np.arange(100) * 0.01, {"u": np.sin(np.arange(100))},

@@ -13,7 +13,7 @@ from pikanid.mismatch.beyond.formulas import CONSTANT, _candidate, symbolic_cand
 from pikanid.mismatch.beyond.patch import patch
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import systems

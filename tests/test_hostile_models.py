@@ -14,7 +14,7 @@ from hostile import CODE, MARK, VALUES, cut, nothing_evaluated, walk
 from pikanid import errors
 from pikanid.formula.expressions import parse, to_real
 from pikanid.mismatch.catalogue.between import effects_between
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model import Input, Model, Output, Parameter, State
 from pikanid.model.rates import in_rates
 from pikanid.recording import Recording

@@ -9,7 +9,7 @@ import pikanid as pk
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.bound_effects import bound_to
 from pikanid.mismatch.catalogue.input_offset import input_offsets
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model import systems
 
 Q, R0, R1, T1 = 2000.0, 0.05, 0.08, 30.0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.settings.settings import DEFAULTS

@@ -8,7 +8,7 @@ from scipy.signal import cont2discrete, lfilter
 
 import pikanid as pk
 from pikanid.mismatch.catalogue.late_inputs import input_delay, input_lead
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 
 STEP, FINE, SIGMA = 0.02, 10, 0.003  # s, steps of the truth between two samples, V
 POLE, GAIN = 3.0, 2.5  # 1/s

@@ -14,7 +14,7 @@ import pikanid as pk
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.lever import lever
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.search.neighbours import beside
 from pikanid.model import systems
 

@@ -11,7 +11,7 @@ from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.forces import disturbance
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.noise_level import refined
 from pikanid.mismatch.data.outliers import without_outliers
 from pikanid.mismatch.data.preparation import averaged, oversampling

@@ -16,7 +16,7 @@ from pikanid.mismatch.beyond.local_force import LocalForce
 from pikanid.mismatch.beyond.patch import DEGREE, INTERVALS, FreeCurve
 from pikanid.mismatch.beyond.penalised import Penalised, _prior
 from pikanid.mismatch.catalogue.friction import coulomb_friction
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.preparation import averaged, oversampling
 from pikanid.mismatch.design.separation import mean_precision, unexplained
 from pikanid.mismatch.design.sizing import _next

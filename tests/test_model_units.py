@@ -240,7 +240,7 @@ def test_every_effect_of_the_catalogue_can_be_added_in_units_that_are_not_si(
         angle: str, rate: str, out: str) -> None:
     """What an effect adds has the unit of its place, whatever the model's units are."""
     from pikanid.mismatch.catalogue.catalogue import candidates
-    from pikanid.mismatch.catalogue.site import sites
+    from pikanid.mismatch.catalogue.sites import sites
 
     length = {"deg": "rad", "mrad": "rad"}.get(angle, "m")
     model = Model.from_dict({

@@ -15,7 +15,7 @@ import pikanid as pk
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.recording import Recording
 
 STILL = pk.excitation.two_pulse()

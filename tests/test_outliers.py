@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 import pikanid as pk
 from pikanid import Model, Recording
 from pikanid.mismatch.catalogue.friction import coulomb_friction
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.noise_level import bridged, refined
 from pikanid.mismatch.data.outliers import lone, without_lone, without_outliers
 from pikanid.mismatch.data.whitened import Records

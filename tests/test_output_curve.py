@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 import pikanid as pk
 from pikanid.mismatch.catalogue.bound_effects import bound_to
 from pikanid.mismatch.catalogue.output_curve import output_curves
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model import systems
 from pikanid.model.domains import candidates_of
 

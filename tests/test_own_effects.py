@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case

@@ -7,7 +7,7 @@ import pytest
 
 import pikanid as pk
 from pikanid.mismatch.catalogue.forces import wall_impact
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.fitting.progressive_horizon import progressive_horizon, rough

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model.rates import in_rates
 
 T = np.arange(0.0, 6.0, 0.01)

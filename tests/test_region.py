@@ -11,7 +11,8 @@ import pikanid as pk
 from pikanid.mismatch.beyond.region import Course, Interval, course
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import Site, sites
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis

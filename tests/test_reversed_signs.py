@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model import Model
 from pikanid.recording import Recording
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.recording import excitation
 
 LENGTH, DAMPING, MASS, GRAVITY = 0.05, 0.3, 0.3, 9.81

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.design.sizing import _refitted, recorded, sized
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.search.screen import Screen

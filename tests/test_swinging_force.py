@@ -13,7 +13,7 @@ from scipy.signal import cont2discrete
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import View
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.search.neighbours import with_other_form
 from pikanid.mismatch.search.screen import Screen

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.preparation import prepared
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.fit import fitted

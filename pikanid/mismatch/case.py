@@ -9,7 +9,8 @@ import numpy as np
 
 from pikanid.estimate import Estimate
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.catalogue.site import Site, sites
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.outliers import without_lone
 from pikanid.mismatch.data.own_noise import with_own_noise
 from pikanid.mismatch.data.preparation import with_refined_noise

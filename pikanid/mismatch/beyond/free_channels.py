@@ -75,7 +75,7 @@ class _Left:
     def __init__(self, base: Hypothesis, site: Site, candidates: Sequence[Candidate]):
         self.rule = base.whitened.settings.part
         force = [_curve("dynamics", name, site) for name in site.moving]
-        curves = [*force, _curve("sensor", site.output.name, site),
+        curves = [*force, *(_curve("sensor", s.output.name, s) for s in (site, *site.sensors)),
                   *(_curve("input", name, site) for name in site.inputs)]
         whole = [*curves, *(c for c in candidates if not c.per_recording)]
         found = directions(base.whitened, base.minimum.theta, whole)

@@ -14,7 +14,8 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.between import Motion, effects_between
 from pikanid.mismatch.catalogue.input_offset import input_offsets
 from pikanid.mismatch.catalogue.output_curve import output_curves
-from pikanid.mismatch.catalogue.site import Site, coordinates
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.sites import coordinates
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Effect, EffectForm, Model
 from pikanid.model.binding import Surroundings, bound

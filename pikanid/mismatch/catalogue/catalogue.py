@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from pikanid import errors
@@ -91,7 +91,7 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
 
     >>> from pikanid.recording import excitation
     >>> from pikanid.model import systems
-    >>> from pikanid.mismatch.catalogue.site import sites
+    >>> from pikanid.mismatch.catalogue.sites import sites
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known and c.suits() and not c.refines for c in found), found[0].key
@@ -113,6 +113,8 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
                             candidate = _placed(candidate, site.v in levered)
                         made.setdefault(candidate.key, replace(
                             candidate, families=families, pushes=make in FORCES))
+        for other in sites[0].sensors:
+            made |= {c.key: c for c in _of_sensor(replace(other, taken=sites[0].taken), table)}
     for entry in [*made.values()]:
         made |= {c.key: c for c in neighbouring_forms(entry) if entry.known}
     effects = tuple(effects)
@@ -125,6 +127,19 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     if any(map(units.begins_elsewhere, measured)):
         made = {key: c for key, c in made.items() if _has_meaning(c, model)}
     return tuple(with_twins([*own, *made.values()], effects))
+
+
+def _of_sensor(site: Site, table: Sequence[tuple[Make, tuple[Family, ...]]]
+               ) -> Iterator[Candidate]:
+    """What may be wrong with the sensor of an output that no equation's site is seen in.
+
+    No law of an equation is a twin of it, as other outputs show that as well.
+    """
+    for make, families in table:
+        for candidate in make(site):
+            if candidate.channel == "sensor":
+                yield replace(_told_apart(candidate), families=families, twin=candidate.twin and (
+                    f"{candidate.twin} in {site.output.name}"))
 
 
 def _placed(law: Candidate, levered: bool) -> Candidate:

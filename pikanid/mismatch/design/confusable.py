@@ -24,7 +24,7 @@ from pikanid.mismatch.catalogue.bound_effects import (
 )
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.design.response import Sigma
 from pikanid.mismatch.design.sizing import Sized, recorded, sized
 from pikanid.mismatch.fitting.fit import fitted

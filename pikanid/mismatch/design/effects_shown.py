@@ -13,7 +13,7 @@ from pikanid.figures import COLOURS, DPI, new_figure
 from pikanid.mismatch.catalogue.between import Motion
 from pikanid.mismatch.catalogue.bound_effects import bound_to
 from pikanid.mismatch.catalogue.candidate import Array
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model import Effect, Model
 from pikanid.model.domains import candidates_of
 from pikanid.model.rates import in_rates

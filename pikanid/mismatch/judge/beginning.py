@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pikanid.formula.expressions import TIME, symbol
-from pikanid.mismatch.catalogue.site import Site, sites
+from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Model
 from pikanid.problem.problem import Problem

@@ -14,7 +14,7 @@ from pikanid.mismatch.catalogue.bound_effects import (
     with_unseen_speeds,
 )
 from pikanid.mismatch.catalogue.catalogue import candidates as catalogue_of
-from pikanid.mismatch.catalogue.site import sites
+from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.pieces import in_pieces
 from pikanid.mismatch.data.preparation import (
     beginnings,
