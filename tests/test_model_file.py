@@ -145,6 +145,8 @@ BROKEN = [
     (DRIVEN.replace('initial = 0.0 }            #', "initial = [0] } #"), "a number"),
     (DRIVEN.replace("theta     = {", "t = {"), "built-in"),
     (DRIVEN.replace("l = {", "sin = {"), "built-in"),
+    (DRIVEN.replace('initial = 0.0 }            #', 'initial = "free" } #').replace(
+        "l = {", "theta_0 = {"), "which .parameters. has as well"),
     ("states = 3\n[equations]\nx = \"1\"", "table"),
     ("equations = 3\n[states]\nx = {}", "table"),
     ("[states]\nx = 1\n[equations]\nx = \"1\"", r"'x' under \[states\] is no table"),

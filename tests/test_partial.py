@@ -229,8 +229,8 @@ def test_what_noise_hides_is_no_remainder() -> None:
     assert isinstance(found, Doubtful) and "2.5 times" in found.why
 
 
-REMAINDER = Remainder(0.93, 0.95, 0.02, 0.004, 0.003, 0.0005, "rad", 1e-9, 16.0, 120.0, 3.2,
-                      ((1.0, 2.5),), (("timing", "its probability is 0.93"),))
+REMAINDER = Remainder(0.93, 0.95, "theta", 0.02, 0.004, 0.003, 0.0005, "rad", 1e-9, 16.0, 120.0,
+                      3.2, ((1.0, 2.5),), (("timing", "its probability is 0.93"),))
 FRICTION = reported_as.Present(
     "dry friction", (), "Coulomb friction", "-c*sign(v)",
     {"hysteresis": "hysteresis", "hysteresis[slim]": "hysteresis", "rounded": "Coulomb friction"},

@@ -90,10 +90,12 @@ def test_a_proof_is_told_output_by_output() -> None:
     assert Proof({**proof.outputs, "swing": OutputError(4.0, 1.0, 0.3, 0.3, "mm")}, 0.4,
                  {}).sensitive(DEFAULTS)
     content = proof.to_dict()
-    assert content["rmse_after"] == 0.002 and content["unit"] == "rad"
+    # ten noises of the nominal model against five
+    assert (content["output"], content["rmse_after"], content["unit"]) == ("swing", 0.31, "mm")
     assert content["outputs"]["swing"] == {
         "rmse_before": 4.0, "rmse_after": 0.31, "noise": 0.3, "unit": "mm"}
-    assert "outputs" not in Proof({"theta": proof.first}, 0.4, {}).to_dict()
+    alone = Proof({"theta": proof.outputs["theta"]}, 0.4, {}).to_dict()
+    assert alone["rmse_after"] == 0.002 and not {"output", "outputs"} & alone.keys()
 
 
 def test_what_is_missing_in_the_second_coordinate_is_found_there() -> None:

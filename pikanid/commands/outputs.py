@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -55,9 +56,11 @@ def _check_place(option: str, path: str, endings: Sequence[str]) -> None:
     except OSError as failure:
         why = failure.strerror or "the system refuses"
         raise errors.BadSetting(errors.output_refused(option, path, why)) from None
-    if not os.access(folder, os.W_OK | os.X_OK):
+    try:  # what access rights promise the file system may refuse
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
         why = f"the folder '{folder}' is not open for writing"
-        raise errors.BadSetting(errors.output_refused(option, path, why))
+        raise errors.BadSetting(errors.output_refused(option, path, why)) from None
 
 
 def _same(source: str, path: str) -> bool:

@@ -151,3 +151,9 @@ def too_few_of_its_own(where: str, samples: int, parameters: Sequence[str]) -> s
 def guess_and_value(source: str, name: str) -> str:
     return (f"'{source}': parameter '{name}' has a 'guess' and a 'value': leave out the value if "
             "it is to be estimated, the guess if it is known.")
+
+
+def initial_clash(source: str, state: str) -> str:
+    return (f"'{source}': the free initial value of '{state}' is the parameter '{state}_0', which "
+            f"[parameters] has as well: give that another name, or write initial = \"{state}_0\" "
+            "if it is the same.")

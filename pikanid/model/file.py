@@ -86,10 +86,12 @@ def from_dict(content: Mapping[str, Any], source: str, kind: Callable[..., M]) -
             parameters.setdefault(name, Parameter(name, 0.0))
     for name, entry in tables["states"].items():
         if entry.get("initial") == "free":
+            if f"{name}_0" in tables["parameters"]:
+                raise errors.BadModel(errors.initial_clash(source, name))
             free = Parameter(
                 f"{name}_0", entry.get("guess", 0.0), entry.get("unit", ""), _bounds(entry),
                 scope=entry.get("scope", "recording"), description=f"initial {name}")
-            parameters.setdefault(free.name, free)
+            parameters[free.name] = free
     names = {*tables["states"], *tables["inputs"], *parameters}
     functions = [s.name for s in splines]
     work = Work()

@@ -83,7 +83,7 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
     values = channel.values.copy()
     values[seen[bad]] = np.nan
     return recording.with_channels(replace(channel, values=values)), [
-        LeftOut(output, recording.name, float(channel.time[seen[k]])) for k in bad]
+        LeftOut(output, recording.name, float(channel.time[seen[k]])) for k in sorted(set(bad))]
 
 
 def _cluster(bad: Sequence[int] | np.ndarray, count: int, by_chance: float) -> bool:

@@ -145,47 +145,51 @@ class Proof:
         return any(e.after > settings.verdict.sensitive * e.moved for e in self.outputs.values())
 
     @property
-    def first(self) -> OutputError:
-        """Of the first output."""
-        return next(iter(self.outputs.values()))
+    def worst(self) -> str:
+        """The output that the nominal model misses most, in units of its noise."""
+        return max(self.outputs, key=lambda name: (
+            self.outputs[name].before / max(self.outputs[name].noise, 1e-300)))
+
+    @property
+    def of_worst(self) -> OutputError:
+        """Of that one."""
+        return self.outputs[self.worst]
 
     @property
     def rmse_before(self) -> float:
-        """Of the first output."""
-        return self.first.before
+        """Of that one."""
+        return self.of_worst.before
 
     @property
     def rmse_after(self) -> float:
-        """Of the first output."""
-        return self.first.after
-
-    @property
-    def rmse_moved(self) -> float:
-        """Of the first output."""
-        return self.first.moved
+        """Of that one."""
+        return self.of_worst.after
 
     @property
     def noise(self) -> float:
-        """Of the first output."""
-        return self.first.noise
+        """Of that one."""
+        return self.of_worst.noise
 
     @property
     def unit(self) -> str:
-        """Of the first output."""
-        return self.first.unit
+        """Of that one."""
+        return self.of_worst.unit
 
     def to_dict(self) -> dict[str, Any]:
-        """For diagnosis.json: numbers of the first output, and of each where there are several."""
-        found: dict[str, Any] = {
-            "rmse_before": self.rmse_before, "rmse_after": self.rmse_after, "noise": self.noise,
-            "unit": self.unit, "p_value": self.p_value}
+        """For diagnosis.json: numbers of the output that the nominal model misses most, and of each
+        where there are several.
+        """
+        found: dict[str, Any] = {**_rmse(self.of_worst), "p_value": self.p_value}
         if self.not_met:
             found["not_met"] = list(self.not_met)
         if len(self.outputs) > 1:
-            found["outputs"] = {name: {
-                "rmse_before": e.before, "rmse_after": e.after, "noise": e.noise, "unit": e.unit}
-                for name, e in self.outputs.items()}
+            found["output"] = self.worst
+            found["outputs"] = {name: _rmse(e) for name, e in self.outputs.items()}
         return found
+
+
+def _rmse(e: OutputError) -> dict[str, Any]:
+    return {"rmse_before": e.before, "rmse_after": e.after, "noise": e.noise, "unit": e.unit}
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,7 +111,8 @@ class Remainder:
         share_explained: Of the square of the nominal misfit, noise taken off, in the held-out
             recordings, with the parameters as they were fitted.
         share_train: The same in the recordings that were fitted.
-        rmse_before: Of the first output in the held-out recordings, nominal.
+        output: That the nominal model misses most in the held-out recordings.
+        rmse_before: Of that one, nominal.
         rmse: The same with the explanation.
         rmse_moved: The same with its parameters moved within their errors.
         noise: Of that output.
@@ -126,6 +127,7 @@ class Remainder:
 
     share_explained: float
     share_train: float
+    output: str
     rmse_before: float
     rmse: float
     rmse_moved: float
@@ -143,7 +145,7 @@ class Remainder:
         size, before, noise = (with_unit(f"{v:.3g}", self.unit)
                                for v in (self.rmse, self.rmse_before, self.noise))
         return (f"{almost(self.share_explained)} of the held-out misfit is explained; of "
-                f"{before} (RMSE) {size} are left, beside noise of {noise}")
+                f"{before} (RMSE of {self.output}) {size} are left, beside noise of {noise}")
 
     def lines(self) -> list[str]:
         """Where it is, and what keeps more from being sure."""

@@ -41,13 +41,13 @@ def remainder(case: Case, answer: Answer, proof: Proof | None) -> Remainder | No
     if answer.part is None or proof is None:
         return None
     h, counts = answer.part.hypothesis, answer.part.overdispersion
-    first = next(iter(proof.curves.values()))
+    seen, worst = proof.curves[proof.worst], proof.of_worst
     before, after, rows = case.base.minimum.chi2, h.minimum.chi2, h.whitened.rows
     return Remainder(
         answer.part.share, 1 - max(after - rows, 0.0) / max(before - rows, 1e-12),
-        proof.rmse_before, proof.rmse_after, proof.rmse_moved, proof.noise, proof.unit,
+        proof.worst, worst.before, worst.after, worst.moved, worst.noise, worst.unit,
         proof.p_value, counts, rows * max(after / rows, 1.0) / counts,
-        median_frequency(first.t, first.measured - first.after), loud_windows(h),
+        median_frequency(seen.t, seen.measured - seen.after), loud_windows(h),
         _doubts(answer.part))
 
 
