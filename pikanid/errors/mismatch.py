@@ -131,3 +131,9 @@ def times_in_another_unit(word: str, left: float, other: float) -> str:
 def sampled_otherwise(name: str, one: float, other: float) -> str:
     return (f"The held-out recording has a sample of the input '{name}' every {other:.3g} s, the "
             f"recording one every {one:.3g} s: what it does between samples is another motion.")
+
+
+def louder_than_read(p_value: float) -> str:
+    return (f"By the noise as it was read at first something is missing (p = {p_value:.1g}), and "
+            "nothing explains it; by what explains best, the noise is louder or has a colour, and "
+            "nothing is. A quiet stretch, or the same recorded again, tells which it is.")

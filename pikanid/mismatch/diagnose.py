@@ -135,6 +135,7 @@ def _diagnosed(case: Case, quiet: tuple[float, float] | None, tell: Callable[[st
     tell("detection")
     detection = case.detected()
     if not smaller(detection.p_value, alpha):
+        case.relevelled(case.base, quiet)
         return _nothing_left(case, detection)
     first, ranked = case.base, searched(case, tell)
     if case.base is not first and not smaller(
@@ -149,6 +150,10 @@ def _diagnosed(case: Case, quiet: tuple[float, float] | None, tell: Callable[[st
         tell("noise once more")
         ranked = with_noise_of_the_rest(case, case.search.ranked(), quiet, tell)
         answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
+    # what explains best has told the noise by now: beside that the nominal model may leave nothing
+    if answer.verdict == "unnamed" and not smaller((again := case.detected()).p_value, alpha):
+        case.notes.append(errors.louder_than_read(detection.p_value))
+        return _nothing_left(case, again)
     mend = None
     if answer.verdict == "unnamed" and case.later is not None:
         mend = patch(case.base, case.model, shape, site, case.records, case.later, case.predicted)

@@ -179,7 +179,7 @@ class Proof:
         """For diagnosis.json: numbers of the output that the nominal model misses most, and of each
         where there are several.
         """
-        found: dict[str, Any] = {**_rmse(self.of_worst), "p_value": self.p_value}
+        found = {**_rmse(self.of_worst), "p_value": self.p_value}
         if self.not_met:
             found["not_met"] = list(self.not_met)
         if len(self.outputs) > 1:
