@@ -176,9 +176,7 @@ class Proof:
         return self.of_worst.unit
 
     def to_dict(self) -> dict[str, Any]:
-        """For diagnosis.json: numbers of the output that the nominal model misses most, and of each
-        where there are several.
-        """
+        """For diagnosis.json: of the worst output, and of each where there are several."""
         found = {**_rmse(self.of_worst), "p_value": self.p_value}
         if self.not_met:
             found["not_met"] = list(self.not_met)
