@@ -14,6 +14,7 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.between import Motion, effects_between
 from pikanid.mismatch.catalogue.input_offset import input_offsets
 from pikanid.mismatch.catalogue.output_curve import output_curves
+from pikanid.mismatch.catalogue.output_drift import output_drifts
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.catalogue.sites import coordinates
 from pikanid.mismatch.data.whitened import Records, Whitened
@@ -47,7 +48,8 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     derived = [e for e in (*effects_between(site.model, coordinates(site.model), motion, names),
                            *input_offsets(site.model, sizes, names),
                            *output_curves(site.model, motion, {
-                               n: high - low for n, (low, high) in seen.items()}, names))
+                               n: high - low for n, (low, high) in seen.items()}, names),
+                           *output_drifts(site.model, first.stop - first.start, names))
                if all(e.key != one.key for one in own)]
     if not forms and not derived:
         return own
@@ -102,8 +104,12 @@ def reserved(sites: Iterable[Site], effects: Iterable[Effect]) -> tuple[Site, ..
 
 def with_unseen_speeds(sites: Iterable[Site], motion: Callable[[], Motion]) -> tuple[Site, ...]:
     """The sites, which know how large the states become that no output shows."""
-    return tuple(site if site.shown else replace(
-        site, unseen_speed=float(np.abs(motion()[site.v]).max(initial=0.0))) for site in sites)
+    return tuple(site if site.shown else _unseen(site, motion()) for site in sites)
+
+
+def _unseen(site: Site, motion: Motion) -> Site:
+    there = replace(site, unseen_speed=float(np.abs(motion[site.v]).max(initial=0.0)))
+    return replace(there, half_range=float(np.ptp(motion[site.q])) / 2) if site.q else there
 
 
 def motion_along(model: Model, records: Records) -> Motion:

@@ -60,8 +60,9 @@ def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
                                  one_sided=size.bounds[0] >= size.value) for probe in probes]
 
     return Candidate(
-        (effect.key,), effect.name, effect.expression, _channel(effect), site, (size, *others),
-        extend, directions, effect.variant, families=(effect.family or effect.name,), probes=probes,
+        (effect.key,), effect.name, effect.expression, _channel(effect, nominal), site,
+        (size, *others), extend, directions, effect.variant,
+        families=(effect.family or effect.name,), probes=probes,
         argument=_argument(effect, site, nominal),
         levels=tuple({size.name: effect.start, **probe} for probe in probes))
 
@@ -80,8 +81,10 @@ def _argument(effect: Effect, site: Site, nominal: Model) -> str:
     return used.pop() if len(used) == 1 else ""
 
 
-def _channel(effect: Effect) -> Channel:
-    if effect.add or effect.replace or effect.states or effect.initial:
+def _channel(effect: Effect, nominal: Model) -> Channel:
+    replaced = {*nominal.state_names, *(s.name for e in nominal.equations.values()
+                                        for s in e.free_symbols)} & effect.replace.keys()
+    if effect.add or replaced or effect.states or effect.initial:
         return "dynamics"
     return "input" if effect.inputs else "sensor"
 

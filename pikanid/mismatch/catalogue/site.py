@@ -26,7 +26,7 @@ class Site:
         model: The nominal model, its inputs held as recorded.
         q, v: Names of a coordinate and of its rate; of a state that is no other one's rate, an
             empty text and the state.
-        output: In which q, or the state, is seen.
+        output: In which q, or the state, is seen, or which it acts on through others.
         inputs: Recorded inputs that act on v'.
         extra: Recorded channels that the model does not use.
         rate: Natural frequency at the guesses [rad/s]; 0 without a restoring force.
@@ -36,7 +36,8 @@ class Site:
         still: Whether it does under the first values of its inputs as well, in every recording:
             only then is an input that comes late the same as an output that does.
         span: First and last time [s] of the first recording.
-        half_range: Half the range of the output there, in its unit.
+        half_range: Half the range of the output there, in its unit; of a coordinate that no output
+            shows half its own, along the nominal motion.
         interval: Between its samples, as a rule [s].
         suffix: Distinguishes names where a model has several coordinates.
         taken: Names that users' own effects have.
@@ -103,7 +104,8 @@ class Site:
     @property
     def shown(self) -> bool:
         """Whether an output shows how large the motion is."""
-        return bool(self.q) or self.output.expression == symbol(self.v)
+        shown = self.output.expression
+        return shown.has(symbol(self.q)) if self.q else shown == symbol(self.v)
 
     def slow_speed(self, wanted: str, share: float = 1.0) -> Parameter:
         """A speed at which a law changes its course, from a share of the usual one on."""

@@ -28,10 +28,10 @@ def coordinates(model: Model) -> list[tuple[str, str]]:
 
 
 def sites(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site, ...]:
-    """The coordinates that an output shows, one site each, and after them another one for each
-    coordinate on which forces act through a lever, and the equations of all other states that reach
-    an output: a current beside a position, or all there are without any coordinate.  The first one
-    holds further outputs, whose sensors may be wrong as well.
+    """The coordinates that an output shows, one site each, and after them those that reach one, the
+    equations of all other states that do (a current beside a position, or all there are without any
+    coordinate), and another site for each coordinate on which forces act through a lever.  The
+    first one holds further outputs, whose sensors may be wrong as well.
 
     Raises:
         BadModel: If no state reaches an output.
@@ -65,6 +65,8 @@ def _of_equations(model: Model, recordings: tuple[Recording, ...]) -> tuple[Site
             raise errors.BadModel(errors.nothing_seen(model.name))
         return first
     ordered = [chosen[q] for q, _ in pairs if q in chosen]
+    ordered += [(q, v, o) for q, v in pairs
+                if q not in chosen and (o := _reached(model, v)) is not None]
     found = [_site(model, recordings, q, v, o, f"_{q}" if len(ordered) > 1 else "")
              for q, v, o in ordered]
     others = [s.name for s in model.states if s.name not in {n for pair in pairs for n in pair}]
