@@ -12,6 +12,7 @@ from pikanid.mismatch.report.drawing import plot_proof, plot_shape, plot_where
 from pikanid.mismatch.report.sheets import held_out, parameters
 from pikanid.mismatch.report.text_report import places
 from pikanid.pieces.html import drawn, tabled, text
+from pikanid.pieces.sentences import p_text
 from pikanid.pieces.sheet import Sheet
 from pikanid.reporting.document import document
 
@@ -38,7 +39,7 @@ def page(dx: Diagnosis, title: str, files: Sequence[str] = ()) -> str:
               plot_where(dx, narrow=True)),
         _lost(dx), _patch(dx), _next(dx),
         f"<h2>Noise and notes</h2><ul>{notes}</ul>",
-        f'<p class="small">{text(f"p = {dx.p_value:.2g}")} at a false-alarm rate of '
+        f'<p class="small">{text(p_text(dx.p_value))} at a false-alarm rate of '
         f"{dx.alpha:g}; {dx.seconds:.1f} s. {text(str(dx.settings))}</p>"],
         {f"Nominal model: {dx.before.model.name}": dx.before.model},
         [*(f.recording for f in dx.before.fits), *(() if dx.held_out is None else (
@@ -55,7 +56,7 @@ def _proof(dx: Diagnosis) -> str:
               else "something else is left than noise")
     head, shows, said = (("The held-out recording, before and after", " before and after",
                           f"<p>Of the extended model {judged} "
-                          f"({text(f'p = {proof.p_value:.2g}')}).</p>") if dx.hypotheses
+                          f"({text(p_text(proof.p_value))}).</p>") if dx.hypotheses
                          else ("The held-out recording", "", ""))
     picture = drawn(figure, f"held-out outputs, predicted{shows}", plot_proof(dx, narrow=True))
     return f"<h2>{head}</h2>{picture}{tabled(held_out(dx))}{said}"

@@ -42,7 +42,7 @@ def explore(driven: bool, rate: float) -> str:
 
 def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rate: float,
            proves: bool, workers: int = 1, weak: bool = False, driven: bool = True,
-           idle: Sequence[str] = ()) -> str:
+           idle: Sequence[str] = (), all_explained: bool = False) -> str:
     """The next experiment for a verdict; empty where none is needed.
 
     Args:
@@ -55,6 +55,7 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
         weak: Whether something given predicts what is held out, but is too weak to be sure of.
         driven: Whether inputs act.
         idle: Names of given effects that do not act in the held-out recordings.
+        all_explained: Whether what is given leaves no more than noise.
     """
     if verdict == "named" and any(e.once for h in given for e in h.effects):
         return ("Find out what happened at that time. The extended model does it again in every "
@@ -65,7 +66,8 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
     if verdict == "set" or (weak and outside and len(given) > 1):
         return _separating(given[:records.settings.budget.compared], records, rate, workers)
     if verdict == "partial":
-        return f"To learn what is left, record {explore(driven, rate)}."
+        what = "be sure of more" if all_explained else "learn what is left"
+        return f"To {what}, record {explore(driven, rate)}."
     if given and weak and idle:
         return ("Give a held-out recording in which the motion and the input are as large as in "
                 f"this one, so that {listed(idle)} acts there as well: it decides what is "

@@ -18,7 +18,7 @@ from pikanid.mismatch.judge.verdict import Verdict
 from pikanid.mismatch.report.part import SHOWN, Closest, Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
-from pikanid.pieces.sentences import enumerated
+from pikanid.pieces.sentences import enumerated, p_text
 from pikanid.pieces.time_unit import spans
 
 TOLD = 3  # layout: explanations in the sentence; all of them stand below it
@@ -253,7 +253,7 @@ class DiagnosisData:
         if self.verdict == "none":
             return (f"The model explains the recording: nothing beyond noise (p = "
                     f"{self.p_value:.2g}).")
-        head = f"Something is missing in the model (p = {self.p_value:.1g}): "
+        head = f"Something is missing in the model ({p_text(self.p_value, 1)}): "
         titles = list(dict.fromkeys(titles_apart(self.hypotheses)))
         if self.verdict == "named" or (self.verdict == "set" and len(titles) == 1):
             return f"{head}{titles[0]}, confirmed {self._confirmed_on}."

@@ -6,6 +6,7 @@ from pikanid.estimate.rounding import rounded, with_unit
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
 from pikanid.mismatch.report.findings import DiagnosisData
 from pikanid.mismatch.report.sheets import parameters
+from pikanid.pieces.sentences import p_text
 
 TOLD = 8  # layout: parameters of the model in a line
 
@@ -53,7 +54,7 @@ def lines_of(dx: DiagnosisData) -> list[str]:
             change = with_unit(f"{error.before:.3g} -> {error.after:.3g}", error.unit)
             whose = f"of '{output}' " if several else ""
             told.append(f"{whose}{change}{moved} (noise {error.noise:.3g})")
-        lines.append(f"Proof: held-out RMSE {'; '.join(told)}, p = {p.p_value:.2g}")
+        lines.append(f"Proof: held-out RMSE {'; '.join(told)}, {p_text(p.p_value)}")
     if dx.patch is not None:
         lines.append(f"Patch: {dx.patch.sentence()}.")
     if dx.next_experiment:

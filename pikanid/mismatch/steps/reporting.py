@@ -29,6 +29,7 @@ from pikanid.mismatch.steps.mislabelled import mislabelled, sampled_otherwise
 from pikanid.mismatch.steps.remaining import closest, present, remainder
 from pikanid.model import Model
 from pikanid.model.domains import not_taken
+from pikanid.pieces.sentences import p_text
 from pikanid.problem.problem import bind
 from pikanid.recording import Recording
 
@@ -58,7 +59,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     if alone and not answer.given and proof is not None and proof.p_value < alpha:
         case.notes.append(
             "Nothing is missing in the recording, but the model does not predict the held-out one "
-            f"(p = {proof.p_value:.1g}): diagnose that one, with this one held out.")
+            f"({p_text(proof.p_value, 1)}): diagnose that one, with this one held out.")
         case.notes += sampled_otherwise(case)
     if answer.verdict == "unnamed":
         case.notes += mislabelled(case)
@@ -85,7 +86,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
         tuple(case.notes), smallest(case.base, case.candidates, counts, time),
         advice(answer.verdict, given, case.records, case.rate, case.proves,
                case.search.workers, bool(answer.doubt),
-               any(i.default is None for i in case.model.inputs), _idle(case, answer)),
+               any(i.default is None for i in case.model.inputs), _idle(case, answer),
+               proof is not None and proof.p_value >= case.settings.adequate),
         shape=shape,
         force_over_time=force,
         doubt=answer.doubt or (case.excuse if answer.verdict == "unconfirmed" else ""),
