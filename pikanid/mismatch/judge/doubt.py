@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -113,7 +115,8 @@ def gained(h: Hypothesis, over: Hypothesis, predict: Predict, scale: float) -> f
     return (over.minimum.chi2 - h.minimum.chi2 + later) / scale
 
 
-def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: Settings) -> str:
+def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: Settings,
+            spread: Mapping[str, float] = MappingProxyType({})) -> str:
     """That the size of an effect of one parameter may be nothing; empty where it is not so.
 
     Args:
@@ -121,12 +124,14 @@ def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: S
         h: As it was fitted.
         overdispersion: That divides χ²: standard errors grow with its root.
         settings: How many of them a size must be from nothing.
+        spread: How far apart other explanations have parameters, by name.
     """
     sizes = [p for p in effect.parameters if p.free and p.scope == "shared"]
     if len(sizes) != 1:
         return ""
     size = h.values[sizes[0].name]
-    error = float(np.sqrt(overdispersion)) * h.std[sizes[0].name]
+    error = math.hypot(math.sqrt(overdispersion) * h.std[sizes[0].name],
+                       spread.get(sizes[0].name, 0.0))
     if not below(abs(size - sizes[0].value), settings.verdict.sized * error):
         return ""
     return (f"the size of {effect.name} may be nothing beside the rest ({size:.3g} with a "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -155,9 +155,13 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
               and not smaller(w.share, rule.share)
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
-    return Part(tuple(sorted(present, key=lambda p: -p.dominance)),
-                doubtful, fewest.hypothesis, explained.overdispersion, fewest.share,
-                spread(fewest.hypothesis, not_ruled_out(fewest, found, rule)))
+    apart = spread(fewest.hypothesis, not_ruled_out(fewest, found, rule))
+    # a law of which others as good have another size altogether has no name: any that is like it
+    present = [replace(p, names=()) if p.names and no_size(
+        p.effect, fewest.hypothesis, explained.overdispersion, settings, apart) else p
+        for p in present]
+    return Part(tuple(sorted(present, key=lambda p: -p.dominance)), doubtful, fewest.hypothesis,
+                explained.overdispersion, fewest.share, apart)
 
 
 def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:
