@@ -87,7 +87,8 @@ def test_what_holds_neither_of_two_families_is_fitted_beside_the_rest(
 def test_the_best_without_both_families_are_compared() -> None:
     """However many do better that hold the one or the other."""
     gain, *springs, neither = (
-        SimpleNamespace(effects=e, values={}, blurred=frozenset(), fit=k, symbolic=False)
+        SimpleNamespace(effects=e, values={}, blurred=frozenset(), fit=k, symbolic=False,
+                        determines=lambda effect: True)
         for k, e in enumerate([(GAIN,), *[(SPRING,)] * 30, (DRAG,)]))
     pool = explanations._pool([gain, *springs, neither], RULE)
     assert neither in pool and len(pool) < 20

@@ -12,8 +12,10 @@ from weighing import COULOMB, DRAG, RULE, Candidate, weighed
 
 import pikanid as pk
 from pikanid.mismatch.fitting.as_estimate import widened
+from pikanid.mismatch.judge.doubt import no_size
 from pikanid.mismatch.judge.explanations import Weighed, not_ruled_out, spread
 from pikanid.mismatch.report.part import Value, values_of
+from pikanid.mismatch.settings.settings import DEFAULTS
 
 
 def with_parameter(effect: Candidate, name: str) -> Candidate:
@@ -59,3 +61,11 @@ def test_its_square_is_added_to_variances_of_shared_parameters() -> None:
     p = pk.Parameter("c", 0.0, "N")
     assert values_of((p,), {"c": 2.0}, {"c": 0.1}, 9.0, {"c": 0.4})["c"] == Value(
         2.0, pytest.approx(0.5), "N")
+
+
+@pytest.mark.parametrize(("spread", "sure"), [(0.0, True), (0.5, True), (0.8, False)])
+def test_a_size_that_others_have_far_otherwise_may_be_nothing(spread: float, sure: bool) -> None:
+    """Of 2.0 ± 0.2, by the noise alone, and with how far apart other explanations have it."""
+    effect: Any = SimpleNamespace(name="drag", parameters=(pk.Parameter("c", 0.0),))
+    h: Any = SimpleNamespace(values={"c": 2.0}, std={"c": 0.1})
+    assert (no_size(effect, h, 4.0, DEFAULTS, {"c": spread}) == "") is sure

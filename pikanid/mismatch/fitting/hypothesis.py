@@ -19,7 +19,7 @@ from pikanid.model import Model
 from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
-ENDLESS = 1e3  # numerical: standard errors of a size, relative to it, beyond any valley's
+ENDLESS = 1e3  # numerical: times a size, or its error alone, that an error without end exceeds
 
 
 @dataclass(frozen=True)
@@ -165,12 +165,25 @@ class Hypothesis:
         return float(np.log(max(self.whitened.rows, 1)))
 
     def determines(self, effect: Candidate) -> bool:
-        """Whether the recordings hold the size of an effect: one that has no end could be any, as
-        of a play that is wider than the motion.
+        """Whether the recordings hold the size of an effect: one that has no end, though by itself
+        it is seen, could be any, as of a play that is wider than the motion.
         """
         size = effect.parameters[0] if effect.parameters else None
-        return size is None or not size.free or not (
-            self.std[size.name] > ENDLESS * abs(self.values[size.name] - size.value))
+        if size is None or not size.free:
+            return True
+        own = [k for k, f in enumerate(self.whitened.problem.free) if f.name == size.name]
+        alone, error = (float(by[own].min()) for by in self._errors)
+        return error <= ENDLESS * max(abs(self.values[size.name] - size.value), alone)
+
+    @functools.cached_property
+    def _errors(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) standard errors were all others known, and with all that no bound holds."""
+        J = self.movable
+        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-100)
+        prior = (np.diag(self.orders) / norms) ** 2
+        w, v = np.linalg.eigh((J / norms).T @ (J / norms) + np.diag(np.minimum(prior, 1.0)))
+        spread = np.sqrt(np.sum(v**2 / np.maximum(w, 1e-16), axis=1))
+        return 1.0 / norms, spread / norms
 
     def improves_on(self, known: Hypothesis) -> bool:
         """Whether it is closer than another fit of the same effects, by more than fits stop at."""

@@ -56,8 +56,6 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     for e in h.effects:
         rest = h.key - {e.key}
         sizes = [p for p in e.parameters if p.free]
-        if not h.determines(e):
-            return f"the recording does not determine {sizes[0].name} of {e.name}: any is as good"
         if h.symbolic and len(sizes) > 1:
             size, error = h.values[sizes[0].name], h.std[sizes[0].name]
             if below(abs(size), asks.sized * error):
@@ -105,6 +103,8 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                 return said
             if past is not None and below(past, h.minimum.chi2 + asks.sized**2 * scale):
                 return f"a parameter past its bound would explain as much as {e.name} does"
+        if not h.determines(e):
+            return f"the recording does not determine {sizes[0].name} of {e.name}: any is as good"
     return ""
 
 
