@@ -144,7 +144,8 @@ class Remainder:
         """In words."""
         size, before, noise = (with_unit(f"{v:.3g}", self.unit)
                                for v in (self.rmse, self.rmse_before, self.noise))
-        return (f"{almost(self.share_explained)} of the held-out misfit is explained; of "
+        share = almost(self.share_explained)
+        return (f"{share[0].upper()}{share[1:]} of the held-out misfit is explained; of "
                 f"{before} (RMSE of {self.output}) {size} are left, beside noise of {noise}")
 
     def lines(self) -> list[str]:
