@@ -65,3 +65,14 @@ def test_times_counted_since_1970_are_in_their_unit(tmp_path: Path, factor: floa
         rec = Recording.read(written(tmp_path, f"{head},y\n" + lines), rate=None if "[s]" in head
                              else 1.0)
         assert not rec.notes
+
+
+@pytest.mark.parametrize(("times", "head", "told"), [
+    ("0 20 40", "t", True), ("0.0 20.0 40.0", "time", True), ("0 0.02 0.04", "t", False),
+    ("0 20 40", "t [ms]", False)])
+def test_times_that_are_whole_numbers_without_a_unit_are_told(
+        tmp_path: Path, times: str, head: str, told: bool) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text(f"{head},y [V]\n" + "".join(f"{t},{k}\n" for k, t in enumerate(times.split())))
+    assert any("are read as seconds" in note for note in Recording.read(file).notes) is told
+    assert not Recording.read(file, units={"t": "ms"}).notes

@@ -245,3 +245,8 @@ def no_surface(where: str, frames: int, reasons: Sequence[str]) -> str:
     why = f" ({'; '.join(reasons)})" if reasons else ""
     return (f"'{where}' shows a surface in fewer than two of {frames} readable frames{why}: check "
             "the file and the region.")
+
+
+def counted_as_seconds(name: str) -> str:
+    return (f"The whole numbers of '{name}' have no unit and are read as seconds: "
+            "'--unit t=ms' says that they are something else.")

@@ -114,6 +114,8 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
     notes = tuple(f"Column '{key}' is left out: {why}" for key, why in unreadable.items())
     notes += tuple(f"Times of '{found.name}' are read as {found.unit} since 1970."
                    for found in bases.clocks() if found.counted)
+    notes += tuple(errors.counted_as_seconds(found.name) for found in bases.clocks()
+                   if "t" not in request.units and _counts(found))
     if not made and not partly:
         soft = [unreadable[k] for k, found, _ in signals if not found.column.text]
         soft += [missing(name, available, where) for name in request.also if not every]
@@ -127,6 +129,13 @@ def channels(table: Table, request: Request, where: str, partly: bool = False) -
     others = tuple(found.column.path or found.name for found in available if found not in used)
     notes += (*sentinels, *note_gaps(made))
     return Result(tuple(made), (*table.notes, *notes), unreadable, bases.began(), others)
+
+
+def _counts(clock: Named) -> bool:
+    """Whether times without a unit are whole numbers: milliseconds, hours or samples perhaps."""
+    values = clock.column.values
+    return not (clock.unit or clock.column.is_clock) and len(values) > 2 and bool(
+        np.all(values == np.round(values)))
 
 
 def _defect(table: Table, where: str, found: Named) -> str:
