@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from opened import hypothesis
@@ -61,3 +63,13 @@ def test_a_play_wider_than_the_motion_could_have_any_size(insulated: bool) -> No
     if not insulated:
         off = found.values["half_play_T_a"] - 2.0
         assert abs(off) < 4 * found.std["half_play_T_a"] < 0.5
+
+
+def test_what_a_bound_holds_has_an_end() -> None:
+    """The way to one side is barred: that is no valley without an end."""
+    room = pk.systems.thermal_rc().with_values(R=0.02, C=3.6e5)
+    case = open_case(room, (heated(1, False),), (heated(2, False),), None, lambda text: None,
+                     DEFAULTS)
+    limited = hypothesis(case, "rate_limited_input[P]", rate_P=1e3, R=0.02, C=3.6e5, T_0=18.0)
+    held = replace(limited, minimum=replace(limited.minimum, J=np.zeros_like(limited.minimum.J)))
+    assert limited.determines(limited.effects[0]) and held.determines(held.effects[0])

@@ -165,25 +165,32 @@ class Hypothesis:
         return float(np.log(max(self.whitened.rows, 1)))
 
     def determines(self, effect: Candidate) -> bool:
-        """Whether the recordings hold the size of an effect: one that has no end, though by itself
-        it is seen, could be any, as of a play that is wider than the motion.
+        """Whether the recordings hold the size of an effect, or a bound does: one that has no end,
+        though by itself it is seen, could be any, as of a play that is wider than the motion.
         """
         size = effect.parameters[0] if effect.parameters else None
         if size is None or not size.free:
             return True
-        own = [k for k, f in enumerate(self.whitened.problem.free) if f.name == size.name]
-        alone, error = (float(by[own].min()) for by in self._errors)
-        return error <= ENDLESS * max(abs(self.values[size.name] - size.value), alone)
+        alone, error = self._errors
+        own = np.array([f.name == size.name for f in self.whitened.problem.free])
+        own &= np.isfinite(alone)
+        far = max(abs(self.values[size.name] - size.value), np.min(alone[own], initial=np.inf))
+        return not bool(np.any(error[own] > ENDLESS * far))
 
     @functools.cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) standard errors were all others known, and with all that no bound holds."""
-        J = self.movable
-        norms = np.maximum(np.linalg.norm(J, axis=0), 1e-100)
-        prior = (np.diag(self.orders) / norms) ** 2
-        w, v = np.linalg.eigh((J / norms).T @ (J / norms) + np.diag(np.minimum(prior, 1.0)))
-        spread = np.sqrt(np.sum(v**2 / np.maximum(w, 1e-16), axis=1))
-        return 1.0 / norms, spread / norms
+        """(n,) standard errors were all others known, and with all that no bound holds; infinite
+        where one does.
+        """
+        lengths = np.linalg.norm(self.movable, axis=0)
+        seen = lengths > 0
+        columns = self.movable[:, seen] / lengths[seen]
+        prior = (np.diag(self.orders)[seen] / lengths[seen]) ** 2
+        w, v = np.linalg.eigh(columns.T @ columns + np.diag(np.minimum(prior, 1.0)))
+        alone, error = (np.full(len(lengths), np.inf) for _ in range(2))
+        alone[seen] = 1.0 / lengths[seen]
+        error[seen] = alone[seen] * np.sqrt(np.sum(v**2 / np.maximum(w, 1e-16), axis=1))
+        return alone, error
 
     def improves_on(self, known: Hypothesis) -> bool:
         """Whether it is closer than another fit of the same effects, by more than fits stop at."""
