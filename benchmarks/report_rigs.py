@@ -61,8 +61,12 @@ longer confirmed. The last two sets of round 4 (two_mass_drive and cart_pole_upr
 after that and were answered blindly first: four of 60 wrong, all on the drive. One of these, an
 oscillation left by "another initial state" that had passed for a colour of the noise, went away
 once tests allowed for noise no louder than what a fit leaves; both sets are reported with that.
-Round 5 was made and answered long after that, blindly, by code in which standard errors count what
-bounds hold; of its sets those that are named have been run.
+Round 5 was made long after that. Eight of its sets were answered blindly by code in which standard
+errors count what bounds hold: 4 of 240 answers were wrong. One of these was looked at (of rivals
+only one had the shape of its dry friction open: dc_motor at 0.5 %, 026), and noise as slow as the
+motion of a foreign rig had been taken for a mismatch; with that mended all eight were answered
+again, and two_mass_drive at 0.5 % for the first time. These answers are reported; of the sets those
+that are named have been run.
 
 Of rounds 1 to 3, the code after round 4 has answered all sets of cascaded_tanks, dc_motor and
 thermal_rc again but three (cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at

@@ -108,7 +108,7 @@ def test_global_state_is_left_alone() -> None:
 def two_outputs() -> tuple[pk.Model, list[pk.Recording]]:
     """Two recordings, an estimated initial state, a parameter of each recording's own, σ known."""
     model = pk.Model.from_dict({
-        "name": "two", "states": {"x": {"initial": "free"}, "v": {}, "w": {}}, "inputs": {"u": {}},
+        "name": "two", "states": {"x": {"initial": "x_0"}, "v": {}, "w": {}}, "inputs": {"u": {}},
         "parameters": {"k": {"guess": 4.0, "bounds": [0.1, 50]},
                        "c": {"guess": 0.3, "scope": "recording"}, "x_0": {"guess": 0.4}},
         "equations": {"x": "v", "v": "-k*sin(x) - c*v + u", "w": "x - c*w"},

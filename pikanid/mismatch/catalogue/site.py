@@ -172,5 +172,6 @@ class Site:
 
 
 def at_rest(model: Model, e: sp.Expr) -> sp.Expr:
+    """A formula where all states and inputs are zero."""
     still = {symbol(n): sp.Integer(0) for n in (*model.state_names, *model.input_names)}
     return e.subs(still).doit()
