@@ -13,7 +13,7 @@ def no_model(kind: str) -> str:
 
 
 def duplicate_name(name: str, first: str, second: str) -> str:
-    return f"'{name}' names both a {first} and a {second}; every name may be used once."
+    return f"'{name}' names both {first} and {second}; every name may be used once."
 
 
 def missing_equation(state: str) -> str:
