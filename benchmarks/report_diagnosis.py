@@ -176,9 +176,9 @@ REAL = """Two drops of one ball repeat one experiment: what differs between them
 colour, and what is missing has to repeat.  Silverbox: fitted to 24,000 samples; in the last column
 both official tests.  Water carried by a robot: runs named by motion, time and turn; the delay of
 the film comes from the energies of film and motion, before any model.  Held-out RMSE is that of
-the first output.  To be sure of a family beside a remainder, the best explanation has to explain
-80 % of the square of the held-out misfit, and without the family four times as much has to be left
-(of a scale error 16 times).
+the output that is missed most.  To be sure of a family beside a remainder, the best explanation has
+to explain 80 % of the square of the held-out misfit, and without the family four times as much has
+to be left (of a scale error 16 times).
 """
 
 def _diagnosed(one: Set, work: Path, cases: int, workers: int
