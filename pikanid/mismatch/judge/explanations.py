@@ -84,9 +84,6 @@ def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
     if nominal is None or len(found) < 2 or below(nominal.predicted.chi2 - len(
             nominal.predicted.rest), settings.least_proof):
         return None
-    # what predicts worse than no effect at all is no rival either
-    most = settings.verdict.worse * nominal.predicted.misfit
-    found = [w for w in found if not smaller(most, w.predicted.misfit)]
     found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
     return Explanations(tuple(found), counts)
 
