@@ -133,7 +133,7 @@ def sampled_otherwise(name: str, one: float, other: float) -> str:
             f"recording one every {one:.3g} s: what it does between samples is another motion.")
 
 
-def louder_than_read(p_value: float) -> str:
-    return (f"By the noise as it was read at first something is missing (p = {p_value:.1g}), and "
+def louder_than_read(p_value: str) -> str:
+    return (f"By the noise as it was read at first something is missing ({p_value}), and "
             "nothing explains it; by what explains best, the noise is louder or has a colour, and "
             "nothing is. A quiet stretch, or the same recorded again, tells which it is.")

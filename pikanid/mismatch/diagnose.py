@@ -26,6 +26,7 @@ from pikanid.mismatch.steps.reporting import reported
 from pikanid.mismatch.steps.searching import searched, with_noise_of_the_rest
 from pikanid.mismatch.steps.surely import with_sure_part
 from pikanid.model import Model
+from pikanid.pieces.sentences import p_text
 from pikanid.problem.arguments import a_model, several
 from pikanid.recording import Recording
 from pikanid.settings import of_kind
@@ -152,7 +153,7 @@ def _diagnosed(case: Case, quiet: tuple[float, float] | None, tell: Callable[[st
         answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
     # what explains best has told the noise by now: beside that the nominal model may leave nothing
     if answer.verdict == "unnamed" and not smaller((again := case.detected()).p_value, alpha):
-        case.notes.append(errors.louder_than_read(detection.p_value))
+        case.notes.append(errors.louder_than_read(p_text(detection.p_value, 1)))
         return _nothing_left(case, again)
     mend = None
     if answer.verdict == "unnamed" and case.later is not None:
