@@ -78,10 +78,7 @@ def with_shapes(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]
     """With the shape of one of its effects left open: what an ideal law lacks another effect may
     make up for.
     """
-    for effect in h.effects:
-        for other in candidates:
-            if other.refines and effect.key in other.covers and effect.ids == other.ids:
-                yield _wider(h, effect, other, effect.key)
+    yield from with_wider(h, [c for c in candidates if c.refines])
 
 
 def with_cousins(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
