@@ -61,8 +61,9 @@ SKIPPED: tuple[tuple[Any, str, Any], ...] = (
     (nls, "changed", {}))
 # functions of settings that return a number, or decide, and do nothing else
 LIFTED = (*((rates, name) for name in ("quantile", "least_proof", "visible", "separated", "excess",
-                                       "contradiction", "dominance")),
-          (verdict, "dominance"), (adequacy, "_decides"), (decisions, "isfinite"))
+                                       "contradiction", "dominance", "odds_against")),
+          (verdict, "dominance"), (verdict, "odds_against"), (adequacy, "_decides"),
+          (decisions, "isfinite"))
 LEFT_OUT: Mapping[str, tuple[str, ...]] = {
     "says where, how large or what next once the verdict stands": (
         "band", "beyond.own", "beyond.line", "beyond.inside", "beyond.knots_a_period",

@@ -135,7 +135,7 @@ def test_a_section_says_what_does_not_survive():
     assert f"Verdicts that survive: {len(keys)}/{len(keys) + 2} (" in text
     assert f" 2/{len(keys) + 2} (" in text
     assert "| `verdict.decoy_handicap` | 4 → 3 | 1 of 1 | 0 of 1 | - |" in text
-    assert "| `verdict.behind` | 3 → 3.75 | 1 of 2 | 1 of 2 | rich 001 |" in text
+    assert "| `verdict.behind` | 2 → 2.5 | 1 of 2 | 1 of 2 | rich 001 |" in text
     assert "rich 001 (`verdict.behind`, `verdict.decoy_handicap`)" in text
     assert "No verdict of 1 depends on `" in text and "`verdict.improvement`" in text
     assert "- later (rich 002)" in text
@@ -162,7 +162,7 @@ def test_a_remembered_diagnosis_is_the_same():
                                 sigma=0.002, seed=seed) for seed in (1, 2))
     memory = Memory(varied.UNREAD)
     varied.diagnosed(train, other, DEFAULTS, memory)
-    for name, factor in (("budget.singles", 0.75), ("verdict.indistinct", 1.25),
+    for name, factor in (("budget.singles", 0.75), ("verdict.unlikely", 1.25),
                          ("verdict.decoy_handicap", 0.75), ("noise.lone", 0.75),
                          ("refusal", 1.25)):
         settings = varied.changed(SETTINGS[name], factor)

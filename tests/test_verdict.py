@@ -23,6 +23,7 @@ from pikanid.optimise.levenberg_marquardt import Minimum
 
 SITE = SimpleNamespace(suffix="", swing=1.0, v="v")
 ROWS = 1000
+APART, ODDS = DEFAULTS.verdict.indistinct, DEFAULTS.verdict.decoy_handicap
 
 
 def effect(name: str, known: bool = True) -> Candidate:
@@ -186,9 +187,9 @@ def test_an_effect_must_show_where_it_was_found() -> None:
 def test_no_name_is_sure_while_what_is_refused_does_far_better() -> None:
     """It is a part of the truth, or close to it."""
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1003.0, B)]
-    sure = answered(fits, {"b": -5.0}, refused=("b",))
+    sure = answered(fits, {"b": -3.0 - APART + 1.0}, refused=("b",))
     assert (sure.verdict, sure.given[0].key) == ("named", {"a"})
-    doubted = answered(fits, {"b": -12.0}, refused=("b",))
+    doubted = answered(fits, {"b": -3.0 - APART - 1.0}, refused=("b",))
     assert (doubted.verdict, doubted.given[0].key) == ("unconfirmed", {"a"})
     assert doubted.doubt == "what explains it far better leaves something unexplained"
 
@@ -231,14 +232,14 @@ def test_exact_ties_fall_the_same_way_whatever_the_rounding() -> None:
     """Each of these sits on a threshold: without a dead band the last digit decides."""
     same = [BASE, hypothesis(1000.0, A), hypothesis(1001.0, GUARD), hypothesis(1000.0, LAW)]
     assert answered(same, refused=("a",)).verdict == "named"
-    within = [BASE, hypothesis(1000.0, A), hypothesis(1006.0, B)]
+    within = [BASE, hypothesis(1000.0, A), hypothesis(1000.0 + APART, B)]
     assert [h.key for h in answered(within).given] == [{"a"}]
     equal = [BASE, hypothesis(1000.0, B), hypothesis(1000.0, A)]
     given = answered(equal)
     assert given.verdict == "set" and [h.key for h in given.given] == [{"a"}, {"b"}]
     strong = [hypothesis(1040.0), hypothesis(1000.0, A)]
     assert answered(strong).verdict == "named"
-    nearly = [BASE, hypothesis(1000.0, A), hypothesis(992.0, A, B)]
+    nearly = [BASE, hypothesis(1000.0, A), hypothesis(1000.0 - 14.0 + APART, A, B)]
     assert answered(nearly).verdict == "named"
 
 
@@ -248,14 +249,10 @@ def test_the_most_probable_explanation_comes_first() -> None:
     found = [criterion(h, None, 1.0, DEFAULTS.verdict)
              + {"a": -12.0}.get("+".join(h.key), 0.0) for h in given.given]
     assert len(found) == 2 and found == sorted(found)
-    part = answered([BASE, hypothesis(1000.0, A), hypothesis(1001.0, B)], refused=("a", "b"),
-                    misfit={"a": 0.22, "b": 0.21})
-    assert part.verdict == "unconfirmed" and [h.key for h in part.given] == [{"a"}, {"b"}]
-    # also a law of whole exponent, that no law of free exponent stands beside
-    square = replace(A, exponent=2.0)
-    part = answered([BASE, hypothesis(1000.0, square), hypothesis(1001.0, B)],
-                    refused=("a", "b"), misfit={"a": 0.22, "b": 0.21})
-    assert part.verdict == "unconfirmed" and [h.key for h in part.given] == [{"a"}, {"b"}]
+    for one in (A, replace(A, exponent=2.0)):  # also where no law of free exponent stands beside
+        part = answered([BASE, hypothesis(1000.0, one), hypothesis(1001.0, B)],
+                        refused=("a", "b"), misfit={"a": 0.22, "b": 0.21})
+        assert part.verdict == "unconfirmed" and [h.key for h in part.given] == [{"a"}, {"b"}]
 
 
 def test_what_is_sure_is_given_whatever_weak_effect_may_be_there_besides() -> None:
@@ -283,15 +280,17 @@ def test_a_law_outside_the_catalogue_that_would_do_as_well_stands_beside_the_nam
     fits = [BASE, hypothesis(1000.0, A), hypothesis(1001.0, GUARD)]
     given = answered(fits)
     assert given.verdict == "set" and [sorted(h.key) for h in given.given] == [["a"], ["outside"]]
-    assert answered([BASE, hypothesis(1000.0, A), hypothesis(1007.0, GUARD)]).verdict == "named"
-    # as much better as is no evidence, where both are given
-    tie = answered([BASE, hypothesis(1000.0, A), hypothesis(995.0, GUARD)])
+    worse, tied, better = (hypothesis(1000.0 + gap - ODDS, GUARD) for gap in (
+        APART + 1.0, 1.0, -1.0))
+    assert answered([BASE, hypothesis(1000.0, A), worse]).verdict == "named"
+    # somewhat better, and yet no more probable
+    tie = answered([BASE, hypothesis(1000.0, A), tied])
     assert tie.verdict == "set" and len(tie.given) == 2
     assert answered([BASE, hypothesis(1000.0, A), hypothesis(1001.0, B),
                      hypothesis(998.5, GUARD)]).verdict == "unconfirmed"
-    # one that does better keeps the name from being sure
-    better = answered([BASE, hypothesis(1000.0, A), hypothesis(993.0, GUARD)])
-    assert better.verdict == "unconfirmed" and "outside" in better.doubt
+    # one that is more probable keeps the name from being sure
+    given = answered([BASE, hypothesis(1000.0, A), better])
+    assert given.verdict == "unconfirmed" and "outside" in given.doubt
     # where only the law outside the catalogue is left, nothing has a name
     assert answered(fits, refused=("a",)).verdict == "unnamed"
 
@@ -299,8 +298,8 @@ def test_a_law_outside_the_catalogue_that_would_do_as_well_stands_beside_the_nam
 def test_a_form_next_to_the_name_is_given_where_it_is_likely_enough() -> None:
     """It is one of many: what it is handicapped by is the prior odds against it."""
     near = replace(effect("square", known=False), next_to="a")
-    found = [answered([BASE, hypothesis(1000.0, A), hypothesis(chi2, near)]).verdict
-             for chi2 in (1001.0, 1003.0, 995.0, 993.0)]
+    found = [answered([BASE, hypothesis(1000.0, A), hypothesis(1000.0 + gap - ODDS, near)]).verdict
+             for gap in (APART - 1.0, APART + 1.0, 1.0, -1.0)]
     assert found == ["set", "named", "set", "unconfirmed"]
 
 

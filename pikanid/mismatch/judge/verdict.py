@@ -152,17 +152,11 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
     merged, twins = merged_twins(known, tried, asks)
     # laws outside the catalogue that would do as well are for the reader to know
     lowest = min(map(total, known))
-    open_to, more = merged_twins(
-        [h for h in outside if below(
-            total(h) - (0.0 if h.next_form else _handicap(h, asks)), lowest + within)], tried, asks)
+    open_to, more = merged_twins([h for h in outside if below(total(h), lowest + within)],
+                                 tried, asks)
     merged, twins = merged + open_to, {**twins, **more}
-    # beside one name such a law, and a name's next form beside several, may explain it as much
-    # better as is no evidence: it is given, too
-    if proves and not known[0].symbolic and any(
-            below(total(h) - _handicap(h, asks),
-                  lowest - (within if len(merged) == 2 or h.next_form else 0.0))
-            for h in outside):
-        doubt = "a law outside the catalogue explains it better"
+    if proves and not known[0].symbolic and any(below(total(h), lowest) for h in outside):
+        doubt = "a law outside the catalogue is more probable"
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
     laws = [h for h in merged if not h.next_form]  # a name's next form is of one kind with it

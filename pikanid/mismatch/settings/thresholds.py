@@ -111,3 +111,15 @@ def dominance(chance: float, spread: float) -> float:
     4.0
     """
     return float(np.exp(spread * quantile(chance / 2)))
+
+
+def odds_against(share: float) -> float:
+    """Difference of the criterion at which one hypothesis has that share of another one's weight.
+
+    -2 ln(share): the criterion is -2 ln of the posterior weight but for a constant (R. E. Kass and
+    A. E. Raftery, J. Am. Stat. Assoc. 90, 1995).  To one decimal.
+
+    >>> odds_against(0.01)
+    9.2
+    """
+    return round(-2 * float(np.log(share)), 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pikanid.mismatch.settings.thresholds import dominance
+from pikanid.mismatch.settings.thresholds import dominance, odds_against
 from pikanid.settings import Amount, Count, Factor, Rate, Share
 
 
@@ -17,8 +17,9 @@ class VerdictSettings:
     90, 1995).
 
     Attributes:
-        indistinct: [criterion] below which hypotheses are not told apart: weights of 1 to 20.
-        behind: Times that, and a hypothesis can still be what predicts best.
+        unlikely: Posterior weight, as a share of the best one's, below which a hypothesis is told
+            apart from it.
+        behind: Times `indistinct`, and a hypothesis can still be what predicts best.
         same_law: [criterion]: what differs by less may be the same law, written in another way.
         decoy_handicap: [criterion] that each law outside the catalogue is handicapped by: prior
             odds of e² to 1 that a law is one that has a name.
@@ -62,8 +63,8 @@ class VerdictSettings:
         guessed: Probability from which on what is not confirmed is said to be perhaps so.
     """
 
-    indistinct: Amount = 6.0
-    behind: Factor = 3.0
+    unlikely: Rate = 0.01
+    behind: Factor = 2.0
     same_law: Amount = 1.0
     decoy_handicap: Amount = 4.0
     unforeseen: Rate = 0.005
@@ -88,6 +89,11 @@ class VerdictSettings:
     narrow: Share = 0.03
     sensitive: Factor = 1.2
     guessed: Rate = 0.05
+
+    @property
+    def indistinct(self) -> float:
+        """[criterion] below which hypotheses are not told apart."""
+        return odds_against(self.unlikely)
 
 
 @dataclass(frozen=True)
