@@ -212,7 +212,9 @@ def test_what_happens_once_may_take_any_course(course: str) -> None:
 
     dx = pk.diagnose(motor, run(truth, 1), run(motor, 2), workers=1)
     assert dx.verdict in ("named", "set")
-    assert all([e.ids for e in h.effects] == [("disturbance",)] for h in dx.hypotheses)
+    assert all(("disturbance",) in [e.ids for e in h.effects] for h in dx.hypotheses)
+    # that there is something else besides is a possibility at most
+    assert sum(h.probability or 0.0 for h in dx.hypotheses if len(h.effects) == 1) > 0.95
 
 
 @pytest.mark.slow

@@ -80,7 +80,7 @@ def test_a_model_sees_its_late_input_behind_play_and_limited_rate(
     np.testing.assert_allclose(found[:, 0], expected.at(probe - delay), atol=1e-7)
     np.testing.assert_array_equal(found[:, 1], 0.7)
     breaks = experiment.breakpoints()
-    carrier, side, _, ramp = acting(experiment.held[0], half, rate)
+    carrier, side, _, ramp, _ = acting(experiment.held[0], half, rate)
     every = np.unique(np.concatenate([p.switches for p in (carrier, side, ramp)]) + delay)
     np.testing.assert_array_equal(breaks, every[(every > 0.0) & (every < 1.1)])
 

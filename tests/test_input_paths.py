@@ -64,7 +64,7 @@ def test_what_follows_equals_the_oracle(values: list[float], half: float | None,
         expected = signals.played(expected, half)
     if np.isfinite(rate):
         expected = signals.slewed(expected, rate)
-    carrier, side, untouched, ramp = acting(HeldInput("u", t, u, hold), half, rate, start)
+    carrier, side, untouched, ramp, _ = acting(HeldInput("u", t, u, hold), half, rate, start)
     probe = np.sort([chance.uniform(0.0, t[-1] - 1e-6) for _ in range(200)])
     probe = probe[np.abs(probe - np.round(probe)) > 1e-6]
     found = carrier.at(probe) + (half or 0.0) * side.at(probe) - first

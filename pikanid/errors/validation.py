@@ -62,8 +62,8 @@ def diagnosis_unreadable(case: str, detail: object) -> str:
 
 
 def not_for_scipy(model: str) -> str:
-    return (f"'{short(model)}' has splines, play or rate limits of inputs, which concealed "
-            "recordings are not simulated with: leave them out.")
+    return (f"'{short(model)}' has splines, or inputs with play, a limited rate or a past, which "
+            "concealed recordings are not simulated with: leave them out.")
 
 
 def not_the_sealed(truth: str, folder: str) -> str:

@@ -21,7 +21,7 @@ from pikanid.model.shown_rates import showing
 
 M = TypeVar("M", bound=Operations)
 INPUT_MAPS = ("backlash", "backlash_start", "rate_limit", "gain", "offset", "saturation",
-              "dead_zone", "function", "lag", "delay")
+              "dead_zone", "function", "lag", "delay", "past")
 OUTPUT_MAPS = ("lag", "gain", "offset", "drift", "function", "clip", "delay")
 
 
@@ -31,18 +31,19 @@ def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
               gain: Formula | None = None, offset: Formula | None = None,
               saturation: Formula | None = None, dead_zone: Formula | None = None,
               function: Formula | None = None, lag: Formula | None = None,
-              delay: Formula | None = None) -> M:
+              delay: Formula | None = None, past: Formula | None = None) -> M:
     """The model whose input `name` passes through the given maps before it acts.
 
     They apply in the order of the keywords: u -> behind a play of ±backlash, at backlash_start in
     it (-1 to 1) when the record begins, by default as on a rig at rest -> changing no faster than
     rate_limit [1/s] -> gain·u -> + offset -> limited to ±saturation -> dead zone of ±dead_zone ->
     function (a formula of the input's name) -> first-order lag [s]; `delay` [s] shifts the recorded
-    signal, `hold` ("zero", "first", "cubic") says how it runs between samples.  Play, limited rate
-    and delay act on the recorded signal, before all other maps.
+    signal, and `past` is what acted before it begins (by default its first value); `hold` ("zero",
+    "first", "cubic") says how it runs between samples.  Play, limited rate and delay act on the
+    recorded signal, before all other maps.
 
     Raises:
-        BadModel: Unknown input or symbol, or a second backlash or rate limit.
+        BadModel: Unknown input or symbol, or a second backlash, rate limit or past.
 
     >>> from pikanid.model import Input, Model, Output, Parameter, State
     >>> import sympy as sp
@@ -82,7 +83,7 @@ def map_input(model: M, name: str, parameters: Sequence[Parameter] = (), *,
         swap = {u: held}
     paths = {}
     for what, formula in (("backlash", backlash), ("backlash_start", backlash_start),
-                          ("rate_limit", rate_limit)):
+                          ("rate_limit", rate_limit), ("past", past)):
         if formula is not None:
             if getattr(item, what) not in (0, None):
                 raise errors.BadModel(errors.path_twice(name, what.replace("_", " ")))

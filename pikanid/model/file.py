@@ -139,7 +139,8 @@ def to_dict(model: Lookup) -> dict[str, Any]:
             "delay": None if i.delay == 0 else _plain(i.delay),
             "backlash": None if i.backlash == 0 else _plain(i.backlash),
             "backlash_start": None if i.backlash_start is None else _plain(i.backlash_start),
-            "rate_limit": None if i.rate_limit == 0 else _plain(i.rate_limit)})
+            "rate_limit": None if i.rate_limit == 0 else _plain(i.rate_limit),
+            "past": None if i.past is None else _plain(i.past)})
             for i in model.inputs}
     if model.parameters:
         content["parameters"] = {p.name: _drop({

@@ -38,6 +38,9 @@ class Input:
     `rate_limit` per second (0: as fast as it likes).  `backlash_start` says where in the play it
     begins, from -1 (below) to 1 (above): what acts first is the recorded signal and so many half
     plays.  Without it nothing acts before the record begins, as on a rig at rest.
+
+    `past`, in the input's unit, is what acted before the record begins, and with a delay still
+    does for a while; without it the first recorded value did.
     """
 
     name: str
@@ -48,18 +51,21 @@ class Input:
     backlash: sp.Expr = sp.S.Zero
     rate_limit: sp.Expr = sp.S.Zero
     backlash_start: sp.Expr | None = None
+    past: sp.Expr | None = None
 
     @property
     def formulas(self) -> dict[str, sp.Expr]:
-        """Of parameters, by name of the field; without a start of the play where none is given."""
+        """Of parameters, by name of the field; without what is not given."""
         found = {"delay": self.delay, "backlash": self.backlash, "rate_limit": self.rate_limit}
-        start = self.backlash_start
-        return found if start is None else {**found, "backlash_start": start}
+        begins = {"backlash_start": self.backlash_start, "past": self.past}
+        return found | {what: formula for what, formula in begins.items() if formula is not None}
 
     @property
     def shaped(self) -> bool:
-        """Whether the recorded signal passes through play or a limit of its rate."""
-        return not (self.backlash.is_zero and self.rate_limit.is_zero)
+        """Whether more acts than the recorded signal, or less: play, a limit of its rate, what was
+        before.
+        """
+        return not (self.backlash.is_zero and self.rate_limit.is_zero and self.past is None)
 
 
 @dataclass(frozen=True)

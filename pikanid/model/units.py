@@ -120,5 +120,7 @@ def _input(item: Input, put: Callable[..., sp.Expr]) -> Input:
                      open_=not item.unit),
         backlash_start=None if item.backlash_start is None else put(
             item.backlash_start, declared("1"), f"The backlash start of input '{item.name}'"),
+        past=None if item.past is None else put(
+            item.past, own, f"The past of input '{item.name}'", open_=not item.unit),
         rate_limit=put(item.rate_limit, own.times(SECOND, Fraction(-1)),
                        f"The rate limit of input '{item.name}'", open_=not item.unit))

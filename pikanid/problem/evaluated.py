@@ -42,18 +42,22 @@ def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray)
                      for item in items]).reshape(len(items), len(p))
 
 
-def paths(model: Model, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Half the play, the greatest rate, and where in the play it begins, of every input (m,), at
-    parameters p (P,).
+def paths(model: Model, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Half the play, the greatest rate, where in the play it begins and what was before, of every
+    input (m,), at parameters p (P,).
 
-    A rate that is not limited is infinite, a start that is not given NaN.
+    A rate that is not limited is infinite, what is not given NaN.
     """
     table = dict(zip(model.parameter_names, p, strict=True))
+
+    def given(formula: sp.Expr | None) -> float:
+        return np.nan if formula is None else _number(formula, table)
+
     return (np.array([_number(i.backlash, table) for i in model.inputs]),
             np.array([_number(i.rate_limit, table) if i.rate_limit != 0 else np.inf
                       for i in model.inputs]),
-            np.array([np.nan if i.backlash_start is None else _number(i.backlash_start, table)
-                      for i in model.inputs]))
+            np.array([given(i.backlash_start) for i in model.inputs]),
+            np.array([given(i.past) for i in model.inputs]))
 
 
 @functools.lru_cache(maxsize=256)

@@ -143,32 +143,37 @@ class PiecewiseInput:
 
 
 class Acting(NamedTuple):
-    """Of v = carrier + side·half + start·open·half + ramp·rate the four signals; they are its
-    derivatives as well: ∂v/∂half = side + start·open, ∂v/∂start = half·open, ∂v/∂rate = ramp.
+    """Of v = carrier + side·half + start·open·half + ramp·rate + past·before the signals; they are
+    its derivatives as well: ∂v/∂half = side + start·open, ∂v/∂start = half·open, ∂v/∂rate = ramp,
+    ∂v/∂before = past.
     """
 
     carrier: PiecewiseInput
     side: PiecewiseInput
     open: PiecewiseInput
     ramp: PiecewiseInput
+    past: PiecewiseInput
 
-    def parts(self, half: float, rate: float = np.inf, start: float = np.nan
-              ) -> list[tuple[PiecewiseInput, float]]:
+    def parts(self, half: float, rate: float = np.inf, start: float = np.nan,
+              before: float = np.nan) -> list[tuple[PiecewiseInput, float]]:
         """The signals, each with what it is multiplied by in v."""
         return [(self.carrier, 1.0), (self.side, half),
                 (self.open, half * start if np.isfinite(start) else 0.0),
-                (self.ramp, rate if np.isfinite(rate) else 0.0)]
+                (self.ramp, rate if np.isfinite(rate) else 0.0),
+                (self.past, before if np.isfinite(before) else 0.0)]
 
 
 def acting(held: HeldInput, half: float | None = None, rate: float = np.inf,
-           start: float = np.nan) -> Acting:
+           start: float = np.nan, remembers: bool = False) -> Acting:
     """What follows an input u through a play of ±half, and no faster than `rate` per second.
 
     Behind the play v stays until u has crossed it and then follows u ∓ half (M. A. Krasnosel'skii
     and A. V. Pokrovskii, Systems with Hysteresis, 1989, sec. 2).  It begins at u + start·half, or,
     without a start, is 0 before the record begins.  The limit on the rate comes after the play and
     begins at its first value; without it `side` is -1 where u pushes upwards or did so last, +1
-    downwards, 0 before the first contact, until which `open` is 1 where there is a start.
+    downwards, 0 before the first contact, until which `open` is 1 where there is a start.  Before
+    the record begins, its first value acts, or, where it `remembers` another one, `past` is 1 and
+    everything else 0.
 
     >>> u = HeldInput("u", np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 0.9]), "zero")
     >>> carrier, side, *_ = acting(u, 0.25)
@@ -176,10 +181,13 @@ def acting(held: HeldInput, half: float | None = None, rate: float = np.inf,
     ([0.0, 0.75, 0.75], [0.0, -1.0, -1.0])
     >>> acting(u, 0.25, start=-0.5).open.values.tolist()
     [1.0, 0.0, 0.0]
-    >>> carrier, *_, ramp = acting(u, rate=2.0)
+    >>> carrier, _, _, ramp, _ = acting(u, rate=2.0)
     >>> t = np.array([1.0, 1.25, 1.75])
     >>> (carrier.at(t) + 2.0 * ramp.at(t)).tolist()
     [0.0, 0.5, 1.0]
+    >>> carrier, *_, past = acting(u, remembers=True)
+    >>> [part.at(np.array([-0.5, 1.5])).tolist() for part in (carrier, past)]
+    [[0.0, 1.0], [1.0, 0.0]]
     """
     from pikanid.problem.backlash import limited, play
 
@@ -200,5 +208,10 @@ def acting(held: HeldInput, half: float | None = None, rate: float = np.inf,
     if np.isfinite(begins):
         side = side - begins * untouched
     still = np.zeros(len(knots))
-    return Acting(PiecewiseInput(knots, carrier, rates), PiecewiseInput(knots, side, still),
-                  PiecewiseInput(knots, untouched, still), PiecewiseInput(knots, ramp, ramp_rates))
+    found = [(carrier, rates), (side, still), (untouched, still), (ramp, ramp_rates),
+             (still, still)]
+    if remembers:
+        knots = np.append(knots[0] - 1.0, knots)
+        found = [(np.append(float(k == len(found) - 1), values), np.append(0.0, slopes))
+                 for k, (values, slopes) in enumerate(found)]
+    return Acting._make(PiecewiseInput(knots, *part) for part in found)

@@ -85,11 +85,12 @@ class Experiment:
             return [[(held, 1.0)] for held in self.held]
         values = np.array(list(self.model.values.values()))
         found: list[list[tuple[HeldInput | PiecewiseInput, float]]] = []
-        for held, item, half, rate, start in zip(self.held, self.model.inputs,
-                                                 *paths(self.model, values), strict=True):
+        for held, item, half, rate, start, before in zip(
+                self.held, self.model.inputs, *paths(self.model, values), strict=True):
             play = None if item.backlash == 0 else half
-            found.append([*acting(held, play, rate, start).parts(half, rate, start)]
-                         if item.shaped else [(held, 1.0)])
+            acts = acting(held, play, rate, start, bool(np.isfinite(before)))
+            found.append([*acts.parts(half, rate, start, before)] if item.shaped
+                         else [(held, 1.0)])
         return found
 
     def initial(self, p: np.ndarray) -> np.ndarray:

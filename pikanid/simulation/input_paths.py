@@ -1,9 +1,9 @@
-"""Play and limited rates of inputs, for kernels that know neither: more inputs instead.
+"""Play, limited rates and the past of inputs, for kernels that know none: more inputs instead.
 
-Behind a play of ±b, begun at e·b in it, and a limit R of its rate an input is
-v = c + s·b + o·e·b + q·R (`pikanid.problem.held.acting`).  Between two knots c, s, o and q are
-straight lines, and the derivatives by b, e and R those of the formula: the sensitivities come out
-exact.
+Behind a play of ±b, begun at e·b in it, and a limit R of its rate, after B before the record, an
+input is v = c + s·b + o·e·b + q·R + a·B (`pikanid.problem.held.acting`).  Between two knots c, s,
+o, q and a are straight lines, and the derivatives by b, e, R and B those of the formula: the
+sensitivities come out exact.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ Paths = Sequence[np.ndarray]  # (m,) each, as from `pikanid.problem.evaluated.pa
 
 
 def with_parts(model: Model) -> Model:
-    """The model with every input that has play or a limited rate written as
-    c + s·b + o·e·b + q·R; the parts s, o and q are its last inputs.
+    """The model with every input that is `shaped` written as c + s·b + o·e·b + q·R + a·B; the
+    parts s, o, q and a are its last inputs.
 
     >>> from pikanid.model import systems
     >>> with_parts(systems.sloshing()).input_names
@@ -36,7 +36,8 @@ def with_parts(model: Model) -> Model:
 
 @functools.lru_cache(maxsize=64)
 def _with_parts(model: Model) -> Model:
-    plain = {"unit": "", "backlash": sp.S.Zero, "rate_limit": sp.S.Zero, "backlash_start": None}
+    plain = {"unit": "", "backlash": sp.S.Zero, "rate_limit": sp.S.Zero, "backlash_start": None,
+             "past": None}
     added, swap = [], {}
     for item in model.inputs:
         whole = symbol(item.name)
@@ -54,12 +55,12 @@ def _with_parts(model: Model) -> Model:
 
 def _factors(item: Input) -> dict[str, sp.Expr]:
     """What each part of an input is multiplied by, by the name of the part."""
-    start = item.backlash_start
-    found = {"side": item.backlash, "open": sp.S.Zero if start is None else start * item.backlash,
-             "ramp": item.rate_limit}
-    # a start that is zero now may be estimated: only one that is not given has no part
-    return {what: formula for what, formula in found.items()
-            if formula != 0 or (what == "open" and start is not None)}
+    found = {"side": item.backlash, "ramp": item.rate_limit}
+    found = {what: formula for what, formula in found.items() if formula != 0}
+    # what is zero now may be estimated: only what is not given has no part
+    if item.backlash_start is not None:
+        found["open"] = item.backlash_start * item.backlash
+    return found if item.past is None else {**found, "past": item.past}
 
 
 def _fresh(model: Model, name: str) -> str:
@@ -73,11 +74,12 @@ def split(model: Model, held: tuple[HeldInput, ...], paths: Paths
     """The inputs of `with_parts(model)` for the paths of its own ones."""
     own: list[HeldInput | PiecewiseInput] = []
     added: list[PiecewiseInput] = []
-    for item, h, half, rate, start in zip(model.inputs, held, *paths, strict=True):
+    for item, h, half, rate, start, before in zip(model.inputs, held, *paths, strict=True):
         if not item.shaped:
             own.append(h)
             continue
-        acts = acting(h, None if item.backlash == 0 else float(half), float(rate), float(start))
+        acts = acting(h, None if item.backlash == 0 else float(half), float(rate), float(start),
+                      bool(np.isfinite(before)))
         own.append(acts.carrier)
         added += [getattr(acts, what) for what in _factors(item)]
     return (*own, *added)
@@ -86,8 +88,9 @@ def split(model: Model, held: tuple[HeldInput, ...], paths: Paths
 def combined(model: Model, U: np.ndarray, paths: Paths) -> np.ndarray:
     """The model's own inputs (L, m) from those of `with_parts(model)` (L, m + parts)."""
     own, part = U[:, :len(model.inputs)].copy(), len(model.inputs)
-    for j, (item, half, rate, start) in enumerate(zip(model.inputs, *paths, strict=True)):
+    for j, (item, half, rate, start, before) in enumerate(zip(model.inputs, *paths, strict=True)):
+        factors = {"side": half, "open": start * half, "ramp": rate, "past": before}
         for what in _factors(item):
-            own[:, j] += {"side": half, "open": start * half, "ramp": rate}[what] * U[:, part]
+            own[:, j] += factors[what] * U[:, part]
             part += 1
     return own

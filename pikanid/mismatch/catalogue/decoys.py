@@ -242,7 +242,7 @@ def rate_limit(site: Site) -> list[Candidate]:
             inside = view.t[:-1, None] + steps[:, None] * (np.arange(PARTS) + 0.5) / PARTS
             found = []
             for size in top * np.array([2.0, 0.5, 0.15, 0.05, 0.015]) if top else ():
-                carrier, *_, ramp = acting(recorded, rate=size)
+                carrier, *_, ramp, _ = acting(recorded, rate=size)
                 at = inside.ravel()
                 mean = (carrier.at(at) + size * ramp.at(at)).reshape(inside.shape).mean(axis=1)
                 found.append(TangentDirection(

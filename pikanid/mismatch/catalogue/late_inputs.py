@@ -1,19 +1,20 @@
 """Catalogue: one of several inputs comes late, or was recorded late.
 
 Alone, an input that comes late is a twin of an output that does.  Where another input acts as well,
-or something moves at first, it is not.  An input whose recorder lags behind that of the outputs
-acts before it is recorded.
+or something moves at first, it is not.  What acted before a recording begins is not known, unless
+the model says so, and goes on to act for as long as the input is late: it is another unknown of
+each recording.  An input whose recorder lags behind that of the outputs acts before it is recorded.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
-from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.site import Site, estimates_a_start
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
@@ -22,16 +23,32 @@ LEADS = (1.5, 3.0, 8.0)  # numerical: the same of what acts before it is recorde
 
 
 def input_delay(site: Site) -> list[Candidate]:
-    """A delay of each input by itself; of a lone one out of rest only beside a channel that acts as
-    well.
+    """A delay of each input by itself; of a lone one only beside a channel that acts as well, where
+    it is the same as one of the output.
     """
     tau = Parameter(site.name("tau_in"), 0.0, "s", (0.0, float("inf")))
+    same = len(site.inputs) == 1 and (site.still or (
+        len(site.pasts) == len(site.model.outputs) == 1 and estimates_a_start(site.model)))
     return [Candidate(
-        ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site, (tau,),
-        partial(_delayed, u, tau.name),
+        ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site,
+        (tau, *past.values()), partial(delayed, {u: tau.name}, past),
         partial(_shifted, u, tau, SHIFTS, 1), variant=u, twin="delay",
-        beside=() if len(site.inputs) > 1 or not site.still else ("cross_axis",))
-        for u in site.inputs]
+        beside=("cross_axis",) if same else (), begins=tuple(p.name for p in past.values()))
+        for u in site.inputs for past in [pasts(site, (u,))]]
+
+
+def pasts(site: Site, inputs: Iterable[str]) -> dict[str, Parameter]:
+    """What those inputs were before each recording, where that is not known."""
+    return {u: Parameter(site.name("u_past", u if len(site.pasts) > 1 else ""),
+                         sum(site.pasts[u]) / 2, site.model.input(u).unit, site.pasts[u],
+                         scope="recording") for u in inputs if u in site.pasts}
+
+
+def delayed(by: Mapping[str, str], past: Mapping[str, Parameter], model: Model) -> Model:
+    """The model whose inputs come late by so much, after what they were before a recording."""
+    for u, tau in by.items():
+        model = model.map_input(u, delay=tau, past=past[u].name if u in past else None)
+    return model
 
 
 def input_lead(site: Site) -> list[Candidate]:
@@ -42,13 +59,9 @@ def input_lead(site: Site) -> list[Candidate]:
     tau = Parameter(site.name("tau_lead"), site.interval, "s", (site.interval, float("inf")))
     return [Candidate(
         ("input_lead",), f"{u} acts before it is recorded", f"{u}(t + {tau.name})", "input", site,
-        (tau,), partial(_delayed, u, f"-{tau.name}"),
+        (tau,), partial(delayed, {u: f"-{tau.name}"}, {}),
         partial(_shifted, u, tau, LEADS, -1), variant=u, undoes="input_delay")
         for u in site.inputs]
-
-
-def _delayed(u: str, by: str, model: Model) -> Model:
-    return model.map_input(u, delay=by)
 
 
 def _shifted(u: str, tau: Parameter, shifts: Sequence[float], later: int, view: View

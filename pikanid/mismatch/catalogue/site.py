@@ -46,6 +46,8 @@ class Site:
         along: The parameter whose damping acts so.
         unseen_speed: Largest value of a state that no output shows, along the nominal motion.
         operating: Inputs that do not begin at 0 in every recording: the rig need not be at rest.
+        pasts: Inputs that move, with the range in which lies what they were before the recordings,
+            where that is not known: the rig need not be at rest, and no initial value follows them.
         sensors: Of the first site: outputs in which none is seen, as a gyro beside an angle.
     """
 
@@ -68,6 +70,7 @@ class Site:
     along: str = ""
     unseen_speed: float = 0.0
     operating: tuple[str, ...] = ()
+    pasts: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
     sensors: tuple[Site, ...] = ()
 
     def pushed(self, model: Model, force: Formula) -> Model:
@@ -169,6 +172,12 @@ class Site:
         """
         return free_name(wanted + (f"_{of}" if of else "") + self.suffix, self.model.symbols,
                          self.taken)
+
+
+def estimates_a_start(model: Model) -> bool:
+    """Whether some initial value is estimated."""
+    return any(q.name in model.parameter_names and model.parameter(q.name).free
+               for s in model.states for q in s.initial.free_symbols)
 
 
 def at_rest(model: Model, e: sp.Expr) -> sp.Expr:

@@ -12,7 +12,7 @@ from pikanid import errors
 from pikanid.formula.expanding import expanded
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.lever import lever
-from pikanid.mismatch.catalogue.site import Site, at_rest
+from pikanid.mismatch.catalogue.site import Site, at_rest, estimates_a_start
 from pikanid.model import Model
 from pikanid.model.parts import Output
 from pikanid.recording import Recording
@@ -127,8 +127,28 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
                 all(_starts_still(model, r) for r in recordings),
                 (first.start, first.stop), _swing(first, output.name),
                 _interval(first, output.name), suffix,
-                operating=tuple(n for n in inputs if not all(
-                    n in r and _begins_at_zero(r[n].values) for r in recordings)))
+                operating=tuple(n for n in inputs if _operating(n, recordings)),
+                pasts=_pasts(model, recordings))
+
+
+def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, tuple[float, float]]:
+    first = recordings[0]
+    moving = [n for n in model.input_names if n in first and _moves(first, n)]
+    # a model that begins in balance with an input says what was before
+    if (any(s.initial.has(symbol(n)) for s in model.states for n in model.input_names)
+            or not any(_operating(n, recordings) for n in moving)):
+        return {}
+    return {n: _about(first, n) for n in moving}
+
+
+def _about(recording: Recording, name: str) -> tuple[float, float]:
+    """The range of an input, and as much on both sides."""
+    low, high = (float(f(recording[name].values)) for f in (np.min, np.max))
+    return 2 * low - high, 2 * high - low
+
+
+def _operating(name: str, recordings: tuple[Recording, ...]) -> bool:
+    return not all(name in r and _begins_at_zero(r[name].values) for r in recordings)
 
 
 def _begins_at_zero(values: np.ndarray) -> bool:
@@ -156,8 +176,7 @@ def _moves(recording: Recording, name: str) -> bool:
 
 
 def _starts_still(model: Model, recording: Recording) -> bool:
-    if any(q.name in model.parameter_names and model.parameter(q.name).free
-           for s in model.states for q in s.initial.free_symbols):
+    if estimates_a_start(model):
         return False
     at = {symbol(n): value for n, value in model.values.items()}
     at |= {symbol(i.name): float(recording[i.name].values[0]) if i.name in recording
