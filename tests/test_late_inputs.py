@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 import pikanid as pk
-from pikanid.mismatch.catalogue.late_inputs import input_delay, input_lead
+from pikanid.mismatch.catalogue.delays import input_delay, input_lead
 from pikanid.mismatch.catalogue.sites import sites
 
 STEP, FINE, SIGMA = 0.02, 10, 0.003  # s, steps of the truth between two samples, V

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pikanid import errors
 from pikanid.formula import units
-from pikanid.mismatch.catalogue import channels, decoys, forces, friction, late_inputs
+from pikanid.mismatch.catalogue import channels, decoys, delays, forces, friction
 from pikanid.mismatch.catalogue.backlash import input_backlash
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.catalogue.coupled_state import coupled_state
@@ -38,9 +38,9 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (forces.disturbance, ("once",)),
     (friction.boundary_layer, ("drag",)),
     (friction.hysteresis, ("dry friction",)),
-    (channels.delay, ("timing",)),
-    (late_inputs.input_delay, ("timing",)),
-    (late_inputs.input_lead, ("timing",)),
+    (delays.delay, ("timing",)),
+    (delays.input_delay, ("timing",)),
+    (delays.input_lead, ("timing",)),
     (channels.lags, ("timing",)),
     (channels.input_gain, ("gain",)),
     (channels.sensor_gain, ("gain",)),

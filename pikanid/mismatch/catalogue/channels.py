@@ -11,8 +11,7 @@ import numpy as np
 from pikanid.formula import units
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
-from pikanid.mismatch.catalogue.late_inputs import delayed, pasts
-from pikanid.mismatch.catalogue.site import Site, estimates_a_start
+from pikanid.mismatch.catalogue.site import Site
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.problem.held import PIECES
@@ -128,36 +127,6 @@ def _returns(there: np.ndarray) -> bool:
     turns = np.diff(there.astype(int))
     left, entered = np.flatnonzero(turns < 0), np.flatnonzero(turns > 0)
     return len(entered) > 0 and bool(np.any(left > entered[0]))
-
-
-def delay(site: Site) -> list[Candidate]:
-    """A shift in time: of all inputs or of the output, which are exact twins out of rest, and in
-    operation, where a recording begins anywhere and what was before is not known.
-    """
-    tau = Parameter(site.name("tau"), 0.0, "s", (0.0, INF))
-    o = site.output.name
-    past = pasts(site, site.pasts) if len(site.model.outputs) == 1 else {}
-
-    def directions(view: View) -> list[TangentDirection]:
-        step = float(np.median(np.diff(view.t)))
-        found = []
-        for shift in (0.3 * step, 3 * step, 8 * step):
-            late = np.interp(view.t - shift, view.t, view.y[o])
-            found.append(TangentDirection({tau.name: shift}, seen=late - view.y[o], one_sided=True))
-        return found
-
-    both = ("input_delay", "sensor_delay")
-    held = Candidate(both if site.inputs and site.still else both[1:], "a delay",
-                     f"{o}(t - {tau.name})", "sensor", site, (tau,),
-                     partial(Model.map_output, name=o, delay=tau.name), directions, twin="delay")
-    if not past:
-        return [held]
-    moving = replace(
-        held, ids=both if len(past) == 1 else both[1:], parameters=(tau, *past.values()),
-        extend=partial(delayed, dict.fromkeys(past, tau.name), past),
-        begins=tuple(p.name for p in past.values()))
-    return [moving] if estimates_a_start(site.model) else [
-        held, replace(moving, variant="moving", beside=("initial_state",))]
 
 
 LAGS = (0.075, 0.25, 0.75, 2.5)  # numerical: samples, from where fits begin

@@ -1,4 +1,4 @@
-"""Catalogue: one of several inputs comes late, or was recorded late.
+"""Catalogue: an output or one of several inputs comes late, or was recorded late.
 
 Alone, an input that comes late is a twin of an output that does.  Where another input acts as well,
 or something moves at first, it is not.  What acted before a recording begins is not known, unless
@@ -9,6 +9,7 @@ each recording.  An input whose recorder lags behind that of the outputs acts be
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,6 +21,33 @@ from pikanid.model.parts import Parameter
 
 SHIFTS = (0.3, 3.0, 8.0)  # numerical: samples, from where fits begin
 LEADS = (1.5, 3.0, 8.0)  # numerical: the same of what acts before it is recorded
+
+
+def delay(site: Site) -> list[Candidate]:
+    """A shift in time: of all inputs or of the output, which are exact twins out of rest, and in
+    operation, where a recording begins anywhere and what was before is not known.
+    """
+    tau = Parameter(site.name("tau"), 0.0, "s", (0.0, float("inf")))
+    o = site.output.name
+    past = pasts(site, site.pasts) if len(site.model.outputs) == 1 else {}
+
+    def directions(view: View) -> list[TangentDirection]:
+        step = float(np.median(np.diff(view.t)))
+        return [TangentDirection({tau.name: shift}, one_sided=True, seen=np.interp(
+            view.t - shift, view.t, view.y[o]) - view.y[o]) for shift in step * np.array(SHIFTS)]
+
+    both = ("input_delay", "sensor_delay")
+    held = Candidate(both if site.inputs and site.still else both[1:], "a delay",
+                     f"{o}(t - {tau.name})", "sensor", site, (tau,),
+                     partial(Model.map_output, name=o, delay=tau.name), directions, twin="delay")
+    if not past:
+        return [held]
+    moving = replace(
+        held, ids=both if len(past) == 1 else both[1:], parameters=(tau, *past.values()),
+        extend=partial(delayed, dict.fromkeys(past, tau.name), past),
+        begins=tuple(p.name for p in past.values()))
+    return [moving] if estimates_a_start(site.model) else [
+        held, replace(moving, variant="moving", beside=("initial_state",))]
 
 
 def input_delay(site: Site) -> list[Candidate]:
