@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid.errors import BadModel
 from pikanid.formula.expressions import TIME, symbol
-from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.catalogue import OF_QUANTITY, candidates
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.model.parts import Output
 
@@ -32,15 +32,15 @@ def motor() -> pk.Model:
         "outputs": {"w": {"unit": "rad/s", "expression": "w"}}})
 
 
-def tanks() -> pk.Model:
+def tanks(unit: str = "cm") -> pk.Model:
     return pk.Model.from_dict({
         "name": "tanks", "inputs": {"u": {"unit": "V"}},
-        "states": {"x1": {"unit": "cm"}, "x2": {"unit": "cm"}},
-        "parameters": {"k": {"unit": "cm/(s*V)", "value": 1.0},
+        "states": {"x1": {"unit": unit}, "x2": {"unit": unit}},
+        "parameters": {"k": {"unit": f"({unit})/(s*V)", "value": 1.0},
                        "a": {"unit": "1/s", "guess": 0.1, "bounds": [0.001, 10.0]},
                        "b": {"unit": "1/s", "guess": 0.1, "bounds": [0.001, 10.0]}},
         "equations": {"x1": "k*u - a*x1", "x2": "a*x1 - b*x2"},
-        "outputs": {"y": {"unit": "cm", "expression": "x2"}}})
+        "outputs": {"y": {"unit": unit, "expression": "x2"}}})
 
 
 def test_every_state_that_reaches_an_output_is_a_site() -> None:
@@ -245,3 +245,15 @@ def test_a_motor_that_its_voltage_reaches_late() -> None:
     assert [e.ids for e in best.effects] == [("input_delay",)]
     tau = next(iter(best.effects[0].parameters.values()))
     assert tau.value == pytest.approx(0.034, abs=5 * tau.std)
+
+
+def test_what_is_no_speed_is_lost_and_has_no_friction() -> None:
+    made = {unit: {c.name for c in candidates(sites(tanks(unit), (STILL,)))}
+            for unit in ("cm", "rad/s")}
+    said = {unit: {name for name in names if "friction" in name or "drag" in name}
+            for unit, names in made.items()}
+    assert said["rad/s"] and not said["cm"]
+    assert {"a constant loss of x1", "a quadratic loss of x2", "a power-law loss of x1",
+            "a source local in time"} <= made["cm"] - made["rad/s"]
+    # every name that is changed is one that an entry has
+    assert {n for n in OF_QUANTITY if not any(n in name for name in made["rad/s"])} == set()

@@ -239,7 +239,8 @@ def test_exact_ties_fall_the_same_way_whatever_the_rounding() -> None:
     assert given.verdict == "set" and [h.key for h in given.given] == [{"a"}, {"b"}]
     strong = [hypothesis(1040.0), hypothesis(1000.0, A)]
     assert answered(strong).verdict == "named"
-    nearly = [BASE, hypothesis(1000.0, A), hypothesis(1000.0 - 14.0 + APART, A, B)]
+    more = DEFAULTS.verdict.needless
+    nearly = [BASE, hypothesis(1000.0, A), hypothesis(1000.0 - 14.0 + more, A, B)]
     assert answered(nearly).verdict == "named"
 
 

@@ -72,6 +72,16 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.rate_limit, ("timing",)),
     (fading_memory, ("storage",)),
 )
+# what the laws of a motion are called where they act on a quantity that is no speed
+OF_QUANTITY = {
+    "Coulomb friction": "a constant loss",
+    "Coulomb friction with a rounded reversal": "a rounded constant loss",
+    "quadratic drag": "a quadratic loss",
+    "drag with an exponent of its own": "a power-law loss",
+    "friction in one direction": "a one-sided constant loss",
+    "friction that rises at low speed": "a loss that rises near zero",
+    "a force local in time": "a source local in time",
+    "a force local in time, its course open": "a source local in time, its course open"}
 # what acts on a coordinate as a force, which a lever hands on to others
 FORCES: frozenset[Make] = frozenset((
     friction.coulomb_friction, friction.linear_drag, friction.quadratic_drag,
@@ -108,7 +118,8 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
                     continue
                 for candidate in make(site):
                     if all(first[name] == site.v for name in _channels(candidate)):
-                        candidate = _told_apart(candidate)
+                        candidate = _told_apart(candidate if site.mechanical else replace(
+                            candidate, name=OF_QUANTITY.get(candidate.name, candidate.name)))
                         if site.suffix and make in FORCES:
                             candidate = _placed(candidate, site.v in levered)
                         made.setdefault(candidate.key, replace(
@@ -147,7 +158,8 @@ def _placed(law: Candidate, levered: bool) -> Candidate:
     same law along it is its twin.
     """
     site = law.site
-    name = f"{law.name} on {site.q or site.v}" + (f" as {site.along} acts" if site.lever else "")
+    name = f"{law.name} {'on' if site.mechanical else 'of'} {site.q or site.v}" + (
+        f" as {site.along} acts" if site.lever else "")
     own = f"{law.ids[0]}[{law.variant}]" if levered else ""
     return replace(law, name=name, twin=law.twin or own)
 

@@ -83,6 +83,12 @@ class Site:
         return model
 
     @property
+    def mechanical(self) -> bool:
+        """Whether its state is a speed, of which one says friction and drag."""
+        return bool(self.q) or any(units.convertible(self.speed_unit, speed)
+                                   for speed in ("m/s", "rad/s"))
+
+    @property
     def acceleration(self) -> sp.Expr:
         """The right-hand side of v'."""
         return self.model.equations[self.v]

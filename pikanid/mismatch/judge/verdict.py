@@ -104,9 +104,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         ahead([partial(getattr, seen, "detection") for h in near
                if not smaller(test(h).p_value, adequate) and (seen := predict(h))])
     given = [h for h in near if passes(h)]
-    for h in [h for h in given if _needless(h, near, given, scale, asks)]:
-        spare[h.key] = "holds more than is needed"
-        given.remove(h)
+    needless = [h for h in given if _needless(h, near, given, scale, asks)]
+    spare |= {h.key: "holds more than is needed" for h in needless}
+    given, near = ([h for h in some if h not in needless] for some in (given, near))
     if checked:
         # what the recording speaks against a little may predict better
         best = min(map(total, near))
@@ -238,7 +238,7 @@ def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothe
         return True  # a longer formula for the same
     own = _handicapped(h, scale, asks)
     return any(o.key < h.key and not below(own, _handicapped(o, scale, asks) + (
-        0.0 if o in given and not h.known else asks.indistinct)) for o in near)
+        0.0 if o in given and not h.known else asks.needless)) for o in near)
 
 
 def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, test: Test,

@@ -19,6 +19,8 @@ class VerdictSettings:
     Attributes:
         unlikely: Posterior weight, as a share of the best one's, below which a hypothesis is told
             apart from it.
+        besides: The same of an explanation that holds one more effect than another: that there is
+            more needs some evidence, that it may be something else needs none.
         behind: Times `indistinct`, and a hypothesis can still be what predicts best.
         same_law: [criterion]: what differs by less may be the same law, written in another way.
         decoy_handicap: [criterion] that each law outside the catalogue is handicapped by: prior
@@ -64,6 +66,7 @@ class VerdictSettings:
     """
 
     unlikely: Rate = 0.01
+    besides: Rate = 0.05
     behind: Factor = 2.0
     same_law: Amount = 1.0
     decoy_handicap: Amount = 4.0
@@ -94,6 +97,11 @@ class VerdictSettings:
     def indistinct(self) -> float:
         """[criterion] below which hypotheses are not told apart."""
         return odds_against(self.unlikely)
+
+    @property
+    def needless(self) -> float:
+        """[criterion] from which on one more effect is not told."""
+        return odds_against(self.besides)
 
 
 @dataclass(frozen=True)
