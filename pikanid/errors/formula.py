@@ -122,7 +122,8 @@ def number_between_units(where: str, number: str) -> str:
 
 def temperatures_meet(where: str, first: str, second: str) -> str:
     return (f"{where} adds temperatures in '{first}' and '{second}', which begin at different "
-            "zeros: declare all of them in one unit, and differences in 'delta_degC'.")
+            "zeros: declare all of them in one unit (columns of recordings in another one are "
+            "converted), and differences in 'delta_degC'.")
 
 
 def converted_twice(where: str, number: float, factor: str, value: float) -> str:

@@ -18,7 +18,7 @@ from pikanid.pieces.sentences import enumerated
 # that have such a unit or one that goes with it.  A voltage alone tells nothing: levels and angles
 # are recorded in volts as well; nor does a length, which may be a level or a place.
 STATES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l"), ("l",)),
+    "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l", "kg"), ("l",)),
     "electrical": (("A",), ("V", "C")), "hydraulics": (("Pa",), ("l", "l/s"))}
 
 

@@ -154,7 +154,7 @@ def _lost(dx: Diagnosis) -> str:
     rows = []
     for (title, why), h in zip(dx.not_given, dx.rejected, strict=True):
         more = dx.behind(h)
-        rows.append((title, why, "" if more is None else f"{more:+.0f}"))
+        rows.append((title, why, "" if more is None else f"{round(more):+d}"))
     behind = "χ² and penalty, from what is given"
     return "<h2>Tried and not given</h2>" + tabled(
         Sheet(("tried", "why it is not given", behind), tuple(rows), (behind,)))

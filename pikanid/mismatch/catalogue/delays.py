@@ -36,14 +36,17 @@ def delay(site: Site) -> list[Candidate]:
         return [TangentDirection({tau.name: shift}, one_sided=True, seen=np.interp(
             view.t - shift, view.t, view.y[o]) - view.y[o]) for shift in step * np.array(SHIFTS)]
 
-    both = ("input_delay", "sensor_delay")
-    held = Candidate(both if site.inputs and site.still else both[1:], "a delay",
-                     f"{o}(t - {tau.name})", "sensor", site, (tau,),
-                     partial(Model.map_output, name=o, delay=tau.name), directions, twin="delay")
+    own = Candidate(
+        ("sensor_delay",), "a delay of the sensor", f"{o}(t - {tau.name})", "sensor", site, (tau,),
+        partial(Model.map_output, name=o, delay=tau.name), directions, twin="delay")
+    either = replace(own, ids=("input_delay", "sensor_delay"),
+                     name="a delay of the input or of the sensor")
+    held = either if site.inputs and site.still else own
     if not past:
         return [held]
     moving = replace(
-        held, ids=both if len(past) == 1 else both[1:], parameters=(tau, *past.values()),
+        either if len(past) == 1 else own, parameters=(tau, *past.values()),
+        expression=f"{own.expression}{_before(past)}",
         extend=partial(delayed, dict.fromkeys(past, tau.name), past),
         begins=tuple(p.name for p in past.values()))
     return [moving] if estimates_a_start(site.model) else [
@@ -58,7 +61,7 @@ def input_delay(site: Site) -> list[Candidate]:
     same = len(site.inputs) == 1 and (site.still or (
         len(site.pasts) == len(site.model.outputs) == 1 and estimates_a_start(site.model)))
     return [Candidate(
-        ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name})", "input", site,
+        ("input_delay",), f"a delay of {u}", f"{u}(t - {tau.name}){_before(past)}", "input", site,
         (tau, *past.values()), partial(delayed, {u: tau.name}, past),
         partial(_shifted, u, tau, SHIFTS, 1), variant=u, twin="delay",
         beside=("cross_axis",) if same else (), begins=tuple(p.name for p in past.values()))
@@ -70,6 +73,10 @@ def pasts(site: Site, inputs: Iterable[str]) -> dict[str, Parameter]:
     return {u: Parameter(site.name("u_past", u if len(site.pasts) > 1 else ""),
                          sum(site.pasts[u]) / 2, site.model.input(u).unit, site.pasts[u],
                          scope="recording") for u in inputs if u in site.pasts}
+
+
+def _before(past: Mapping[str, Parameter]) -> str:
+    return "".join(f", {u} = {p.name} before" for u, p in past.items())
 
 
 def delayed(by: Mapping[str, str], past: Mapping[str, Parameter], model: Model) -> Model:
