@@ -46,8 +46,8 @@ class Site:
         along: The parameter whose damping acts so.
         unseen_speed: Largest value of a state that no output shows, along the nominal motion.
         operating: Inputs that do not begin at 0 in every recording: the rig need not be at rest.
-        pasts: Inputs that move, with the range in which lies what they were before the recordings,
-            where that is not known: the rig need not be at rest, and no initial value follows them.
+        pasts: Inputs that move, with their means, where it is not known what they were before the
+            recordings: the rig need not be at rest, and no initial value follows them.
         sensors: Of the first site: outputs in which none is seen, as a gyro beside an angle.
     """
 
@@ -70,7 +70,7 @@ class Site:
     along: str = ""
     unseen_speed: float = 0.0
     operating: tuple[str, ...] = ()
-    pasts: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
+    pasts: Mapping[str, float] = field(default_factory=dict, hash=False)
     sensors: tuple[Site, ...] = ()
 
     def pushed(self, model: Model, force: Formula) -> Model:

@@ -131,20 +131,14 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
                 pasts=_pasts(model, recordings))
 
 
-def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, tuple[float, float]]:
+def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, float]:
     first = recordings[0]
     moving = [n for n in model.input_names if n in first and _moves(first, n)]
     # a model that begins in balance with an input says what was before
     if (any(s.initial.has(symbol(n)) for s in model.states for n in model.input_names)
             or not any(_operating(n, recordings) for n in moving)):
         return {}
-    return {n: _about(first, n) for n in moving}
-
-
-def _about(recording: Recording, name: str) -> tuple[float, float]:
-    """The range of an input, and as much on both sides."""
-    low, high = (float(f(recording[name].values)) for f in (np.min, np.max))
-    return 2 * low - high, 2 * high - low
+    return {n: float(first[n].values.mean()) for n in moving}
 
 
 def _operating(name: str, recordings: tuple[Recording, ...]) -> bool:
