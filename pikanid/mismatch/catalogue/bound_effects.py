@@ -12,6 +12,7 @@ import sympy as sp
 from pikanid import errors
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.between import Motion, effects_between
+from pikanid.mismatch.catalogue.feedthrough import feedthroughs
 from pikanid.mismatch.catalogue.input_offset import input_offsets
 from pikanid.mismatch.catalogue.output_curve import output_curves
 from pikanid.mismatch.catalogue.output_drift import output_drifts
@@ -44,18 +45,25 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
     names = {n for e in own for n in e.names}
     recorded = [*(i for i in site.model.input_names if i in first), *site.extra]
     sizes = {n: float(np.abs(first[n].values).max(initial=0.0)) for n in recorded}
+
+    def ranges() -> dict[str, tuple[float, float]]:
+        return {n: (float(x.min()), float(x.max())) for n, x in motion().items()} | {
+            n: _range(first, n) for n in recorded}
+
     seen = {n: _range(first, n) for n in site.model.output_names if n in first}
+    spans = {n: high - low for n, (low, high) in seen.items()}
+    moving = {n: size for n, size in sizes.items() if np.ptp(first[n].values) > 0}
     derived = [e for e in (*effects_between(site.model, coordinates(site.model), motion, names),
-                           *input_offsets(site.model, sizes, names),
-                           *output_curves(site.model, motion, {
-                               n: high - low for n, (low, high) in seen.items()}, names),
+                           *input_offsets(site.model, sizes, names, ranges),
+                           *output_curves(site.model, motion, spans, names),
+                           *feedthroughs(site.model, moving, spans, names),
                            *output_drifts(site.model, first.stop - first.start, names))
                if all(e.key != one.key for one in own)]
     if not forms and not derived:
         return own
     around = Surroundings(
         site.model, tuple(dict.fromkeys(s.v for s in sites)),
-        {n: (float(x.min()), float(x.max())) for n, x in motion().items()},
+        {n: r for n, r in ranges().items() if n in site.model.state_names},
         seen, sizes, {n: first[n].unit for n in site.extra},
         sum(r.stop - r.start for r in recordings), site.interval)
     extended = {_extended(site.model, e) for e in own}

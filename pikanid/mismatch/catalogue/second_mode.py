@@ -15,15 +15,17 @@ from pikanid.model.parts import Parameter, State
 
 
 def second_mode(site: Site) -> list[Candidate]:
-    """Another mode, driven by the input and seen beside the coordinate."""
-    if not site.inputs or not site.rate:
+    """Another mode, driven by the input and seen beside the coordinate; slower than half the
+    sampling rate: what is faster follows the input at once, and nothing tells it from that.
+    """
+    slowest, fastest = 0.3 * site.rate, min(12 * site.rate, np.pi / site.interval)
+    if not site.inputs or not slowest < fastest:
         return []
     u = site.inputs[0]
     drive, shown = site.model.input(u).unit, site.output.unit
     gain = units.product((shown, 1), ("s", -2), (drive, -1)) if drive and shown else ""
     a = Parameter(site.name("a_2"), 0.0, gain)
-    w2 = Parameter(site.name("omega_2"), 2 * site.rate, "rad/s",
-                   (0.3 * site.rate, 12 * site.rate))
+    w2 = Parameter(site.name("omega_2"), min(2 * site.rate, fastest), "rad/s", (slowest, fastest))
     z2 = Parameter(site.name("zeta_2"), 0.02, "", (0.0, 1.0))
     q, r = site.name("q_2"), site.name("q_2_dot")
 

@@ -9,14 +9,17 @@ from dataclasses import dataclass
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.model import Model
 
+ORDER = ("dynamics", "input", "sensor")
+
 
 def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
-    """The nominal model with all effects: sensors show what acts.
+    """The nominal model with all effects: what inputs are mapped to acts in what is added to
+    equations as well, and sensors show what acts.
 
     Raises:
         BadUnit: If an effect has no meaning beside the others.
     """
-    ordered = sorted(effects, key=lambda e: e.channel == "sensor")
+    ordered = sorted(effects, key=lambda e: ORDER.index(e.channel))
     return _made(_Itself(nominal), *map(_Itself, ordered))
 
 
