@@ -188,7 +188,7 @@ def test_effects_of_a_catalogue_are_simulated_and_their_derivatives_right() -> N
     t = np.arange(0.0, 400.0, 4.0)
     u = np.where(np.sin(t / 40.0) > 0.0, 3.5, 1.5)
     shown = effects_shown(model, pk.Recording.from_arrays(t, {"u": u}, units={"u": "V"}))
-    assert len(shown) == 9 and not any(one.failure for one in shown)
+    assert len(shown) == 10 and not any(one.failure for one in shown)
     assert max(one.derivative for one in shown if not np.isnan(one.derivative)) < 1e-3
 
 

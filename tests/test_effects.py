@@ -158,7 +158,8 @@ def test_what_effects_do_is_simulated_and_their_derivative_checked(tanks: Path) 
     model = pk.Model.load(tanks).with_candidates(*from_table(STORE, "test"))
     t = np.arange(0.0, 60.0)
     drive = pk.Recording.from_arrays(t, {"u": np.where(t < 20, 8.0, 1.0)}, units={"u": "V"})
-    overflow, store = effects_shown(model, drive)
+    overflow, store, *others = effects_shown(model, drive)
+    assert [one.effect.key for one in others] == ["feedthrough"]
     assert overflow.largest["y"] > 0.1 and store.largest["y"] > 0.01
     assert overflow.derivative < 1e-3 and store.derivative < 1e-3
     quiet = effects_shown(model, drive.with_channels(
@@ -198,7 +199,7 @@ def test_command(tanks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "has already" in capsys.readouterr().err
     (tmp_path / "more.toml").write_text(OVERFLOW.replace("h, 0)", "hh, 0)"))
     plain = tmp_path / "plain.toml"
-    plain.write_text(TANKS)
+    plain.write_text(TANKS.replace('expression = "x2"', 'expression = "x1"'))
     assert main(["effects", "--model", str(plain)]) == 2
     assert "lists no effects" in capsys.readouterr().err
     assert main(["effects", "--model", str(plain), "--catalogue", str(tmp_path / "more.toml")]) == 2

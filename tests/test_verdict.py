@@ -59,8 +59,8 @@ def rounded(value: float) -> float:
 
 def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothesis:
     """A fit of 1 ± 0.01 that leaves χ², at a price of 14 for each effect; its noise's doubt."""
-    free = [SimpleNamespace(name=n, label=n, guess=1.0, bounds=(-np.inf, np.inf)) for n in (
-        "length", "damping", *(p.name for e in effects for p in e.parameters))]
+    free = [SimpleNamespace(name=n, label=n, guess=1.0, bounds=(-np.inf, np.inf), recording=None)
+            for n in ("length", "damping", *(p.name for e in effects for p in e.parameters))]
     r = np.full(ROWS, np.sqrt(chi2 / ROWS))
     whitened = cast(Whitened, SimpleNamespace(
         rows=ROWS, problem=SimpleNamespace(free=free, lower=-np.inf, upper=np.inf),

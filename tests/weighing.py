@@ -27,7 +27,7 @@ def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool 
         key=name, name=name, ids=(name,), families=families,
         covers={key: {} for key in covers}, known=known, twin=twin, lasts=True,
         parts=parts, shape_of=shape_of, brief=brief, parameters=(), exponent=None,
-        channel="dynamics", absent=False, alike=twin, site=SimpleNamespace(v="v")))
+        channel="dynamics", absent=False, read=False, alike=twin, site=SimpleNamespace(v="v")))
 
 
 COULOMB = effect("coulomb_friction", "dry friction")

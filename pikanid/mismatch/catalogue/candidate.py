@@ -223,6 +223,11 @@ class Candidate:
         """Under which it is reported: a law that no catalogue holds is its formula."""
         return self.ids if self.known else (SYMBOLIC + self.expression,)
 
+    @property
+    def read(self) -> bool:
+        """Whether it is a formula that was read, and no entry."""
+        return self.ids[0].startswith(SYMBOLIC)
+
     def applied(self, model: Model) -> Model:
         """The model with this effect.
 

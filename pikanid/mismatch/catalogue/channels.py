@@ -17,6 +17,7 @@ from pikanid.model.parts import Parameter
 from pikanid.problem.held import PIECES
 
 INF = float("inf")
+LEFT = 0.1  # limit: share of an input's range that passes through
 # of a limit: on both sides alike, or on one; what it is called
 SIDES = {"": "saturation of the", "above": "an upper limit of the", "below": "a lower limit of the"}
 
@@ -81,7 +82,8 @@ def sensor_saturation(site: Site) -> list[Candidate]:
         text = _clipped(o, limit.name, side)
         found.append(Candidate(
             ("sensor_saturation",), f"{words} sensor", text, "sensor", site,
-            (_sided(limit, side),), _seen_through(o, text), directions, variant=side,
+            (replace(limit, bounds=(-INF, INF)) if side else limit,), _seen_through(o, text),
+            directions, variant=side,
             twin="limit of the sensor"))
     return found
 
@@ -90,9 +92,11 @@ def _seen_through(o: str, text: str) -> Callable[[Model], Model]:
     return lambda m: m.map_output(o, function=text)
 
 
-def _sided(limit: Parameter, side: str) -> Parameter:
-    """The level of a limit: of a limit on one side it may have any sign."""
-    return replace(limit, bounds=(-INF, INF)) if side else limit
+def _lowest_limit(low: float, high: float, side: str) -> float:
+    """Of an input between two values: one that leaves less of it is a switch, and no limit."""
+    if not side:
+        return LEFT * max(-low, high)
+    return low + LEFT * (high - low) if side == "above" else -high + LEFT * (high - low)
 
 
 def _clipped(x: str, limit: str, side: str) -> str:
@@ -211,9 +215,10 @@ def input_limits(site: Site) -> list[Candidate]:
     found = []
     for u in site.inputs:
         unit = site.model.input(u).unit
-        limit = Parameter(site.name("u_max", site.variant(u)), 1e6, unit, (1e-9, INF))
         width = Parameter(site.name("u_dead", site.variant(u)), 0.0, unit, (0.0, INF))
         for side, words in SIDES.items():
+            limit = Parameter(site.name("u_max", site.variant(u)), 1e6, unit,
+                              (_lowest_limit(*site.ranges[u], side), INF))
 
             def clipped(view: View, u: str = u, p: Parameter = limit, side: str = side
                         ) -> list[TangentDirection]:
@@ -224,7 +229,7 @@ def input_limits(site: Site) -> list[Candidate]:
 
             text = _clipped(u, limit.name, side)
             found.append(_input(site, u, "input_saturation", f"{words} input",
-                                (_sided(limit, side),), text, clipped, f"limit of {u}",
+                                (limit,), text, clipped, f"limit of {u}",
                                 variant=side, function=text))
 
         def dead(view: View, u: str = u, p: Parameter = width) -> list[TangentDirection]:

@@ -1,8 +1,9 @@
 """Catalogue: an output shows a part of an input beside what it is taken to.
 
-An inclinometer leans with the acceleration of what carries it, a thermometer beside a heater feels
-its power, a gauge the flow past it: what follows an input at once is no state.  A mode that is
-faster than the sampling, driven by the input, looks the same.
+An inclinometer leans with the acceleration of what carries it: what follows an input at once is no
+state.  A mode that is faster than the sampling, driven by the input, looks the same.  Where the
+input enters the rate of what is seen, a part of it in the output is to first order what a delay or
+a lag does there, and nothing of its own: T(t - τ) ≈ T - τ T'.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ SHARE = 0.05  # numerical: of an output's range, which an input makes up where a
 
 def feedthroughs(model: Model, sizes: Mapping[str, float], ranges: Mapping[str, float],
                  taken: Iterable[str] = ()) -> Iterator[Effect]:
-    """For each recorded input and each output that does not hold it.
+    """For each recorded input and each output that holds neither it nor a state whose rate does.
 
     Args:
         model: Whose outputs.
@@ -35,7 +36,9 @@ def feedthroughs(model: Model, sizes: Mapping[str, float], ranges: Mapping[str, 
     used = {*model.symbols, *taken}
     for output in (o for o in model.outputs if o.name in ranges):
         for u in (i for i in model.inputs if sizes.get(i.name)):
-            if output.expression.has(symbol(u.name)):
+            rates = [model.equations[x] for x in model.state_names
+                     if output.expression.has(symbol(x))]
+            if any(e.has(symbol(u.name)) for e in (output.expression, *rates)):
                 continue
             several = len(model.outputs) > 1
             share = free_name(f"part_{u.name}" + (f"_{output.name}" if several else ""), used)

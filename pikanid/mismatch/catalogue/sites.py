@@ -128,7 +128,13 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
                 (first.start, first.stop), _swing(first, output.name),
                 _interval(first, output.name), suffix,
                 operating=tuple(n for n in inputs if _operating(n, recordings)),
+                ranges={n: _range(n, recordings) for n in inputs},
                 pasts=_pasts(model, recordings))
+
+
+def _range(name: str, recordings: tuple[Recording, ...]) -> tuple[float, float]:
+    values = np.concatenate([r[name].values for r in recordings if name in r])
+    return float(np.nanmin(values)), float(np.nanmax(values))
 
 
 def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, float]:

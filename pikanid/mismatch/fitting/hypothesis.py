@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
+from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.descent import (
@@ -20,6 +20,8 @@ from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
 ENDLESS = 1e3  # numerical: times a size, or its error alone, that an error without end exceeds
+KNOWN = 2.0  # numerical: standard errors from nothing, from which on a parameter is known
+TOGETHER = 10.0  # numerical: times its error alone, that of a parameter known only with others
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class Hypothesis:
     @property
     def symbolic(self) -> bool:
         """Whether an effect is a formula that was read, not an entry of the catalogue."""
-        return any(e.ids[0].startswith(SYMBOLIC) for e in self.effects)
+        return any(e.read for e in self.effects)
 
     @property
     def far(self) -> bool:
@@ -166,16 +168,34 @@ class Hypothesis:
 
     def determines(self, effect: Candidate) -> bool:
         """Whether the recordings hold the size of an effect, or a bound does: one that has no end,
-        though by itself it is seen, could be any, as of a play that is wider than the motion.
+        though by itself it is seen, could be any, as of a play that is wider than the motion.  Of
+        several parameters one at least must be known: where only what they make together is, the
+        effect stands for a simpler one, as a loop that never yields for a spring.
         """
         size = effect.parameters[0] if effect.parameters else None
         if size is None or not size.free:
             return True
         alone, error = self._errors
-        own = np.array([f.name == size.name for f in self.whitened.problem.free])
-        own &= np.isfinite(alone)
+        names = [f.name for f in self.whitened.problem.free]
+        own = np.array([n == size.name for n in names]) & np.isfinite(alone)
         far = max(abs(self.values[size.name] - size.value), np.min(alone[own], initial=np.inf))
-        return not bool(np.any(error[own] > ENDLESS * far))
+        if np.any(error[own] > ENDLESS * far):
+            return False
+        shared = {p.name for p in effect.parameters if p.free and p.scope == "shared"}
+        unknown = [n for n, a, e in zip(names, alone, error, strict=True) if n in shared
+                   and np.isfinite(a) and e > abs(self.values[n]) and e > TOGETHER * a]
+        return len(shared) < 2 or len(unknown) < len(shared)
+
+    @property
+    def explained_away(self) -> bool:
+        """Whether most of the model's own parameters are not known beside its effects: these then
+        stand for the model itself.
+        """
+        theirs = {p.name for e in self.effects for p in e.parameters}
+        own = np.array([f.name not in theirs and f.recording is None
+                        for f in self.whitened.problem.free], bool)
+        lost = KNOWN * np.sqrt(np.diag(self.covariance)) > np.abs(self.minimum.theta)
+        return bool(self.effects) and 2 * int(np.sum(lost & own)) > int(np.sum(own))
 
     @functools.cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:

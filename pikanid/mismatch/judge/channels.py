@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import get_args
 
-from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate, Channel
+from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 
 
@@ -14,7 +14,7 @@ def acts_in(e: Candidate) -> frozenset[Channel]:
     """Channels in which an effect may act: of exact twins, as a delay of input or sensor, any."""
     if len(e.ids) > 1:
         return frozenset(get_args(Channel))
-    formula = not e.known or e.ids[0].startswith(SYMBOLIC)
+    formula = not e.known or e.read
     if e.channel != "dynamics" or not formula:
         return frozenset({e.channel})
     # a force of inputs alone is what an input's curve makes; one of inputs and states is either's

@@ -18,6 +18,7 @@ from pikanid.mismatch.settings.settings import Settings
 Predict = Callable[[Hypothesis], HeldOut | None]
 # χ² that an effect is worth within the train recordings, from explanations with it and without it
 Again = Callable[[Candidate, Hypothesis, Hypothesis], float]
+EXPLAINED_AWAY = "most of the model's own parameters are not known beside it"
 
 
 def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again: Again,
@@ -49,6 +50,8 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     proof = predict(h)
     if nominal and proof and smaller(asks.worse * nominal.misfit, proof.misfit):
         return "as it stands it predicts the held-out recording worse than the nominal model"
+    if h.explained_away:
+        return EXPLAINED_AWAY
     spread = min(h.whitened.records.spread, settings.noise.order_only)
     louder = float(np.exp(settings.louder * spread))
 
@@ -77,6 +80,9 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                 return (f"the held-out recording could not have refuted {e.name} (it is worth "
                         f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
             gain = gained(h, o, predict, scale)
+            if e.read and fewer == rest and below(gain, asks.minor_strong * len(sizes)):
+                return (f"{e.name} is too weak for its form to be sure (it lowers chi-squared by "
+                        f"{gain:.0f}, {asks.minor_strong:.0f} are asked for each parameter)")
             if (e.absent or below(gain, minor)) and below(gain, asks.minor_strong):
                 what = ("happens once, of which no other recording speaks, and explains so little"
                         if e.absent else "explains so little beside the rest")

@@ -10,7 +10,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import Again, idle, no_size, worth
+from pikanid.mismatch.judge.doubt import EXPLAINED_AWAY, Again, idle, no_size, worth
 from pikanid.mismatch.judge.explanations import (
     Explanations,
     Weighed,
@@ -136,9 +136,11 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
         _with_a_size(_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again),
                      lead.hypothesis, explained.overdispersion, settings)
         for kind in kinds_in(lead.hypothesis, rule.dry)]
+    little = EXPLAINED_AWAY if lead.hypothesis.explained_away else ""
     if smaller(lead.share, rule.share):
         little = (f"the best explanation with it explains {max(lead.share, 0.0):.0%} of the "
                   f"held-out misfit, {rule.share:.0%} are asked")
+    if little:
         examined = [one if isinstance(one, Doubtful) else Doubtful(one.kind, one.effect, little)
                     for one in sorted(examined, key=lambda one: isinstance(one, Doubtful))]
     doubtful = tuple(d for d in examined if isinstance(d, Doubtful)

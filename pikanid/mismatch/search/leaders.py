@@ -48,3 +48,16 @@ def closest_of_each(fits: Iterable[Hypothesis]) -> list[Hypothesis]:
     counts = sorted({len(h.effects) for h in several}, reverse=True)
     return [min((h for h in several if len(h.effects) == n), key=lambda h: h.minimum.chi2)
             for n in counts]
+
+
+def siblings(h: Hypothesis, ranked: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """The best of those that have another effect of the same family in the place of one, however
+    far behind: they may have been led elsewhere.
+    """
+    return [o for o in ranked if _are_siblings(o, h)][:h.whitened.settings.budget.rivals]
+
+
+def _are_siblings(one: Hypothesis, other: Hypothesis) -> bool:
+    own = [e for e in one.effects if e.key not in other.key]
+    theirs = [e for e in other.effects if e.key not in one.key]
+    return len(own) == len(theirs) == 1 and bool({*own[0].families} & {*theirs[0].families})

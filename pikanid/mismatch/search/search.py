@@ -199,9 +199,10 @@ class Search:
         before, wide = {h.fit for h in self.fits.values()}, self.settings.verdict.behind
         for h in hypotheses[:self.settings.budget.asked_again]:
             self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates),
-                         *places.elsewhere(h, self.candidates),
-                         *neighbours.from_its_place(h, self._contenders(wide), self.base())), h.key)
+                         *places.elsewhere(h, self.candidates)), h.key)
             self._exchange(h, anyway=True)
+            rivals = [*self._contenders(wide), *leaders.siblings(h, self.ranked())]
+            self.refine(neighbours.from_its_place(h, rivals, self.base()), h.key)
         self._fit_all([job for h in self._contenders(anyway=True)
                        for job in neighbours.with_shapes(h, self.candidates)], always=True)
         return {h.fit for h in self.fits.values()} != before
@@ -293,8 +294,6 @@ class Search:
                 and (again or frozenset(e.key for e in job[0]) not in self.fits)
                 and neighbours.signature(job) not in self.begun]  # it would end where it did
         ordered_parallel_map(
-            jobs, lambda: max(self._closest_chi2(), reach), work, take, lambda: always or not
-            self.budget_exhausted, self.workers, lambda result, chi2: result[1].stands(chi2))
-
-    def _closest_chi2(self) -> float:
-        return min((h.minimum.chi2 for h in self.fits.values()), default=np.inf)
+            jobs, lambda: max(min((h.minimum.chi2 for h in self.fits.values()), default=np.inf),
+                              reach), work, take, lambda: always or not self.budget_exhausted,
+            self.workers, lambda result, chi2: result[1].stands(chi2))
