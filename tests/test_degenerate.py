@@ -1,0 +1,96 @@
+"""Explanations that fit and say nothing: effects in a limit, and models explained away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from opened import case, hypothesis
+
+import pikanid as pk
+from pikanid.formula.expressions import symbol
+from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.channels import LEFT
+from pikanid.mismatch.catalogue.sites import sites
+from pikanid.mismatch.fitting.extended import extended
+from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.search.leaders import siblings
+from pikanid.model.parts import Parameter
+from pikanid.optimise.levenberg_marquardt import Minimum
+
+__all__ = ["case"]  # the fixture
+
+
+def fit(names: tuple[str, ...], theta: np.ndarray, J: np.ndarray, effect: Any) -> Hypothesis:
+    """Of a model's own parameters `a`, `b`, ... and those of an effect, with a Jacobian J."""
+    free = [SimpleNamespace(name=n, label=n, recording=None) for n in names]
+    problem = SimpleNamespace(free=free, lower=np.full(len(free), -np.inf),
+                              upper=np.full(len(free), np.inf))
+    whitened: Any = SimpleNamespace(rows=len(J), sizes=np.full(len(free), 1e3), problem=problem)
+    minimum = Minimum(theta, np.ones(len(J)), J, True)
+    return Hypothesis((effect,), pk.systems.sloshing(), whitened, minimum, 0.0)
+
+
+def law(*names: str) -> Any:
+    return SimpleNamespace(key="law", parameters=tuple(Parameter(n, 0.0) for n in names))
+
+
+@pytest.mark.parametrize(("angle", "known"), [(1e-4, False), (0.5, True)])
+def test_what_is_known_only_together_is_not_determined(angle: float, known: bool) -> None:
+    """A loop that never yields: of size and yield only the quotient moves anything."""
+    rng = np.random.default_rng(0)
+    x, y, z = np.linalg.qr(rng.normal(size=(200, 3)))[0].T
+    # 9 standard errors each if the other one were known
+    J = np.column_stack([30.0 * z, 9.0 * x, 9.0 * (np.cos(angle) * x + np.sin(angle) * y)])
+    h = fit(("a", "size", "width"), np.array([1.0, 1.0, 1.0]), J, law("size", "width"))
+    assert h.determines(h.effects[0]) == known
+    # of one parameter the correlation with the model's own is no ridge of its own
+    assert fit(("a", "size"), np.ones(2), J[:, :2], law("size")).determines(law("size"))
+
+
+@pytest.mark.parametrize(("errors", "away"), [((0.1, 0.1, 0.9), False), ((0.1, 0.9, 0.9), True),
+                                              ((0.9, 0.9, 0.9), True)])
+def test_a_model_most_of_whose_parameters_are_not_known_is_explained_away(
+        errors: tuple[float, ...], away: bool) -> None:
+    J = np.zeros((50, 4))
+    J[:4] = np.diag([1.0 / e for e in errors] + [100.0])
+    h = fit(("a", "b", "c", "size"), np.ones(4), J, law("size"))
+    assert h.explained_away == away
+    assert not replace(h, effects=()).explained_away
+
+
+def test_siblings_have_another_effect_of_one_family(case: Case) -> None:
+    cubic, quintic = (hypothesis(case, key, "sensor_offset")
+                      for key in ("cubic_stiffness", "quintic_stiffness"))
+    others = [hypothesis(case, *keys) for keys in (
+        ("sensor_offset",), ("quadratic_drag", "sensor_offset"))]
+    assert siblings(cubic, [*others, quintic, cubic]) == [quintic]
+
+
+def test_what_inputs_are_mapped_to_acts_in_what_is_added(case: Case) -> None:
+    """Whatever the order in which they were found."""
+    listed = {c.key: c for c in case.candidates}
+    gain, drive = listed["input_gain"], listed["velocity_coupled_drive"]
+    models = [extended(case.model, effects) for effects in ((gain, drive), (drive, gain))]
+    rates = [m.equations["theta_dot"] for m in models]
+    assert rates[0] == rates[1]
+    u, k = symbol("u_x"), symbol(gain.parameters[0].name)
+    scaled = extended(case.model, (drive,)).equations["theta_dot"].xreplace({u: k * u})
+    assert (rates[0] - scaled).expand() == 0
+
+
+@pytest.mark.parametrize("low", [-2.0, 3.0])
+def test_an_input_keeps_a_tenth_of_its_range_where_it_is_limited(low: float) -> None:
+    t = np.arange(300) * 0.02
+    u = low + (5.0 - low) * (1 + np.sin(3 * t)) / 2
+    recording = pk.Recording.from_arrays(t, {"u_x": u, "theta": np.sin(t)},
+                                         {"u_x": "m/s^2", "theta": "rad"})
+    found = {c.key: c.parameters[0].bounds[0] for c in candidates(sites(
+        pk.systems.sloshing(), (recording,))) if c.ids == ("input_saturation",)}
+    assert found["input_saturation"] == pytest.approx(LEFT * 5.0, rel=1e-3)
+    assert found["input_saturation[above]"] == pytest.approx(low + LEFT * (5.0 - low), rel=1e-2)
+    assert found["input_saturation[below]"] == pytest.approx(-5.0 + LEFT * (5.0 - low), rel=1e-2)
