@@ -35,7 +35,8 @@ class Interval:
     unit: str
 
     def __str__(self) -> str:
-        return f"{self.state} from {self.low:.3g} to {self.high:.3g} {self.unit}".rstrip()
+        unit = "" if self.unit == "1" else f" {self.unit}".rstrip()
+        return f"{self.state} from {self.low:.3g} to {self.high:.3g}{unit}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.doubt import Predict
@@ -14,6 +15,9 @@ from pikanid.mismatch.judge.verdict import Answer, Test, criterion
 from pikanid.mismatch.report.findings import Explanation, NamedEffect
 from pikanid.mismatch.report.part import values_of
 from pikanid.mismatch.settings.settings import Settings
+from pikanid.model.parts import Parameter
+
+UNKNOWN = 10.0  # layout: times a value, or where it began, that the error of one not told exceeds
 
 
 def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
@@ -49,7 +53,7 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
         named = [table.get(e.key, Names(e.names, (e.name,))) for e in h.effects]
         effects = tuple(NamedEffect(
             names.ids, " or ".join(names.words), e.expression,
-            values_of(e.parameters, h.values, h.std, overdispersion,
+            values_of(_told(e, h), h.values, h.std, overdispersion,
                       spread if h in answer.given else {}, time), e.channel, e.site.v, e.absent)
             for e, names in zip(h.effects, named, strict=True))
         p = predict(h) if h in answer.given else None
@@ -63,6 +67,12 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
     others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(h.score(scale) - best))
                    for h in answer.others)
     return given, others
+
+
+def _told(e: Candidate, h: Hypothesis) -> tuple[Parameter, ...]:
+    """The parameters of an effect, but what only says how a recording begins and is not known."""
+    return tuple(p for p in e.parameters if p.name not in e.begins
+                 or h.std[p.name] < UNKNOWN * max(abs(h.values[p.name]), abs(p.value)))
 
 
 def _behind(gap: float) -> str:
