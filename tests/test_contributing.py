@@ -97,7 +97,7 @@ def test_an_effect(tmp_path: Path) -> None:
     copy.lint()
     (told,) = copy.commands()
     lines = [line.split()[0] for line in told.splitlines()[1:]]
-    assert lines[3:5] == ["amplitude_damping", "cubic_drag"]
+    assert lines[lines.index("amplitude_damping") + 1] == "cubic_drag"
     assert re.search(r"^cubic_drag +c_v3 > \S+ s/\(rad\)\^2", told, re.MULTILINE)
 
 
