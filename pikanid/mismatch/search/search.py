@@ -199,10 +199,11 @@ class Search:
         before, wide = {h.fit for h in self.fits.values()}, self.settings.verdict.behind
         for h in hypotheses[:self.settings.budget.asked_again]:
             self.refine((*neighbours.without_one(h), *neighbours.with_twins(h, self.candidates),
-                         *places.elsewhere(h, self.candidates)), h.key)
+                         *places.elsewhere(h, self.candidates),
+                         *neighbours.from_its_place(h, self._contenders(wide), self.base())), h.key)
             self._exchange(h, anyway=True)
-            rivals = [*self._contenders(wide), *leaders.siblings(h, self.ranked())]
-            self.refine(neighbours.from_its_place(h, rivals, self.base()), h.key)
+            self.refine(neighbours.from_its_place(
+                h, leaders.siblings(h, self.ranked()), self.base()), h.key)
         self._fit_all([job for h in self._contenders(anyway=True)
                        for job in neighbours.with_shapes(h, self.candidates)], always=True)
         return {h.fit for h in self.fits.values()} != before
