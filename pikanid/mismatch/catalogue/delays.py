@@ -71,8 +71,8 @@ def input_delay(site: Site) -> list[Candidate]:
 def pasts(site: Site, inputs: Iterable[str]) -> dict[str, Parameter]:
     """What those inputs were before each recording, where that is not known."""
     return {u: Parameter(site.name("u_past", u if len(site.pasts) > 1 else ""),
-                         site.pasts[u], site.model.input(u).unit, scope="recording")
-            for u in inputs if u in site.pasts}
+                         sum(site.pasts[u]) / 2, site.model.input(u).unit, site.pasts[u],
+                         scope="recording") for u in inputs if u in site.pasts}
 
 
 def _before(past: Mapping[str, Parameter]) -> str:

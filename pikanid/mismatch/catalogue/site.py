@@ -47,8 +47,9 @@ class Site:
         unseen_speed: Largest value of a state that no output shows, along the nominal motion.
         operating: Inputs that do not begin at 0 in every recording: the rig need not be at rest.
         ranges: Lowest and highest values of its inputs in all recordings.
-        pasts: Inputs that move, with their means, where it is not known what they were before the
-            recordings: the rig need not be at rest, and no initial value follows them.
+        pasts: Inputs that move, where it is not known what they were before the recordings, as the
+            rig need not be at rest and no initial value follows them: about where that lies, their
+            range in all recordings and as much on both sides.
         sensors: Of the first site: outputs in which none is seen, as a gyro beside an angle.
     """
 
@@ -72,7 +73,7 @@ class Site:
     unseen_speed: float = 0.0
     operating: tuple[str, ...] = ()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
-    pasts: Mapping[str, float] = field(default_factory=dict, hash=False)
+    pasts: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
     sensors: tuple[Site, ...] = ()
 
     def pushed(self, model: Model, force: Formula) -> Model:

@@ -17,6 +17,7 @@ from pikanid.model import Model
 from pikanid.model.parts import Output
 from pikanid.recording import Recording
 
+MANY = 6  # limit: of unknown pasts, whose price is more than what any delay gains
 NEAR_ZERO = 0.01  # numerical: of an input's largest value, from where on it does not begin at 0
 
 
@@ -137,14 +138,16 @@ def _range(name: str, recordings: tuple[Recording, ...]) -> tuple[float, float]:
     return float(np.nanmin(values)), float(np.nanmax(values))
 
 
-def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, float]:
+def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, tuple[float, float]]:
     first = recordings[0]
     moving = [n for n in model.input_names if n in first and _moves(first, n)]
     # a model that begins in balance with an input says what was before
     if (any(s.initial.has(symbol(n)) for s in model.states for n in model.input_names)
-            or not any(_operating(n, recordings) for n in moving)):
+            or not any(_operating(n, recordings) for n in moving)
+            or len(moving) * len(recordings) > MANY):
         return {}
-    return {n: float(first[n].values.mean()) for n in moving}
+    found = {n: _range(n, recordings) for n in moving}
+    return {n: (2 * low - high, 2 * high - low) for n, (low, high) in found.items()}
 
 
 def _operating(name: str, recordings: tuple[Recording, ...]) -> bool:
