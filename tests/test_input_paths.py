@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from perturbed import assert_sensitivities
 
 import pikanid as pk
 from pikanid import errors
@@ -84,16 +85,7 @@ def test_sensitivities_are_those_of_differences(operating: bool, kind: type[Simu
     model = slow(hold, operating)
     simulator = kind(model, bind(model, pk.simulate(model, wandering(hold), sigma=0.0)))
     p = np.array([0.045, 0.15, 0.3, 9.81, HALF, *([BEGUN] if operating else []), RATE])
-    active = np.array([0, 1, *range(4, len(p))])
-    steps = simulator.choose_steps(p, 1e-10)
-    found = simulator.run(p, active, steps)
-    for column, k in enumerate(active):
-        aside = np.zeros(len(p))
-        aside[k] = 1e-6
-        up, down = (simulator.run(p + s * aside, active, steps).y for s in (1, -1))
-        expected = (up - down) / 2e-6
-        scale = np.abs(expected).max()
-        assert found.sensitivity[:, column] == pytest.approx(expected, abs=1e-6 * scale)
+    assert_sensitivities(simulator, p, np.array([0, 1, *range(4, len(p))]))
 
 
 def test_simulated_motion_is_that_under_the_signal_behind_the_play() -> None:
