@@ -17,7 +17,7 @@ from pikanid.mismatch.catalogue.input_offset import input_offsets
 from pikanid.mismatch.catalogue.output_curve import output_curves
 from pikanid.mismatch.catalogue.output_drift import output_drifts
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.mismatch.catalogue.sites import coordinates
+from pikanid.mismatch.catalogue.sites import coordinates, span_of
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.model import Effect, EffectForm, Model
 from pikanid.model.binding import Surroundings, bound
@@ -48,9 +48,9 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
 
     def ranges() -> dict[str, tuple[float, float]]:
         return {n: (float(x.min()), float(x.max())) for n, x in motion().items()} | {
-            n: _range(first, n) for n in recorded}
+            n: span_of(n, (first,)) for n in recorded}
 
-    seen = {n: _range(first, n) for n in site.model.output_names if n in first}
+    seen = {n: span_of(n, (first,)) for n in site.model.output_names if n in first}
     spans = {n: high - low for n, (low, high) in seen.items()}
     moving = {n: size for n, size in sizes.items() if np.ptp(first[n].values) > 0}
     derived = [e for e in (*effects_between(site.model, coordinates(site.model), motion, names),
@@ -81,12 +81,6 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
                 own.append(effect)
                 extended.add(made)
     return own
-
-
-def _range(recording: Recording, name: str) -> tuple[float, float]:
-    values = recording[name].values
-    seen = values[np.isfinite(values)]
-    return (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
 
 
 def _extended(model: Model, effect: Effect) -> tuple[sp.Expr, ...] | None:

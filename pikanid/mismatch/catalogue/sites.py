@@ -129,13 +129,15 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
                 (first.start, first.stop), _swing(first, output.name),
                 _interval(first, output.name), suffix,
                 operating=tuple(n for n in inputs if _operating(n, recordings)),
-                ranges={n: _range(n, recordings) for n in inputs},
+                ranges={n: span_of(n, recordings) for n in inputs},
                 pasts=_pasts(model, recordings))
 
 
-def _range(name: str, recordings: tuple[Recording, ...]) -> tuple[float, float]:
+def span_of(name: str, recordings: Sequence[Recording]) -> tuple[float, float]:
+    """Lowest and highest finite value of a channel in recordings; 0 and 1 where it has none."""
     values = np.concatenate([r[name].values for r in recordings if name in r])
-    return float(np.nanmin(values)), float(np.nanmax(values))
+    seen = values[np.isfinite(values)]
+    return (float(seen.min()), float(seen.max())) if len(seen) else (0.0, 1.0)
 
 
 def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, tuple[float, float]]:
@@ -146,7 +148,7 @@ def _pasts(model: Model, recordings: tuple[Recording, ...]) -> dict[str, tuple[f
             or not any(_operating(n, recordings) for n in moving)
             or len(moving) * len(recordings) > MANY):
         return {}
-    found = {n: _range(n, recordings) for n in moving}
+    found = {n: span_of(n, recordings) for n in moving}
     return {n: (2 * low - high, 2 * high - low) for n, (low, high) in found.items()}
 
 
