@@ -44,6 +44,25 @@ def test_exchanged_columns_are_told() -> None:
     assert "'theta' and 'phi' exchanged" in said and "check which is which" in said
 
 
+def test_exchanged_inputs_are_told() -> None:
+    """Of a crane the length of the rope and the acceleration of the trolley."""
+    model = pk.Model.from_dict({
+        "name": "crane", "states": {"theta": {}, "w": {}}, "inputs": {"a": {}, "L": {}},
+        "parameters": {"c": {"guess": 0.1, "bounds": [0.0, 2.0]}},
+        "equations": {"theta": "w", "w": "-(9.81*sin(theta) + a*cos(theta))/L - c*w"},
+        "outputs": {"theta": {"expression": "theta"}}})
+    t = np.arange(400) * 0.05
+
+    def recorded(seed: int) -> pk.Recording:
+        moves = np.repeat(np.random.default_rng(seed).choice([-0.5, 0.5], 20), 20)
+        drive = pk.Recording.from_arrays(t, {"a": moves, "L": 3.0 + np.sin(0.3 * t + seed)})
+        made = pk.simulate(model, drive, sigma=0.002, seed=seed)
+        return made.with_channels(replace(made["a"], name="L"), replace(made["L"], name="a"))
+
+    (said,) = mislabelled(opened(model, recorded(1), recorded(2)))
+    assert "'a' and 'L' exchanged" in said
+
+
 def test_times_that_are_too_short_are_told() -> None:
     model = systems.sloshing()
     case = opened(model, *(stretched(moved(model, seed), 1e-3) for seed in (1, 2)))

@@ -18,9 +18,9 @@ from pikanid.commands.options import (
     Values,
     adjusted,
 )
-from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.commands.outputs import STDOUT, check_outputs, tell_notes, written
 from pikanid.commands.reading import Driven, every_source
-from pikanid.commands.simulate import excited, sigmas, tell_notes
+from pikanid.commands.simulate import excited, sigmas
 
 EXAMPLES = """Examples:
 
@@ -54,7 +54,7 @@ def confusable(
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
     drive = excited(chosen, excitation, duration, files)
-    tell_notes(drive, quiet)
+    tell_notes(drive.notes, quiet)
     with working("looking", 28, quiet) as step:
         found = run(chosen, drive, sigmas(chosen, sigma) or None, strength=strength,
                     refit=not quick, tell=step)

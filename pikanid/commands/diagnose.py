@@ -17,7 +17,7 @@ from pikanid.commands.options import (
     adjusted,
     seconds,
 )
-from pikanid.commands.outputs import STDOUT, check_outputs, written
+from pikanid.commands.outputs import STDOUT, check_outputs, tell_notes, written
 from pikanid.commands.reading import Reading, every_source, files_read
 from pikanid.recording.formats import readable
 
@@ -76,6 +76,7 @@ def diagnose(
                   every_source(*named))
     from pikanid.mismatch.diagnose import diagnose as run
     from pikanid.mismatch.settings.settings import Settings
+    from pikanid.mismatch.steps.unlike import unlike
     from pikanid.model import systems
     from pikanid.reporting.console import working
 
@@ -88,6 +89,7 @@ def diagnose(
     if quiet_until is not None:
         begin = min(r.start for r in records)
         stretch = (begin, begin + quiet_until)
+    tell_notes(unlike(chosen, records, others), quiet)
     with working("diagnosing", 8, quiet) as step:
         dx = run(chosen, records, others or None,
                  settings=taken, quiet=stretch, tell=step, workers=workers)

@@ -18,9 +18,9 @@ from pikanid.commands.options import (
     Values,
     adjusted,
 )
-from pikanid.commands.outputs import check_outputs
+from pikanid.commands.outputs import check_outputs, tell_notes
 from pikanid.commands.reading import Driven, every_source
-from pikanid.commands.simulate import excited, tell_notes
+from pikanid.commands.simulate import excited
 from pikanid.figures import ENDINGS, save_figure
 
 AGREES = 0.1  # layout: difference of derivatives from which on "agrees" would be the wrong word
@@ -58,7 +58,7 @@ def effects(
 
     chosen = adjusted(systems.find(model), set_, catalogue=catalogue)
     drive = excited(chosen, excitation, duration, files)
-    tell_notes(drive, quiet)
+    tell_notes(drive.notes, quiet)
     shown = effects_shown(chosen, drive)
     if not shown:
         raise errors.BadModel(errors.no_effects(chosen.name))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -98,3 +99,12 @@ def written(files: Mapping[str, bytes], json_: str | None, content: Any) -> None
     together({**files, **({json_: text.encode()} if json_ not in (None, STDOUT) else {})})
     if json_ == STDOUT:
         print(text, end="")
+
+
+def tell_notes(notes: Iterable[str], quiet: bool) -> None:
+    """Sentences about what was given, on standard error."""
+    from pikanid.reporting.console import console
+
+    if not quiet:
+        for note in notes:
+            console(sys.stderr).print(f"Note: {note}", markup=False, soft_wrap=True)

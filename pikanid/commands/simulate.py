@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +20,7 @@ from pikanid.commands.options import (
     by_output,
     quantity,
 )
-from pikanid.commands.outputs import check_outputs
+from pikanid.commands.outputs import check_outputs, tell_notes
 from pikanid.commands.reading import Driven, every_source
 from pikanid.recording.formats import written_endings
 
@@ -64,7 +63,7 @@ def simulate(
 
     chosen = adjusted(systems.find(model), set_)
     drive = excited(chosen, excitation, duration, files)
-    tell_notes(drive, quiet)
+    tell_notes(drive.notes, quiet)
     made = run(chosen, drive, sigma=sigmas(chosen, sigma), seed=seed)
     if not chosen.inputs:
         made = made.without(*drive.names)
@@ -118,15 +117,6 @@ def too_short(model: Model, rec: Recording) -> tuple[str, ...]:
 
     rate, lasts = natural_frequency(model) or decay_rate(model), rec.stop - rec.start
     return (errors.note_excitation_short(lasts, 1 / rate),) if rate and lasts * rate < 1 else ()
-
-
-def tell_notes(rec: Recording, quiet: bool) -> None:
-    """What has to be said of an excitation, on standard error."""
-    from pikanid.reporting.console import console
-
-    if not quiet:
-        for note in rec.notes:
-            console(sys.stderr).print(f"Note: {note}", markup=False, soft_wrap=True)
 
 
 def sigmas(model: Model, texts: list[str]) -> dict[str, float]:

@@ -120,12 +120,16 @@ def settings_unreadable(path: str, detail: str) -> str:
 
 def columns_exchanged(a: str, b: str, left: float, other: float) -> str:
     return (f"With the columns of '{a}' and '{b}' exchanged the model leaves {100 * other:.2g} % "
-            f"of what the outputs do, {100 * left:.3g} % as they are: check which is which.")
+            f"of what the outputs do, {_left(left)} as they are: check which is which.")
 
 
 def times_in_another_unit(word: str, left: float, other: float) -> str:
     return (f"With all times {word} by 1000 the model leaves {100 * other:.2g} % of what the "
-            f"outputs do, {100 * left:.3g} % as they are: check the unit of the time.")
+            f"outputs do, {_left(left)} as they are: check the unit of the time.")
+
+
+def _left(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 1 else "all of it"
 
 
 def sampled_otherwise(name: str, one: float, other: float) -> str:
@@ -137,3 +141,18 @@ def louder_than_read(p_value: str) -> str:
     return (f"By the noise as it was read at first something is missing ({p_value}), and "
             "nothing explains it; by what explains best, the noise is louder or has a colour, and "
             "nothing is. A quiet stretch, or the same recorded again, tells which it is.")
+
+
+def sizes_differ(name: str, unit: str, times: float, large: str, small: str) -> str:
+    asked = f"is it in {unit} in both" if unit else "has it one unit in both"
+    return f"'{name}' is {times:.3g} times as large in '{large}' as in '{small}': {asked}?"
+
+
+def times_differ(one: str, other: str, step: float, other_step: float) -> str:
+    return (f"'{one}' has a sample every {step:.3g} s, '{other}' one every {other_step:.3g} s, and "
+            "they last accordingly: are the times of both in s?")
+
+
+def samples_far_apart(step: float, period: float) -> str:
+    return (f"Samples are {step:.3g} s apart, and by its guesses the model's slowest motion lasts "
+            f"{period:.2g} s: are the times in s?")

@@ -158,5 +158,7 @@ def _between(model: Model, name: str, coordinates: Sequence[tuple[str, str]], pl
 def _reach(seen: Motion, one: _Between, model: Model, x: str, y: str) -> float:
     """The largest difference of two places, or of two speeds."""
     at = {symbol(n): value for n, value in model.values.items()}
-    ratio = float(sp.S(one.ratio).subs(at))
-    return float(np.abs(seen[x] - ratio * seen[y]).max(initial=0.0)) or 1.0
+    ratio = sp.S(one.ratio).subs(at)
+    if not ratio.is_finite:  # a parameter that divides is guessed zero
+        return 1.0
+    return float(np.abs(seen[x] - float(ratio) * seen[y]).max(initial=0.0)) or 1.0

@@ -61,5 +61,5 @@ def _varies(model: Model, slope: sp.Expr, ranges: Callable[[], Ranges]) -> bool:
     at = {symbol(n): value for n, value in model.values.items()} | {TIME: sp.S.Zero}
     found = [slope.subs(at | {symbol(n): v for n, v in (middle | {m: end}).items()}).doit()
              for m, ends in known.items() for end in ends]
-    sizes = [abs(float(value)) for value in found if value.is_number]
+    sizes = [abs(float(value)) for value in found if value.is_finite and value.is_real]
     return bool(sizes) and max(sizes) - min(sizes) > VARIES * max(sizes)

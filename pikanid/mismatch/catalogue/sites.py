@@ -118,7 +118,7 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
                   if n not in used and all(n in r and _moves(r, n) for r in recordings))
     at = {symbol(n): value for n, value in model.values.items()}
     slope = at_rest(model, a.diff(symbol(q))).subs(at) if q else sp.S.Zero
-    k = -float(slope) if slope.is_number else 0.0
+    k = -float(slope) if slope.is_finite and slope.is_number else 0.0  # infinite: u in 1/u is zero
     force = at_rest(model, a)
     starts = [s.initial for s in model.states if s.name in (q, v)]
     alone = all(at_rest(model, e.diff(symbol(q))).subs(at) == 0

@@ -23,7 +23,7 @@ from pikanid.strategies.nls import NLS
 
 POOR = 0.3  # numerical: share of what the outputs do, left by a fit that explains too little
 TIMES = 16.0  # numerical: as much as another reading leaves, for a hint: a quarter of the RMSE
-PAIRS = 6  # limit: of outputs that are exchanged
+PAIRS = 6  # limit: of columns that are exchanged
 FINE, LONG = 0.2, 0.5  # limit: periods or time constants between samples, and in a recording
 COARSER = 2.0  # numerical: times as long between an input's samples, which makes a difference
 THOUSAND = (("divided", 1e-3), ("multiplied", 1e3))  # definition: milliseconds, and their contrary
@@ -31,7 +31,8 @@ THOUSAND = (("divided", 1e-3), ("multiplied", 1e3))  # definition: milliseconds,
 
 def mislabelled(case: Case) -> list[str]:
     """Sentences about recordings that the nominal model explains far better when read otherwise:
-    with the columns of two outputs of one unit exchanged, or with times of another unit.
+    with the columns of two outputs of one unit, or of two inputs, exchanged, or with times of
+    another unit.
 
     Empty where the nominal model explains most of what is measured; a few fits elsewhere.
     """
@@ -42,14 +43,15 @@ def mislabelled(case: Case) -> list[str]:
     model = case.model.with_values(case.records.guess)
     given = with_sigma(records, case.model)
     found = []
-    for a, b in islice(_alike(model), PAIRS):
-        other = _refitted(model, [_exchanged(r, a, b) for r in given])
-        if other * TIMES < left:
-            found.append(errors.columns_exchanged(a, b, left, other))
+    tried = [(_refitted(model, [_exchanged(r, a, b) for r in given]), a, b)
+             for a, b in islice(_alike(model, given[0]), PAIRS)]
+    other, a, b = min(tried, default=(float("inf"), "", ""))
+    if other * TIMES < left and other < POOR:
+        found.append(errors.columns_exchanged(a, b, left, other))
     for word, factor in THOUSAND:
         if _fits(model, given, factor) and not _fits(model, given, 1.0):
             other = _refitted(model, [_stretched(r, factor) for r in given])
-            if other * TIMES < left:
+            if other * TIMES < left and other < POOR:
                 found.append(errors.times_in_another_unit(word, left, other))
     return found
 
@@ -89,13 +91,20 @@ def _refitted(model: Model, recordings: Sequence[Recording]) -> float:
         return float("inf")
 
 
-def _alike(model: Model) -> Iterator[tuple[str, str]]:
-    """Outputs of one unit."""
-    return ((a.name, b.name) for a, b in combinations(model.outputs, 2) if a.unit == b.unit)
+def _alike(model: Model, recording: Recording) -> Iterator[tuple[str, str]]:
+    """Outputs of one unit, and recorded inputs: what drives is often written without units."""
+    inputs = (n for n in model.input_names if n in recording)
+    yield from ((a.name, b.name) for a, b in combinations(model.outputs, 2) if a.unit == b.unit)
+    yield from combinations(inputs, 2)
 
 
 def _exchanged(recording: Recording, a: str, b: str) -> Recording:
-    return recording.with_channels(replace(recording[a], name=b), replace(recording[b], name=a))
+    """The recording with the values of two channels exchanged, each as the other's name and unit
+    say.
+    """
+    one, other = recording[a], recording[b]
+    return recording.with_channels(replace(one, name=b, unit=other.unit),
+                                   replace(other, name=a, unit=one.unit))
 
 
 def _stretched(recording: Recording, factor: float) -> Recording:

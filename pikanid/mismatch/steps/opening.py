@@ -33,6 +33,7 @@ from pikanid.mismatch.fitting.repeats import repeats
 from pikanid.mismatch.judge.beginning import begun
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.steps.unlike import unlike
 from pikanid.model import Effect, Model
 from pikanid.model.domains import candidates_of, taken
 from pikanid.model.rates import in_rates
@@ -67,6 +68,7 @@ def open_case(model: Model, train: tuple[Recording, ...], later: tuple[Recording
     proves = later is not None
     for recording in train:
         bind(model, recording)  # a channel that it lacks is no fault of the held-out one
+    notes += unlike(model, train, later or ())
     if later is not None:
         check_pair(train, later)
         later = beginnings(model, later, "the held-out recording", notes, settings.budget)

@@ -1,0 +1,82 @@
+"""Recordings that can hardly be meant as they are read: told before hours are spent on them.
+
+A header without a unit, a logger that counts milliseconds, one run exported in degrees and the
+other in radians: such recordings cannot be told from physics that is missing, but for their sizes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from pikanid import errors
+from pikanid.mismatch.design.response import decay_rate, natural_frequency
+from pikanid.model import Input, Model, Output
+from pikanid.problem.problem import Experiment, bind
+from pikanid.recording import Recording
+
+OFTEN = 20.0  # numerical: as large or as long, for a question: a radian is 57 degrees
+PERIODS = 5.0  # numerical: of the model's slowest motion between two samples, for a question
+
+
+def unlike(model: Model, train: Sequence[Recording], later: Sequence[Recording]) -> list[str]:
+    """Questions about units: where a channel of the held-out recordings is far larger or smaller
+    than that of the others, where their times are, or where samples are far apart for the model.
+
+    Args:
+        model: Nominal model, at its guesses.
+        train: Recordings to explain.
+        later: Held-out recordings.
+
+    Empty where a recording cannot be used: that is refused where it is used.
+
+    >>> import numpy as np
+    >>> from pikanid.model import systems
+    >>> t = 0.05 * np.arange(200)
+    >>> one = Recording.from_arrays(t, {"a_n": np.sin(t), "theta": 0.1 * np.sin(t)}, name="one")
+    >>> other = Recording.from_arrays(t, {"a_n": np.sin(t), "theta": 6 * np.sin(t)}, name="other")
+    >>> unlike(systems.sloshing(), [one], [other])[0]
+    "'theta' is 60 times as large in 'other' as in 'one': is the unit of both rad?"
+    """
+    try:
+        one, *others = [bind(model, some[0]) for some in (train, later) if some]
+    except errors.BadRecording:
+        return []
+    said = [*_coarse(model, one)]
+    for other in others:
+        said += [*_sizes(one, other), *_times(one, other)]
+    return said
+
+
+def _sizes(one: Experiment, other: Experiment) -> Iterator[str]:
+    items: list[Input | Output] = [*one.model.inputs, *one.model.outputs]
+    for item, *ends in zip(items, _largest(one), _largest(other), strict=True):
+        (small, where), (large, there) = sorted(ends)
+        if small > 0 and large / small > OFTEN:
+            yield errors.sizes_differ(item.name, item.unit, large / small, there, where)
+
+
+def _largest(bound: Experiment) -> list[tuple[float, str]]:
+    """Largest absolute value of each input and output, and of which recording it is."""
+    values = [*(h.values for h in bound.held), *(s.y for s in bound.samples)]
+    return [(float(np.nanmax(np.abs(v), initial=0.0)), bound.name) for v in values]
+
+
+def _times(one: Experiment, other: Experiment) -> Iterator[str]:
+    lengths = [b.t1 - b.t0 for b in (one, other)]
+    steps = [_step(b) for b in (one, other)]
+    if all(min(pair) > 0 and max(pair) / min(pair) > OFTEN for pair in (lengths, steps)):
+        yield errors.times_differ(one.name, other.name, *steps)
+
+
+def _coarse(model: Model, bound: Experiment) -> Iterator[str]:
+    rate = natural_frequency(model) or decay_rate(model)
+    if rate and _step(bound) * rate > PERIODS:
+        yield errors.samples_far_apart(_step(bound), 1 / rate)
+
+
+def _step(bound: Experiment) -> float:
+    """Median interval between the samples of the first output [s]; zero with fewer than two."""
+    steps = np.diff(bound.samples[0].t)
+    return float(np.median(steps)) if len(steps) else 0.0
