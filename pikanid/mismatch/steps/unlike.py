@@ -34,8 +34,8 @@ def unlike(model: Model, train: Sequence[Recording], later: Sequence[Recording])
     >>> import numpy as np
     >>> from pikanid.model import systems
     >>> t = 0.05 * np.arange(200)
-    >>> one = Recording.from_arrays(t, {"a_n": np.sin(t), "theta": 0.1 * np.sin(t)}, name="one")
-    >>> other = Recording.from_arrays(t, {"a_n": np.sin(t), "theta": 6 * np.sin(t)}, name="other")
+    >>> one = Recording.from_arrays(t, {"u_x": np.sin(t), "theta": 0.1 * np.sin(t)}, name="one")
+    >>> other = Recording.from_arrays(t, {"u_x": np.sin(t), "theta": 6 * np.sin(t)}, name="other")
     >>> unlike(systems.sloshing(), [one], [other])[0]
     "'theta' is 60 times as large in 'other' as in 'one': is the unit of both rad?"
     """
