@@ -37,7 +37,7 @@ def unlike(model: Model, train: Sequence[Recording], later: Sequence[Recording])
     >>> one = Recording.from_arrays(t, {"u_x": np.sin(t), "theta": 0.1 * np.sin(t)}, name="one")
     >>> other = Recording.from_arrays(t, {"u_x": np.sin(t), "theta": 6 * np.sin(t)}, name="other")
     >>> unlike(systems.sloshing(), [one], [other])[0]
-    "'theta' is 60 times as large in 'other' as in 'one': is the unit of both rad?"
+    "'theta' is 60 times as large in 'other' as in 'one': is it in rad in both?"
     """
     try:
         one, *others = [bind(model, some[0]) for some in (train, later) if some]
