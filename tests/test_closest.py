@@ -42,7 +42,7 @@ def test_doubts_are_kept_where_nothing_dominates() -> None:
                   weighed((), 1.8, 0.0, share=0.0))
     assert part.present == ()
     assert [d.why for d in part.doubtful] == [
-        "without it the best explanation leaves 1.5 times as much, 4 are asked"]
+        "without it the best explanation leaves 1.5 times as much, sure from 4 on"]
 
 
 def test_the_nominal_model_comes_close_to_nothing() -> None:
@@ -56,7 +56,7 @@ def test_it_is_told_everywhere() -> None:
                    nothing, None, closest=Closest(
                        ("a drag", "a wall"), (("drag",), ("wall",)), 0.654,
                        (("drag", "its probability is 0.9"), ("restoring force", "it is small"))))
-    assert ("\nClosest, and not sure: a drag and a wall: 65% of the held-out misfit is explained\n"
+    assert ("\nClosest, and not sure: a drag and a wall: 65 % of the held-out misfit is explained\n"
             "Not sure: drag: its probability is 0.9\n") in str(dx)
     content = json.loads(json.dumps(dx.to_dict(), allow_nan=False))["closest"]
     assert content == {"effects": [["drag"], ["wall"]], "share_explained": 0.654, "doubtful": [
@@ -78,3 +78,8 @@ def test_of_a_law_that_nobody_knows_what_comes_closest_is_said() -> None:
     dx = pk.diagnose(pk.systems.sloshing(), train, other)
     assert dx.verdict == "unnamed" and dx.closest is not None and dx.closest.doubtful
     assert 0 < dx.closest.share_explained < DEFAULTS.part.share
+
+
+def test_what_is_far_off_is_told_as_that() -> None:
+    far = Closest(("a drag",), (("drag",),), 0.09, (("drag", "its probability is 0.9"),))
+    assert far.lines() == ["Nothing comes close: a drag explains 9 % of the held-out misfit"]

@@ -59,8 +59,8 @@ def test_a_model_most_of_whose_parameters_are_not_known_is_explained_away(
     J = np.zeros((50, 4))
     J[:4] = np.diag([1.0 / e for e in errors] + [100.0])
     h = fit(("a", "b", "c", "size"), np.ones(4), J, law("size"))
-    assert h.explained_away == away
-    assert not replace(h, effects=()).explained_away
+    assert h.explained_away() == away
+    assert not replace(h, effects=()).explained_away()
 
 
 def test_siblings_have_another_effect_of_one_family(case: Case) -> None:

@@ -41,7 +41,7 @@ def test_a_family_that_dominates_is_there_and_has_a_name() -> None:
 
 
 @pytest.mark.parametrize("rivals, why", [
-    ([((DRAG,), 3.9, 0.001)], "3.9 times as much, 4 are asked"),
+    ([((DRAG,), 3.9, 0.001)], "3.9 times as much, sure from 4 on"),
     ([((DRAG,), 5.0, 0.02)], "its probability is 0.98")])
 def test_what_is_missing_to_a_family_is_said(rivals: list[Any], why: str) -> None:
     found = examined(weighed((COULOMB,), 1.0, 1 - rivals[0][2]),
@@ -252,7 +252,7 @@ def test_a_partial_answer_says_what_is_sure_and_what_is_left() -> None:
     assert "something else" not in diagnosis(p_value=0.5).sentence()
     two = replace(FRICTION, or_family="gain")
     assert "gain (here as Coulomb friction; which one is not sure, compared with" in two.sentence()
-    assert "surely a delay and either dry friction or gain, and" in replace(
+    assert "surely a delay and either dry friction or another gain, and" in replace(
         diagnosis(), present=(two, DELAY)).sentence()
     text = str(diagnosis())
     assert "Surely: dry friction (here as Coulomb friction; its form is not sure, compared with " \

@@ -39,7 +39,7 @@ def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: f
             later: float | None = None) -> Weighed:
     """An explanation that leaves so much [σ²], and so much of each held-out sample [σ]."""
     h: Any = SimpleNamespace(effects=effects, values={}, blurred=frozenset(),
-                             explained_away=False)
+                             explained_away=lambda *given: False)
     predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
                                      inert=frozenset())
     return Weighed(h, predicted, left, 0.0, weight, share,

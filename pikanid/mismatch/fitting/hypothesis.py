@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -186,15 +187,21 @@ class Hypothesis:
                    and np.isfinite(a) and e > abs(self.values[n]) and e > TOGETHER * a]
         return len(shared) < 2 or len(unknown) < len(shared)
 
-    @property
-    def explained_away(self) -> bool:
+    def explained_away(self, overdispersion: float = 1.0,
+                       spread: Mapping[str, float] = MappingProxyType({})) -> bool:
         """Whether most of the model's own parameters are not known beside its effects: these then
         stand for the model itself.
+
+        Args:
+            overdispersion: That divides χ²: standard errors grow with its root.
+            spread: How far apart other explanations have parameters, by name.
         """
         theirs = {p.name for e in self.effects for p in e.parameters}
-        own = np.array([f.name not in theirs and f.recording is None
-                        for f in self.whitened.problem.free], bool)
-        lost = KNOWN * np.sqrt(np.diag(self.covariance)) > np.abs(self.minimum.theta)
+        free = self.whitened.problem.free
+        own = np.array([f.name not in theirs and f.recording is None for f in free], bool)
+        apart = np.array([spread.get(f.name, 0.0) for f in free])
+        error = np.hypot(np.sqrt(overdispersion * np.diag(self.covariance)), apart)
+        lost = KNOWN * error > np.abs(self.minimum.theta)
         return bool(self.effects) and 2 * int(np.sum(lost & own)) > int(np.sum(own))
 
     @functools.cached_property

@@ -136,10 +136,10 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
         _with_a_size(_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again),
                      lead.hypothesis, explained.overdispersion, settings)
         for kind in kinds_in(lead.hypothesis, rule.dry)]
-    little = EXPLAINED_AWAY if lead.hypothesis.explained_away else ""
+    little = EXPLAINED_AWAY if lead.hypothesis.explained_away() else ""
     if smaller(lead.share, rule.share):
         little = (f"the best explanation with it explains {max(lead.share, 0.0):.0%} of the "
-                  f"held-out misfit, {rule.share:.0%} are asked")
+                  f"held-out misfit, sure from {rule.share:.0%} on")
     if little:
         examined = [one if isinstance(one, Doubtful) else Doubtful(one.kind, one.effect, little)
                     for one in sorted(examined, key=lambda one: isinstance(one, Doubtful))]
@@ -158,6 +158,9 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     apart = spread(fewest.hypothesis, not_ruled_out(fewest, found, rule))
+    if fewest.hypothesis.explained_away(explained.overdispersion, apart):
+        lost = tuple(Doubtful(p.kind, p.effect, EXPLAINED_AWAY) for p in present)
+        return Part((), (*lost, *doubtful), lead.hypothesis, explained.overdispersion, lead.share)
     # a law of which others as good have another size altogether has no name: any that is like it
     present = [replace(p, names=()) if p.names and no_size(
         p.effect, fewest.hypothesis, explained.overdispersion, settings, apart) else p
@@ -226,7 +229,7 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
         return Doubtful(kind, effect, f"its probability is {total:.3g}")
     if smaller(kappa, asked):
         return Doubtful(kind, effect, "without it the best explanation leaves "
-                        f"{kappa:.2g} times as much, {asked:.2g} are asked")
+                        f"{kappa:.2g} times as much, sure from {asked:.2g} on")
     if smaller(max((dominance(w, others, rule) for w in holders if any(
             e.known for e in members(kind, w.hypothesis, rule.dry))), default=0.0), asked):
         return Doubtful(kind, effect, "only a law outside the catalogue explains so much of it")

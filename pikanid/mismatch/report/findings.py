@@ -15,7 +15,7 @@ from pikanid.mismatch.beyond.patch import Patch
 from pikanid.mismatch.beyond.region import Interval
 from pikanid.mismatch.catalogue.candidate import Channel
 from pikanid.mismatch.judge.verdict import Verdict
-from pikanid.mismatch.report.part import SHOWN, Closest, Present, Remainder, Value
+from pikanid.mismatch.report.part import CLOSE, SHOWN, Closest, Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model
 from pikanid.pieces.sentences import enumerated, p_text
@@ -271,7 +271,8 @@ class DiagnosisData:
             near = enumerated(self.closest.effects) if self.closest else _first(titles)
             return (f"{head}nothing in the catalogue explains it; closest comes {near}, "
                     f"not confirmed{doubt}")
-        return head + "nothing in the catalogue explains it."
+        nearly = self.closest is not None and self.closest.share_explained >= CLOSE
+        return f"{head}nothing in the catalogue explains {'all of it' if nearly else 'it'}."
 
     @property
     def _confirmed_on(self) -> str:

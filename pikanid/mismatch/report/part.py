@@ -16,6 +16,14 @@ from pikanid.pieces.sentences import enumerated
 from pikanid.pieces.time_unit import spans
 
 SHOWN = 6  # layout: windows of time that are listed
+CLOSE = 0.5  # layout: share explained from which on what comes closest is told with its doubts
+# families that are no words for something that is there
+IN_WORDS = {"constant force": "a constant force", "coupling": "a coupling",
+            "gain": "another gain", "input curve": "a curve of an input", "loss": "a loss",
+            "mode": "a further mode", "once": "something that happened once",
+            "rate curve": "a curve of a rate", "restoring force": "a restoring force",
+            "sensor curve": "a curve of a sensor", "slow change": "a slow change",
+            "source": "a source", "storage": "a storage", "timing": "a delay or a lag"}
 
 
 @dataclass(frozen=True)
@@ -69,8 +77,8 @@ class Present:
     def title(self) -> str:
         """The name where it is sure, otherwise the family, or both of two."""
         if self.or_family:
-            return f"either {self.family} or {self.or_family}"
-        return self.name if self.ids else self.family
+            return f"either {in_words(self.family)} or {in_words(self.or_family)}"
+        return self.name if self.ids else in_words(self.family)
 
     @property
     def compared(self) -> list[str]:
@@ -82,7 +90,7 @@ class Present:
         what = "which one" if self.or_family else "its form"
         unsure = f"; {what} is not sure, compared with {', '.join(self.compared)}" * bool(
             self.compared)
-        here = "" if self.name == self.family else f"here as {self.name}"
+        here = "" if self.name in (self.family, in_words(self.family)) else f"here as {self.name}"
         said = (here + unsure).removeprefix("; ")
         within = "" if self.ids or not said else f" ({said})"
         if self.dominance is None:
@@ -101,6 +109,15 @@ class Present:
                 "parameters": {n: {"value": v.value, "std": v.std, "unit": v.unit,
                                    "std_with_remainder": self.std_with_remainder[n]}
                                for n, v in self.parameters.items()}}
+
+
+def in_words(family: str) -> str:
+    """A family as something that is there.
+
+    >>> in_words("timing"), in_words("dry friction")
+    ('a delay or a lag', 'dry friction')
+    """
+    return IN_WORDS.get(family, family)
 
 
 @dataclass(frozen=True)
@@ -194,8 +211,10 @@ class Closest:
 
     def lines(self) -> list[str]:
         """In words."""
-        return [f"Closest, and not sure: {enumerated(self.effects)}: "
-                f"{max(self.share_explained, 0.0):.0%} of the held-out misfit is explained",
+        explained = f"{almost(self.share_explained)} of the held-out misfit"
+        if self.share_explained < CLOSE:
+            return [f"Nothing comes close: {enumerated(self.effects)} explains {explained}"]
+        return [f"Closest, and not sure: {enumerated(self.effects)}: {explained} is explained",
                 *(f"Not sure: {what}: {why}" for what, why in self.doubtful)]
 
     def to_dict(self) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def _against(p: Present, h: Hypothesis, rule: PartSettings,
     if kind is None or near or kind in held or p.instead:
         least = min(kappa for _, kappa in curves)
         return Doubtful(p.kind, p.effect, "a free curve of what it does not depend on leaves "
-                        f"{least:.2g} times as much in its place, {asked:.2g} are asked")
+                        f"{least:.2g} times as much in its place, sure from {asked:.2g} on")
     return replace(p, names=(), instead=Instead(kind, p.effect))
 
 
