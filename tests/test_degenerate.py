@@ -52,15 +52,30 @@ def test_what_is_known_only_together_is_not_determined(angle: float, known: bool
     assert fit(("a", "size"), np.ones(2), J[:, :2], law("size")).determines(law("size"))
 
 
-@pytest.mark.parametrize(("errors", "away"), [((0.1, 0.1, 0.9), False), ((0.1, 0.9, 0.9), True),
-                                              ((0.9, 0.9, 0.9), True)])
+@pytest.mark.parametrize(("before", "errors", "away"), [
+    ((0.1, 0.1, 0.1), (0.1, 0.1, 0.9), False), ((0.1, 0.1, 0.1), (0.1, 0.9, 0.9), True),
+    ((0.1, 0.1, 0.1), (0.9, 0.9, 0.9), True),
+    # what was not known without the effect is not lost by it
+    ((0.1, 0.9, 0.9), (0.1, 0.9, 0.9), False), ((0.9, 0.9, 0.9), (0.9, 0.9, 0.9), False)])
 def test_a_model_most_of_whose_parameters_are_not_known_is_explained_away(
-        errors: tuple[float, ...], away: bool) -> None:
-    J = np.zeros((50, 4))
-    J[:4] = np.diag([1.0 / e for e in errors] + [100.0])
-    h = fit(("a", "b", "c", "size"), np.ones(4), J, law("size"))
-    assert h.explained_away() == away
-    assert not replace(h, effects=()).explained_away()
+        before: tuple[float, ...], errors: tuple[float, ...], away: bool) -> None:
+    def of(*errors: float) -> np.ndarray:
+        return np.vstack([np.diag(1.0 / np.array(errors)), np.zeros((46, len(errors)))])
+
+    nominal = replace(fit(("a", "b", "c"), np.ones(3), of(*before), law()), effects=())
+    h = fit(("a", "b", "c", "size"), np.ones(4), of(*errors, 0.01), law("size"))
+    assert h.explained_away(nominal) == away
+    assert not nominal.explained_away(nominal)
+
+
+def test_a_remainder_and_other_explanations_count_in_what_is_not_known() -> None:
+    J = np.vstack([np.eye(3) * 10.0, np.zeros((46, 3))])
+    nominal = replace(fit(("a", "b"), np.ones(2), J[:, :2], law()), effects=())
+    h = fit(("a", "b", "size"), np.ones(3), J, law("size"))
+    assert not h.explained_away(nominal)
+    assert h.explained_away(nominal, overdispersion=50.0)
+    assert h.explained_away(nominal, spread={"a": 0.8, "b": 0.8})
+    assert not h.explained_away(nominal, spread={"a": 0.8})
 
 
 def test_siblings_have_another_effect_of_one_family(case: Case) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -11,7 +12,7 @@ import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
-from pikanid.mismatch.fitting.decisions import below
+from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.descent import (
     place,
 )
@@ -187,22 +188,22 @@ class Hypothesis:
                    and np.isfinite(a) and e > abs(self.values[n]) and e > TOGETHER * a]
         return len(shared) < 2 or len(unknown) < len(shared)
 
-    def explained_away(self, overdispersion: float = 1.0,
+    def explained_away(self, nominal: Hypothesis, overdispersion: float = 1.0,
                        spread: Mapping[str, float] = MappingProxyType({})) -> bool:
-        """Whether most of the model's own parameters are not known beside its effects: these then
-        stand for the model itself.
+        """Whether of what is known of the model's own parameters without effects most is not known
+        beside these: they then stand for the model itself.
 
         Args:
+            nominal: The model without effects.
             overdispersion: That divides χ²: standard errors grow with its root.
             spread: How far apart other explanations have parameters, by name.
         """
-        theirs = {p.name for e in self.effects for p in e.parameters}
-        free = self.whitened.problem.free
-        own = np.array([f.name not in theirs and f.recording is None for f in free], bool)
-        apart = np.array([spread.get(f.name, 0.0) for f in free])
-        error = np.hypot(np.sqrt(overdispersion * np.diag(self.covariance)), apart)
-        lost = KNOWN * error > np.abs(self.minimum.theta)
-        return bool(self.effects) and 2 * int(np.sum(lost & own)) > int(np.sum(own))
+        known = [f.name for f in nominal.whitened.problem.free if f.recording is None
+                 and not smaller(abs(nominal.values[f.name]), KNOWN * nominal.std[f.name])]
+        error = {n: math.hypot(math.sqrt(overdispersion) * self.std[n], spread.get(n, 0.0))
+                 for n in known}
+        lost = [n for n in known if smaller(abs(self.values[n]), KNOWN * error[n])]
+        return 2 * len(lost) > len(known)
 
     @functools.cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:
