@@ -18,10 +18,12 @@ from pikanid.noise.level import NoiseModel
 RATE = float(np.sqrt(9.81 / 0.045))
 
 
-def explanation(title: str, term: str, identifier: str = "law") -> Explanation:
+def explanation(title: str, term: str, identifier: str = "law", score: float = 0.0
+                ) -> Explanation:
     model = pk.systems.sloshing().with_term("theta_dot", term, [pk.Parameter("a", 0.5)])
     effects = (SimpleNamespace(ids=(identifier,), once=False),)
-    return cast(Explanation, SimpleNamespace(title=title, model=model, effects=effects))
+    return cast(Explanation, SimpleNamespace(
+        title=title, model=model, effects=effects, score=score))
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +48,16 @@ def test_what_no_profile_tells_apart_is_said_to_be_so(records: Records) -> None:
     twin = explanation("the same again", "-a*sign(theta_dot)")
     text = advice("set", (FRICTION, twin), records, RATE, True)
     assert text.startswith("No usual profile tells dry friction from the same again")
+
+
+@pytest.mark.parametrize(("score", "alike"), [(0.2, True), (3.0, False)])
+def test_what_predicts_the_same_is_told_to_need_another_sensor(
+        records: Records, score: float, alike: bool) -> None:
+    other = explanation("drag", "-a*abs(theta_dot)*theta_dot", score=score)
+    text = advice("set", (FRICTION, other), records, 0.0, True)
+    assert text.startswith(f"To tell dry friction from drag: record {explore(True, 0.0)}.")
+    assert ("differs (by 0.2 of chi-squared): if it stays so, only another quantity" in text
+            ) == alike
 
 
 @pytest.mark.parametrize("value", [0.4, 7.0])

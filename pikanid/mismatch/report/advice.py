@@ -18,6 +18,7 @@ from pikanid.mismatch.report.findings import Explanation, titles_apart
 from pikanid.model import Model
 from pikanid.model.parts import Input
 
+ALIKE = 1.0  # numerical: difference in chi-squared, up to which hypotheses fit alike
 PROVE = ("Record the system once more, driven differently and over another range of amplitudes, "
          "and give that recording as held-out: it decides what is confirmed.")
 STRENGTHEN = ("Record the same again for several times as long, with a larger swing or with less "
@@ -85,7 +86,7 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     names = titles_apart(given)
     text = f"To tell {' from '.join(names)}: "
     if len(driven) != 1 or not rate > 0:
-        return f"{text}record {explore(bool(driven), rate)}."
+        return f"{text}record {explore(bool(driven), rate)}.{_alike(given)}"
     models = {name: e.model for name, e in zip(names, given, strict=True)}
     found = _best(models, records, driven[0], rate, workers)
     if found is None:
@@ -97,6 +98,16 @@ def _separating(given: Sequence[Explanation], records: Records, rate: float, wor
     outcome = (f"expected to set them {apart} (now {found.before:.2g}; repeating the last "
                f"experiment, {found.repeated:.2g})")
     return text + f"run {found.profile.name}, {outcome}. `pikanid design` writes the profile."
+
+
+def _alike(given: Sequence[Explanation]) -> str:
+    """That hypotheses may be one and the same to what is measured, where they fit alike."""
+    scores = [e.score for e in given]
+    apart = max(scores) - min(scores)
+    if apart > ALIKE:
+        return ""
+    return (f" What they predict hardly differs (by {apart:.1g} of chi-squared): if it stays so, "
+            "only another quantity that is measured tells them apart.")
 
 
 def _best(models: Mapping[str, Model], records: Records, driven: Input, rate: float, workers: int
