@@ -71,6 +71,39 @@ def test_a_force_that_keeps_a_rig_ringing_explains_more_than_another_initial_sta
     assert listed and all(c.key != "swinging_force" for c, _ in listed)
 
 
+def test_its_frequency_is_found_where_what_shows_is_the_push_that_it_begins_with() -> None:
+    """Of a mass on a rail any frequency gives that push: the true one differs by little."""
+    rail = Model.from_dict({
+        "name": "mass on a rail",
+        "states": {"x": {"unit": "m", "initial": 0.0}, "v": {"unit": "m/s", "initial": 0.0}},
+        "parameters": {"c": {"unit": "1/s", "guess": 1.0, "bounds": [0.0, 20.0]}},
+        "inputs": {"u": {"unit": "m/s^2"}},
+        "equations": {"x": "v", "v": "u - c*v"},
+        "outputs": {"y": {"unit": "m", "expression": "x"}}})
+    drag, rate, rng = 0.4, 7.0, np.random.default_rng(6)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0], 9), 89)
+
+    def slope(t: float, s: np.ndarray) -> list[float]:
+        held = u[min(int(t / TIME[1] + 1e-9), 800)]
+        return [s[1], held + 2.0 * np.sin(rate * t) - drag * s[1]]
+
+    run = solve_ivp(slope, (0, TIME[-1]), (0.0, 0.0), "DOP853", TIME, rtol=1e-8, atol=1e-10,
+                    max_step=TIME[1])
+    seen = run.y[0] + 0.15 * rng.standard_normal(len(TIME))
+    recording = Recording.from_arrays(TIME, {"u": u, "y": seen}, units={"u": "m/s^2", "y": "m"},
+                                      hold={"u": "zero"})
+    case = open_case(rail, (recording,), None, None, lambda text: None, DEFAULTS)
+    search = case.begin_search()
+    [start] = [c for c in case.candidates if c.key == "initial_state"]
+    begun = search._fit([start], [{}])
+    assert begun.values["d_v"] == pytest.approx(2.0 / rate, abs=0.05)
+    search._fit_all([*with_other_form(begun, case.candidates, search.fits)], again=True,
+                    always=True)
+    swinging = search.fits[frozenset({"swinging_force"})]
+    assert swinging.minimum.chi2 < begun.minimum.chi2 - 10
+    assert swinging.values["swing_rate"] == pytest.approx(rate, abs=0.2)
+
+
 def test_another_initial_state_is_told_from_a_force_that_swings() -> None:
     answer = diagnose(model(), recorded(3, (0.01, 0.0)), recorded(4, (-0.006, 0.05)), workers=1)
     assert answer.verdict == "named"

@@ -13,6 +13,7 @@ from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.search.screen import Screen, as_strong
+from pikanid.mismatch.search.swings import swings
 
 WIDER = (0.3, 1.0, 3.0)  # numerical: of the last parameter of a wider law, where fits of it begin
 LIKE = 0.5  # numerical: share of what a law does, from which on an open shape is tried
@@ -118,7 +119,9 @@ def with_next_form(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[J
 
 def with_next_sign(h: Hypothesis, candidates: Sequence[Candidate],
                    fits: Mapping[frozenset[str], Hypothesis]) -> Iterator[Job]:
-    """The same of laws that show where their fits begin in what is left without the effect."""
+    """The same of laws that show where their fits begin in what is left without the effect: where
+    the model was fitted without it, and where it stands beside it.
+    """
     for effect in h.effects:
         near = [replace(c, directions=c.signs) for c in candidates
                 if c.next_to == effect.key and c.signs is not None]
@@ -126,6 +129,8 @@ def with_next_sign(h: Hypothesis, candidates: Sequence[Candidate],
         if near and without is not None:
             for other, starts in Screen(without, near).singles(len(near)):
                 yield (*_rest(h, effect), other), starts
+        for other in near:
+            yield (*_rest(h, effect), other), swings(h, effect, other)
 
 
 def with_open_shape(h: Hypothesis, candidates: Sequence[Candidate],
