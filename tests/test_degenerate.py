@@ -15,6 +15,7 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.channels import LEFT
+from pikanid.mismatch.catalogue.forces import slowest
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
@@ -109,3 +110,14 @@ def test_an_input_keeps_a_tenth_of_its_range_where_it_is_limited(low: float) -> 
     assert found["input_saturation"] == pytest.approx(LEFT * 5.0, rel=1e-3)
     assert found["input_saturation[above]"] == pytest.approx(low + LEFT * (5.0 - low), rel=1e-2)
     assert found["input_saturation[below]"] == pytest.approx(-5.0 + LEFT * (5.0 - low), rel=1e-2)
+
+
+def test_a_parameter_that_cannot_be_negative_does_not_drift_through_nothing(case: Case) -> None:
+    drifts = [c for c in case.candidates if c.ids == ("parameter_drift",)]
+    ends = case.records.recordings[0].stop
+    assert {c.variant: c.parameters[0].bounds[0] for c in drifts} == {
+        "l_theta": -1 / ends, "d_theta": -1 / ends}
+    free = replace(case.model, parameters=tuple(
+        replace(p, bounds=(-1.0, p.bounds[1])) for p in case.model.parameters))
+    site = replace(drifts[0].site, model=free)
+    assert slowest(site, "d_theta") == -np.inf

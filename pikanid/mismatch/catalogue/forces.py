@@ -104,7 +104,7 @@ def parameter_drift(site: Site) -> list[Candidate]:
         within = [n for n in site.model.state_names if site.model.equations[n].has(symbol(p))]
         # one and the same seen from each of several equations
         place = site if within == [site.v] else replace(site, suffix="")
-        r = Parameter(place.name(f"r_{p}"), 0.0, "1/s")
+        r = Parameter(place.name(f"r_{p}"), 0.0, "1/s", (slowest(site, p), INF))
         text = f"{p}*(1 + {r.name}*t)"
 
         def directions(view: View) -> list[TangentDirection]:
@@ -116,6 +116,14 @@ def parameter_drift(site: Site) -> list[Candidate]:
                          place, (r,), lambda m: changing(m, p, text), directions, variant=p)
 
     return [one(p) for p in site.free_in_force]
+
+
+def slowest(site: Site, parameter: str) -> float:
+    """Rate [1/s], as a share, at which a parameter that cannot be negative is nothing at the end of
+    the first recording; none bounds another one.
+    """
+    end = site.span[1]
+    return -1 / end if site.model.parameter(parameter).bounds[0] >= 0 and end > 0 else -INF
 
 
 def changing(model: Model, parameter: str, text: str) -> Model:

@@ -104,8 +104,9 @@ def _against(p: Present, h: Hypothesis, rule: PartSettings,
     held = {k for e in h.effects for k in kinds_of(e, h, rule.dry)}
     if kind is None or near or kind in held or p.instead:
         least = min(kappa for _, kappa in curves)
-        return Doubtful(p.kind, p.effect, "a free curve of what it does not depend on leaves "
-                        f"{least:.2g} times as much in its place, sure from {asked:.2g} on")
+        return Doubtful(p.kind, p.effect, "a free curve of what it does not depend on leaves " + (
+            f"{least:.2g} times as much in its place, sure from {asked:.2g} on" if least >= 1 else
+            "less in its place"))
     return replace(p, names=(), instead=Instead(kind, p.effect))
 
 
