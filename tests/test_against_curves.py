@@ -179,7 +179,9 @@ def test_where_only_curves_of_one_family_do_as_well_it_is_one_of_two(
 def test_where_more_curves_do_as_well_none_is_sure(
         families: tuple[str, str], kappas: dict[Kind | None, float], held: str) -> None:
     found = against(families, kappas, held)
-    assert isinstance(found, Doubtful) and f"leaves {min(kappas.values()):.2g} times" in found.why
+    least = min(kappas.values())
+    told = f"{least:.2g} times as much" if least >= 1 else "less in its place"
+    assert isinstance(found, Doubtful) and f"leaves {told}" in found.why
 
 
 def against(families: tuple[str, str], kappas: dict[Kind | None, float], held: str
