@@ -63,6 +63,23 @@ def test_one_unit_tells_whatever_stands_beside_it(
     assert catalogues_of(pk.Model.from_dict(table)) == names
 
 
+@pytest.mark.parametrize(("unit", "names"), [("l/min", ("hydraulics",)), ("V", ())])
+def test_a_length_is_a_level_where_something_flows(unit: str, names: tuple[str, ...]) -> None:
+    table = content("cm")
+    table["inputs"] = {"q": {"unit": unit}}
+    table["equations"] = {"x": "q - k*x"}
+    assert catalogues_of(pk.Model.from_dict(table)) == names
+
+
+def test_a_length_whose_rate_is_a_state_is_a_place() -> None:
+    cylinder = pk.Model.from_dict({
+        "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}, "p": {"unit": "bar"}},
+        "inputs": {"q": {"unit": "l/min"}}, "parameters": {"k": {"guess": 1.0}},
+        "equations": {"x": "v", "v": "p - k*v", "p": "q - v"},
+        "outputs": {"x": {"expression": "x"}}})
+    assert {e.within for e in candidates_of(cylinder) if isinstance(e, EffectForm)} == {("p",)}
+
+
 def test_what_was_not_looked_for_is_said() -> None:
     said = not_taken(decay("V"), ())
     assert "thermal" in said and "mechanics" not in said and "--catalogue" in said

@@ -16,10 +16,11 @@ from pikanid.pieces.sentences import enumerated
 
 # A catalogue is taken where some state or input has a unit that tells its domain, for the states
 # that have such a unit or one that goes with it.  A voltage alone tells nothing: levels and angles
-# are recorded in volts as well; nor does a length, which may be a level or a place.
+# are recorded in volts as well; nor does a length, which may be a level or a place: where something
+# flows it is a level, unless its rate is a state.
 STATES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "thermal": (("K",), ()), "kinetics": (("mol/l", "mol", "kg/l", "kg"), ("l",)),
-    "electrical": (("A",), ("V", "C")), "hydraulics": (("Pa",), ("l", "l/s"))}
+    "electrical": (("A",), ("V", "C")), "hydraulics": (("Pa", "l/s"), ("l", "m"))}
 
 
 def catalogues_of(model: Lookup) -> tuple[str, ...]:
@@ -47,7 +48,8 @@ def _states_of(model: Lookup) -> dict[str, tuple[str, ...]]:
 
 
 def _in_units(model: Lookup, others: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(s.name for s in model.states if _like(s.unit, others))
+    return tuple(s.name for s in model.states if _like(s.unit, others)
+                 and not model.equations[s.name].is_Symbol)
 
 
 def _tells(model: Lookup, telling: tuple[str, ...]) -> bool:
