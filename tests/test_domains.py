@@ -67,15 +67,18 @@ def test_one_unit_tells_whatever_stands_beside_it(
 def test_a_length_is_a_level_where_something_flows(unit: str, names: tuple[str, ...]) -> None:
     table = content("cm")
     table["inputs"] = {"q": {"unit": unit}}
-    table["equations"] = {"x": "q - k*x"}
+    table["parameters"] |= {"b": {"guess": 1.0, "unit": f"cm/s/({unit})"}}
+    table["equations"] = {"x": "b*q - k*x"}
     assert catalogues_of(pk.Model.from_dict(table)) == names
 
 
 def test_a_length_whose_rate_is_a_state_is_a_place() -> None:
     cylinder = pk.Model.from_dict({
         "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}, "p": {"unit": "bar"}},
-        "inputs": {"q": {"unit": "l/min"}}, "parameters": {"k": {"guess": 1.0}},
-        "equations": {"x": "v", "v": "p - k*v", "p": "q - v"},
+        "inputs": {"q": {"unit": "l/min"}},
+        "parameters": {n: {"guess": 1.0, "unit": unit} for n, unit in (
+            ("a", "m/s^2/bar"), ("b", "bar/l"), ("c", "bar/m"), ("k", "1/s"))},
+        "equations": {"x": "v", "v": "a*p - k*v", "p": "b*q - c*v"},
         "outputs": {"x": {"expression": "x"}}})
     assert {e.within for e in candidates_of(cylinder) if isinstance(e, EffectForm)} == {("p",)}
 
