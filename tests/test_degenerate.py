@@ -53,30 +53,39 @@ def test_what_is_known_only_together_is_not_determined(angle: float, known: bool
     assert fit(("a", "size"), np.ones(2), J[:, :2], law("size")).determines(law("size"))
 
 
-@pytest.mark.parametrize(("before", "errors", "away"), [
-    ((0.1, 0.1, 0.1), (0.1, 0.1, 0.9), False), ((0.1, 0.1, 0.1), (0.1, 0.9, 0.9), True),
-    ((0.1, 0.1, 0.1), (0.9, 0.9, 0.9), True),
-    # what was not known without the effect is not lost by it
-    ((0.1, 0.9, 0.9), (0.1, 0.9, 0.9), False), ((0.9, 0.9, 0.9), (0.9, 0.9, 0.9), False)])
-def test_a_model_most_of_whose_parameters_are_not_known_is_explained_away(
-        before: tuple[float, ...], errors: tuple[float, ...], away: bool) -> None:
-    def of(*errors: float) -> np.ndarray:
-        return np.vstack([np.diag(1.0 / np.array(errors)), np.zeros((46, len(errors)))])
+def beside(angles: tuple[float, ...], errors: tuple[float, ...]) -> Hypothesis:
+    """A model of parameters that are 1, each with an error of its own were the effect known, and at
+    an angle to what the effect does to it.
+    """
+    n = len(errors)
+    axes = np.linalg.qr(np.random.default_rng(0).normal(size=(200, 2 * n)))[0]
+    J = [axes[:, 2 * k] / error for k, error in enumerate(errors)]
+    J += [1e3 * (np.cos(angle) * axes[:, 2 * k] + np.sin(angle) * axes[:, 2 * k + 1])
+          for k, angle in enumerate(angles)]
+    own, sizes = ([f"{name}{k}" for k in range(n)] for name in ("own", "size"))
+    return fit((*own, *sizes), np.ones(2 * n), np.column_stack(J), law(*sizes))
 
-    nominal = replace(fit(("a", "b", "c"), np.ones(3), of(*before), law()), effects=())
-    h = fit(("a", "b", "c", "size"), np.ones(4), of(*errors, 0.01), law("size"))
-    assert h.explained_away(nominal) == away
-    assert not nominal.explained_away(nominal)
+
+@pytest.mark.parametrize(("angles", "errors", "away"), [
+    ((1.0, 1.0, 1.0), (0.01, 0.01, 0.01), False),
+    ((0.01, 1.0, 1.0), (0.01, 0.01, 0.01), False), ((0.01, 0.01, 1.0), (0.01, 0.01, 0.01), True),
+    # what would not be known were the effect known is not lost by it
+    ((1.0, 1.0, 1.0), (0.9, 0.9, 0.9), False),
+    # an error that is many times as large, and small all the same
+    ((0.01, 0.01, 0.01), (1e-4, 1e-4, 1e-4), False)])
+def test_a_model_of_which_effects_take_away_what_is_known_is_explained_away(
+        angles: tuple[float, ...], errors: tuple[float, ...], away: bool) -> None:
+    h = beside(angles, errors)
+    assert h.explained_away() == away
+    assert not replace(h, effects=()).explained_away()
 
 
 def test_a_remainder_and_other_explanations_count_in_what_is_not_known() -> None:
-    J = np.vstack([np.eye(3) * 10.0, np.zeros((46, 3))])
-    nominal = replace(fit(("a", "b"), np.ones(2), J[:, :2], law()), effects=())
-    h = fit(("a", "b", "size"), np.ones(3), J, law("size"))
-    assert not h.explained_away(nominal)
-    assert h.explained_away(nominal, overdispersion=50.0)
-    assert h.explained_away(nominal, spread={"a": 0.8, "b": 0.8})
-    assert not h.explained_away(nominal, spread={"a": 0.8})
+    h = beside((0.05, 0.05, 0.05), (0.005, 0.005, 0.005))
+    assert not h.explained_away()
+    assert h.explained_away(overdispersion=20.0)
+    assert h.explained_away(spread={"own0": 0.8, "own1": 0.8})
+    assert not h.explained_away(spread={"own0": 0.8})
 
 
 def test_siblings_have_another_effect_of_one_family(case: Case) -> None:

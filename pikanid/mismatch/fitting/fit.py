@@ -23,7 +23,6 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost, progressive_horizon
 from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
-from pikanid.optimise.levenberg_marquardt import Minimum
 
 
 def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
@@ -83,20 +82,6 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
         if other != found.effects and not beyond(found.minimum.chi2):
             found = _instead(found, other, nominal, closest, limit, beyond) or found
     return found
-
-
-def taken_out(h: Hypothesis, effect: Candidate) -> Hypothesis | None:
-    """A hypothesis without one of its effects, as it stands: nothing is fitted again.  None where
-    that cannot be simulated.
-    """
-    rest = tuple(e for e in h.effects if e is not effect)
-    model = extended(effect.site.model, rest)
-    whitened = Whitened(model, h.whitened.records)
-    theta = place(whitened, h.point)
-    if not whitened.choose_steps(theta, misfit=per_row(h.minimum.chi2, max(whitened.rows, 1))):
-        return None
-    found = whitened.residual(theta)
-    return found and Hypothesis(rest, model, whitened, Minimum(theta, *found, False), 0.0)
 
 
 def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, closest: Closest,

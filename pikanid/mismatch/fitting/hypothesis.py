@@ -22,7 +22,7 @@ from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
 ENDLESS = 1e3  # numerical: times a size, or its error alone, that an error without end exceeds
-KNOWN = 2.0  # numerical: standard errors from nothing, from which on a parameter is known
+KNOWN = 5.0  # numerical: standard errors from nothing, from which on a parameter is known
 TOGETHER = 10.0  # numerical: times its error alone, that of a parameter known only with others
 
 
@@ -188,22 +188,26 @@ class Hypothesis:
                    and np.isfinite(a) and e > abs(self.values[n]) and e > TOGETHER * a]
         return len(shared) < 2 or len(unknown) < len(shared)
 
-    def explained_away(self, nominal: Hypothesis, overdispersion: float = 1.0,
+    def explained_away(self, overdispersion: float = 1.0,
                        spread: Mapping[str, float] = MappingProxyType({})) -> bool:
-        """Whether of what is known of the model's own parameters without effects most is not known
-        beside these: they then stand for the model itself.
+        """Whether its effects take away what would be known of most of the model's own parameters
+        were the effects known: they then stand for the model itself.
 
         Args:
-            nominal: The model without effects.
             overdispersion: That divides χ²: standard errors grow with its root.
             spread: How far apart other explanations have parameters, by name.
         """
-        known = [f.name for f in nominal.whitened.problem.free if f.recording is None
-                 and not smaller(abs(nominal.values[f.name]), KNOWN * nominal.std[f.name])]
-        error = {n: math.hypot(math.sqrt(overdispersion) * self.std[n], spread.get(n, 0.0))
-                 for n in known}
-        lost = [n for n in known if smaller(abs(self.values[n]), KNOWN * error[n])]
-        return 2 * len(lost) > len(known)
+        theirs = {p.name for e in self.effects for p in e.parameters}
+        free = self.whitened.problem.free
+        kept = [k for k, f in enumerate(free) if f.name not in theirs]
+        alone = np.sqrt(np.diag(_inverse(np.vstack([self.minimum.J, self.orders])[:, kept])))
+        own = [(free[k].name, a) for k, a in zip(kept, alone, strict=True)
+               if free[k].recording is None]
+        louder = math.sqrt(overdispersion)
+        error = {n: math.hypot(louder * self.std[n], spread.get(n, 0.0)) for n, _ in own}
+        lost = [n for n, a in own if smaller(TOGETHER * louder * a, error[n])
+                and smaller(abs(self.values[n]), KNOWN * error[n])]
+        return 2 * len(lost) > len(own)
 
     @functools.cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:

@@ -50,7 +50,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     proof = predict(h)
     if nominal and proof and smaller(asks.worse * nominal.misfit, proof.misfit):
         return "as it stands it predicts the held-out recording worse than the nominal model"
-    if h.explained_away(fits[frozenset()]):
+    if h.explained_away():
         return EXPLAINED_AWAY
     spread = min(h.whitened.records.spread, settings.noise.order_only)
     louder = float(np.exp(settings.louder * spread))

@@ -131,13 +131,12 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
             again in the train recordings.
     """
     rule, found = settings.part, explained.weighed
-    nominal = next(w.hypothesis for w in found if not w.hypothesis.effects)
     lead = explained.lead(rule.share) or found[0]
     examined = [
         _with_a_size(_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again),
                      lead.hypothesis, explained.overdispersion, settings)
         for kind in kinds_in(lead.hypothesis, rule.dry)]
-    little = EXPLAINED_AWAY if lead.hypothesis.explained_away(nominal) else ""
+    little = EXPLAINED_AWAY if lead.hypothesis.explained_away() else ""
     if smaller(lead.share, rule.share):
         little = (f"the best explanation with it explains {max(lead.share, 0.0):.0%} of the "
                   f"held-out misfit, sure from {rule.share:.0%} on")
@@ -159,7 +158,7 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     apart = spread(fewest.hypothesis, not_ruled_out(fewest, found, rule))
-    if fewest.hypothesis.explained_away(nominal, explained.overdispersion, apart):
+    if fewest.hypothesis.explained_away(explained.overdispersion, apart):
         lost = tuple(Doubtful(p.kind, p.effect, EXPLAINED_AWAY) for p in present)
         return Part((), (*lost, *doubtful), lead.hypothesis, explained.overdispersion, lead.share)
     # a law of which others as good have another size altogether has no name: any that is like it

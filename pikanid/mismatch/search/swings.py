@@ -8,8 +8,8 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.decisions import steady
 from pikanid.mismatch.fitting.descent import Start
-from pikanid.mismatch.fitting.fit import taken_out
-from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.extended import extended
+from pikanid.mismatch.fitting.hypothesis import Hypothesis, unfitted
 
 MOST = 4  # limit: frequencies from which fits begin
 
@@ -23,7 +23,8 @@ def swings(h: Hypothesis, effect: Candidate, law: Candidate) -> list[Start]:
         effect: Of it.
         law: In its place; its directions come in twos, a quarter of a turn apart.
     """
-    about = taken_out(h, effect)
+    rest = [e for e in h.effects if e is not effect]
+    about = unfitted(extended(effect.site.model, rest), h.whitened.records, h.point)
     if about is None:
         return []
     found = directions(about.whitened, about.minimum.theta, [law])
