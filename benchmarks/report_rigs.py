@@ -37,7 +37,7 @@ NOISES = (0.005, 0.05)  # shares of an output's range
 WORKERS = 2
 # One for each rig, noise and round, and never looked at before
 SEEDS = {(name, noise, part): 670_000 + 100_000 * part + 10 * k + i
-         for part in (1, 2, 3, 4, 5, 6) for k, name in enumerate(RIGS)
+         for part in (1, 2, 3, 4, 5, 6, 7) for k, name in enumerate(RIGS)
          for i, noise in enumerate(NOISES)}
 MAKERS = ("formula", "model", "recording", "validation")  # rooms: what makes the sets
 COUNTED = ("right", "wrong", "wrong_but_knowable", "false_alarm", "missed", "surely_in_part",
@@ -73,6 +73,11 @@ ten sets were answered with that, the other six blindly. All eight wrong answers
 of them became `unconfirmed` and one a set with the truth by what followed (formulas that are too
 weak for their form, effects of which no parameter is known, models explained away, rivals fitted
 from the best answer's place); the answers of before are reported.
+All ten sets of round 7 were answered blindly by one code. Its two wrong answers are `unnamed` with
+what followed: a source at one level of a tank that had been told an overflow took with it what is
+known of the model, and the frequency of a swinging force is found where it shows as the push that
+it begins with. Four right ones that had stayed `unconfirmed`, since little can be known of the
+model whatever is added, are sure with that. The answers of before are reported.
 
 Of rounds 1 to 3, the code after round 4 has answered all sets of cascaded_tanks, dc_motor and
 thermal_rc again but three (cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at
