@@ -141,13 +141,17 @@ def blows(seed: int) -> Recording:
     return Recording.from_arrays(t, {"u": np.repeat(rng.normal(0, 6, 20), 20)}, {"u": "N"})
 
 
+@pytest.mark.parametrize("more", [(pk.Parameter("b", 1.0, "1/rad"),), ()])
 def test_a_formula_that_is_not_determined_is_no_name(
-        hypotheses: tuple[Case, list[Hypothesis]], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two parameters that go together may fit as well wherever they are."""
+        hypotheses: tuple[Case, list[Hypothesis]], more: tuple[pk.Parameter, ...],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two parameters that go together may fit as well wherever they are; of one nobody has said
+    that the law is another one where it is nothing.
+    """
     case, ranked = hypotheses
     (effect,) = ranked[0].effects
     formula = replace(effect, ids=("symbolic:a*tanh(b*theta)",), known=False, name="a law",
-                      parameters=(*effect.parameters, pk.Parameter("b", 1.0, "1/rad")))
+                      parameters=(*effect.parameters, *more))
     found = [replace(ranked[0], effects=(formula,)), ranked[1]]
     size = found[0].values["k3"]
     for error, sure in ((size / 4.0, True), (4.0 * size, False)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pikanid.errors.wording import did_you_mean, listed, short
+from pikanid.errors.wording import did_you_mean, listed, of_all, short
 
 
 def rounded_repeats(where: str, name: str, count: int) -> str:
@@ -120,16 +120,12 @@ def settings_unreadable(path: str, detail: str) -> str:
 
 def columns_exchanged(a: str, b: str, left: float, other: float) -> str:
     return (f"With the columns of '{a}' and '{b}' exchanged the model leaves {100 * other:.2g} % "
-            f"of what the outputs do, {_left(left)} as they are: check which is which.")
+            f"of what the outputs do, {of_all(left)} as they are: check which is which.")
 
 
 def times_in_another_unit(word: str, left: float, other: float) -> str:
     return (f"With all times {word} by 1000 the model leaves {100 * other:.2g} % of what the "
-            f"outputs do, {_left(left)} as they are: check the unit of the time.")
-
-
-def _left(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 1 else "all of it"
+            f"outputs do, {of_all(left)} as they are: check the unit of the time.")
 
 
 def sampled_otherwise(name: str, one: float, other: float) -> str:

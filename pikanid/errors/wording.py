@@ -100,3 +100,12 @@ def made_brief(sentence: Callable[..., str]) -> Callable[..., str]:
         return sentence(*map(brief, args), **{name: brief(v) for name, v in named.items()})
 
     return told
+
+
+def of_all(share: float) -> str:
+    """A share in percent, or that it is no less than all.
+
+    >>> of_all(0.123), of_all(389.0)
+    ('12 %', 'all of it')
+    """
+    return f"{100 * share:.2g} %" if share < 1 else "all of it"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -12,7 +11,7 @@ import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.whitened import Records, Whitened
-from pikanid.mismatch.fitting.decisions import below, smaller
+from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.descent import (
     place,
 )
@@ -200,14 +199,13 @@ class Hypothesis:
         theirs = {p.name for e in self.effects for p in e.parameters}
         free = self.whitened.problem.free
         kept = [k for k, f in enumerate(free) if f.name not in theirs]
-        alone = np.sqrt(np.diag(_inverse(np.vstack([self.minimum.J, self.orders])[:, kept])))
-        own = [(free[k].name, a) for k, a in zip(kept, alone, strict=True)
-               if free[k].recording is None]
-        louder = math.sqrt(overdispersion)
-        error = {n: math.hypot(louder * self.std[n], spread.get(n, 0.0)) for n, _ in own}
-        lost = [n for n, a in own if smaller(TOGETHER * louder * a, error[n])
-                and smaller(abs(self.values[n]), KNOWN * error[n])]
-        return 2 * len(lost) > len(own)
+        own = np.array([free[k].recording is None for k in kept], bool)
+        alone = np.diag(_inverse(np.vstack([self.minimum.J, self.orders])[:, kept]))
+        apart = np.array([spread.get(free[k].name, 0.0) for k in kept])
+        error = np.sqrt(overdispersion * np.diag(self.covariance)[kept] + apart**2)
+        lost = own & (error > TOGETHER * np.sqrt(overdispersion * alone)) & (
+            KNOWN * error > np.abs(self.minimum.theta[kept]))
+        return 2 * int(np.sum(lost)) > int(np.sum(own))
 
     @functools.cached_property
     def _errors(self) -> tuple[np.ndarray, np.ndarray]:

@@ -59,7 +59,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     for e in h.effects:
         rest = h.key - {e.key}
         sizes = [p for p in e.parameters if p.free]
-        if h.symbolic and len(sizes) > 1:
+        if h.symbolic and sizes:
             size, error = h.values[sizes[0].name], h.std[sizes[0].name]
             if below(abs(size), asks.sized * error):
                 return (f"the recording does not determine {sizes[0].name} of {e.name} ({size:.3g} "
