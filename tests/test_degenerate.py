@@ -17,8 +17,10 @@ from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.channels import LEFT
 from pikanid.mismatch.catalogue.forces import slowest
 from pikanid.mismatch.catalogue.sites import sites
+from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.search import places
 from pikanid.mismatch.search.leaders import siblings
 from pikanid.model.parts import Parameter
 from pikanid.optimise.levenberg_marquardt import Minimum
@@ -130,3 +132,23 @@ def test_a_parameter_that_cannot_be_negative_does_not_drift_through_nothing(case
         replace(p, bounds=(-1.0, p.bounds[1])) for p in case.model.parameters))
     site = replace(drifts[0].site, model=free)
     assert slowest(site, "d_theta") == -np.inf
+
+
+def test_a_law_that_is_too_large_to_be_squared_has_other_places(
+        case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a coordinate that runs away."""
+    h = hypothesis(case, "cubic_stiffness")
+    (effect,) = h.effects
+    other = replace(effect, site=replace(effect.site, suffix="_2"))
+
+    def begun(times: float) -> float:
+        real = places.directions
+        with monkeypatch.context() as patched:
+            patched.setattr(places, "directions", lambda w, theta, same: (
+                found := real(w, theta, [effect])) and replace(found, D=times * found.D))
+            ((_, (start,)),) = places.elsewhere(h, [other])
+        assert isinstance(start, Start)
+        return start.values["k3"]
+
+    assert begun(1e200) * 1e200 == pytest.approx(begun(1.0))
+    assert begun(1.0) == pytest.approx(h.values["k3"], rel=0.2)

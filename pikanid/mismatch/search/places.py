@@ -26,12 +26,15 @@ def elsewhere(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
         size = effect.parameters[0]
         does = h.minimum.J @ np.where([f.name == size.name for f in free],
                                       h.minimum.theta - size.value, 0.0)
-        along, squares = found.D.T @ does, np.maximum(np.sum(found.D**2, axis=0), 1e-300)
+        # a law at a place that runs away may be too large to be squared
+        largest = np.maximum(np.abs(found.D).max(axis=0, initial=0.0), 1e-100)
+        signs = found.D / largest
+        along, squares = signs.T @ does, np.maximum(np.sum(signs**2, axis=0), 1e-100)
         for k, other in enumerate(same):
             own = np.flatnonzero(found.owner == k)
             if len(own):
                 best = own[np.argmax(steady(along[own] ** 2 / squares[own]))]
-                amplitude = float(along[best] / squares[best])
+                amplitude = float(along[best] / squares[best] / largest[best])
                 yield (*(e for e in h.effects if e is not effect), other), [
                     start_from(other, found.directions[best], amplitude, h.point)]
 
