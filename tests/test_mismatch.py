@@ -226,8 +226,8 @@ def test_a_motion_begins_where_its_data_begin() -> None:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_friction_and_a_damping_that_grows_are_found_in_the_real_pendulum(
         recordings_folder: object) -> None:
-    # the recording holds more than any catalogue; which law of each it is cannot be told.  A damping
-    # that falls with time would be negative at the end of the swing
+    # the recording holds more than any catalogue; which law of each it is cannot be told.  A
+    # damping that falls with time would be negative at the end of the swing
     import diagnosis_real
 
     (row,) = diagnosis_real.single_pendulum()
