@@ -82,12 +82,10 @@ def test_a_model_of_which_effects_take_away_what_is_known_is_explained_away(
     assert not replace(h, effects=()).explained_away()
 
 
-def test_a_remainder_and_other_explanations_count_in_what_is_not_known() -> None:
+def test_a_remainder_counts_in_what_is_not_known() -> None:
     h = beside((0.05, 0.05, 0.05), (0.005, 0.005, 0.005))
     assert not h.explained_away()
     assert h.explained_away(overdispersion=20.0)
-    assert h.explained_away(spread={"own0": 0.8, "own1": 0.8})
-    assert not h.explained_away(spread={"own0": 0.8})
 
 
 def test_siblings_have_another_effect_of_one_family(case: Case) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from pikanid.optimise.levenberg_marquardt import Minimum, worth_a_step
 
 GIVEN = 0.1  # numerical: of parameters, by which those that were given may be off
 ENDLESS = 1e3  # numerical: times a size, or its error alone, that an error without end exceeds
-KNOWN = 5.0  # numerical: standard errors from nothing, from which on a parameter is known
+KNOWN = 3.0  # numerical: standard errors from nothing, from which on a parameter is known
 TOGETHER = 10.0  # numerical: times its error alone, that of a parameter known only with others
 
 
@@ -187,24 +186,21 @@ class Hypothesis:
                    and np.isfinite(a) and e > abs(self.values[n]) and e > TOGETHER * a]
         return len(shared) < 2 or len(unknown) < len(shared)
 
-    def explained_away(self, overdispersion: float = 1.0,
-                       spread: Mapping[str, float] = MappingProxyType({})) -> bool:
+    def explained_away(self, overdispersion: float = 1.0) -> bool:
         """Whether its effects take away what would be known of most of the model's own parameters
         were the effects known: they then stand for the model itself.
 
         Args:
             overdispersion: That divides χ²: standard errors grow with its root.
-            spread: How far apart other explanations have parameters, by name.
         """
         theirs = {p.name for e in self.effects for p in e.parameters}
         free = self.whitened.problem.free
         kept = [k for k, f in enumerate(free) if f.name not in theirs]
         own = np.array([free[k].recording is None for k in kept], bool)
         alone = np.diag(_inverse(np.vstack([self.minimum.J, self.orders])[:, kept]))
-        apart = np.array([spread.get(free[k].name, 0.0) for k in kept])
-        error = np.sqrt(overdispersion * np.diag(self.covariance)[kept] + apart**2)
-        lost = own & (error > TOGETHER * np.sqrt(overdispersion * alone)) & (
-            KNOWN * error > np.abs(self.minimum.theta[kept]))
+        squares = np.diag(self.covariance)[kept]
+        lost = own & (squares > TOGETHER**2 * alone) & (
+            KNOWN * np.sqrt(overdispersion * squares) > np.abs(self.minimum.theta[kept]))
         return 2 * int(np.sum(lost)) > int(np.sum(own))
 
     @functools.cached_property

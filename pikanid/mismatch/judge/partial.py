@@ -158,7 +158,7 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
               and not smaller(rule.within * max(lead.left, rule.floor), w.left)]
     fewest = min(enough, key=lambda w: (len(w.hypothesis.effects), w.score))
     apart = spread(fewest.hypothesis, not_ruled_out(fewest, found, rule))
-    if fewest.hypothesis.explained_away(explained.overdispersion, apart):
+    if fewest.hypothesis.explained_away(explained.overdispersion):
         lost = tuple(Doubtful(p.kind, p.effect, EXPLAINED_AWAY) for p in present)
         return Part((), (*lost, *doubtful), lead.hypothesis, explained.overdispersion, lead.share)
     # a law of which others as good have another size altogether has no name: any that is like it

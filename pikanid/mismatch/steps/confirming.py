@@ -26,8 +26,9 @@ def confirmed(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
         # one that is better has rivals of its own
         known = search.ranked()[0].fit in before
         answer = _settled(case, search.ranked() if known else search.grow(case.adequate))
-    if answer.verdict == "unnamed" and case.adequate(search.ranked()[0]):
-        # it was enough for the recordings it was fitted to, and is not for the others
+    best = search.ranked()[0]
+    if answer.verdict == "unnamed" and len(best.effects) == 1 and case.adequate(best):
+        # one was enough for the recordings it was fitted to, and is not for the others
         failed = {h.fit for h in search.ranked()}
         answer = _settled(case, search.grow(
             lambda h: case.adequate(h) and h.fit not in failed))
