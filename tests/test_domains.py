@@ -72,6 +72,14 @@ def test_a_length_is_a_level_where_something_flows(unit: str, names: tuple[str, 
     assert catalogues_of(pk.Model.from_dict(table)) == names
 
 
+def test_what_an_input_alone_fills_is_a_level() -> None:
+    vessel = pk.Model.from_dict({
+        "states": {"V": {"unit": "l"}}, "inputs": {"q": {"unit": "l/s"}},
+        "parameters": {"b": {"guess": 1.0, "unit": "V/l"}}, "equations": {"V": "q"},
+        "outputs": {"y": {"expression": "b*V"}}})
+    assert catalogues_of(vessel) == ("hydraulics",)
+
+
 def test_a_length_whose_rate_is_a_state_is_a_place() -> None:
     cylinder = pk.Model.from_dict({
         "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}, "p": {"unit": "bar"}},

@@ -48,8 +48,14 @@ def _states_of(model: Lookup) -> dict[str, tuple[str, ...]]:
 
 
 def _in_units(model: Lookup, others: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(s.name for s in model.states if _like(s.unit, others)
-                 and not model.equations[s.name].is_Symbol)
+    return tuple(s.name for s in model.states
+                 if _like(s.unit, others) and not _moved(model, s.name))
+
+
+def _moved(model: Lookup, state: str) -> bool:
+    """Whether a state's rate is another state, as of a place."""
+    rate = model.equations[state]
+    return bool(rate.is_Symbol) and rate.name in model.state_names
 
 
 def _tells(model: Lookup, telling: tuple[str, ...]) -> bool:
@@ -82,7 +88,7 @@ def not_taken(model: Lookup, known: Iterable[str]) -> str:
     if model.domain is not None or {*model.state_names} == {*chain(*taken_for.values())}:
         return ""
     ids = {*known}
-    moves = any(e.is_Symbol and e.name in model.state_names for e in model.equations.values())
+    moves = any(_moved(model, name) for name in model.state_names)
     left = [name for name in catalogues() if (name == "mechanics") == moves
             and name not in taken_for and not ids & {e.key for e in read_effects(name)}]
     return "" if not left else (

@@ -43,9 +43,9 @@ def unlike(model: Model, train: Sequence[Recording], later: Sequence[Recording])
         one, *others = [bind(model, some[0]) for some in (train, later) if some]
     except errors.BadRecording:
         return []
-    said = [*_coarse(model, one)]
+    said = [*_coarse(model, train[0])]
     for other in others:
-        said += [*_sizes(one, other), *_times(one, other)]
+        said += [*_sizes(one, other), *_times(model, train[0], later[0])]
     return said
 
 
@@ -63,20 +63,15 @@ def _largest(bound: Experiment) -> list[tuple[float, str]]:
     return [(float(np.nanmax(np.abs(v), initial=0.0)), bound.name) for v in values]
 
 
-def _times(one: Experiment, other: Experiment) -> Iterator[str]:
-    lengths = [b.t1 - b.t0 for b in (one, other)]
-    steps = [_step(b) for b in (one, other)]
+def _times(model: Model, one: Recording, other: Recording) -> Iterator[str]:
+    lengths = [r.stop - r.start for r in (one, other)]
+    steps = [r[model.output_names[0]].interval for r in (one, other)]
     if all(min(pair) > 0 and max(pair) / min(pair) > OFTEN for pair in (lengths, steps)):
         yield errors.times_differ(one.name, other.name, *steps)
 
 
-def _coarse(model: Model, bound: Experiment) -> Iterator[str]:
+def _coarse(model: Model, recording: Recording) -> Iterator[str]:
     rate = natural_frequency(model) or decay_rate(model)
-    if rate and _step(bound) * rate > PERIODS:
-        yield errors.samples_far_apart(_step(bound), 1 / rate)
-
-
-def _step(bound: Experiment) -> float:
-    """Median interval between the samples of the first output [s]; zero with fewer than two."""
-    steps = np.diff(bound.samples[0].t)
-    return float(np.median(steps)) if len(steps) else 0.0
+    step = recording[model.output_names[0]].interval
+    if rate and step * rate > PERIODS:
+        yield errors.samples_far_apart(step, 1 / rate)
