@@ -197,7 +197,7 @@ def against(families: tuple[str, str], kappas: dict[Kind | None, float], held: s
     ("abc", "", "unconfirmed")])
 def test_many_effects_are_all_only_where_each_is_sure(
         monkeypatch: pytest.MonkeyPatch, held: str, sure: str, verdict: str) -> None:
-    h: Any = SimpleNamespace(effects=[effect(name) for name in held])
+    h: Any = SimpleNamespace(effects=[effect(name) for name in held], key=frozenset(held))
     present: Any = tuple(SimpleNamespace(names=(name,)) for name in sure)
     part = Part(present, (), h, 1.0, 0.95) if sure else None
     monkeypatch.setattr(surely, "_sure", lambda case: (None, part))

@@ -93,6 +93,25 @@ def test_delayed_output_shows_the_start_until_the_delay_has_passed() -> None:
     assert found.slope_error < 5e-5
 
 
+def test_output_whose_clock_loses() -> None:
+    """Late by a share of the time, begun half a second before the record, and twice as a gain."""
+    recording = waves("first")
+    clock = Parameter("clock", 0.013, "", (-0.1, 0.1))
+    model = systems.sloshing().with_initial(theta=0.05).map_output(
+        "theta", [clock], delay="0.01 - clock*(t + 0.5)", gain="1 + 2*clock")
+
+    def reference(p: Values) -> np.ndarray:
+        seen = recording.t * (1 + p["clock"]) + 0.5 * p["clock"] - 0.01
+        signal = oracle.Signal(recording.t, recording["u_x"].values, "first")
+        x = oracle.simulate(lambda t, x, u, s: swing(p, x, u[0]), [0.05, 0], seen, [signal],
+                            t0=0.0).x[:, 0]
+        return (1 + 2 * p["clock"]) * x
+
+    found = compare(model, recording, reference)
+    assert found.error < 0.05 * SIGMA
+    assert found.slope_error < 5e-5
+
+
 def test_delays_of_input_and_output_tied_by_one_parameter() -> None:
     """One free number sets both: the late output of a late input, a direct path included."""
     recording = waves("first")

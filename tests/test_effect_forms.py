@@ -51,6 +51,17 @@ def tanks() -> pk.Model:
     return pk.Model.from_dict({**TANKS, "effects": {}})
 
 
+def test_bounds_follow_as_far_again_what_no_output_shows(tanks: pk.Model) -> None:
+    both = replace(around(tanks), unseen=frozenset({"x1"}))
+    first, second = (e.parameters[1] for e in bound(form(OVERFLOW), both))
+    assert (first.value, first.bounds) == (pytest.approx(2.4), (0.0, 5.0))
+    assert (second.value, second.bounds) == (pytest.approx(2.4), (1.0, 3.0))
+    below = replace(both, ranges={"x1": (-3.0, -1.0), "x2": (-1.0, 3.0)},
+                    unseen=frozenset({"x1", "x2"}))
+    assert [e.parameters[1].bounds for e in bound(form(OVERFLOW), below)] == [
+        (-5.0, 0.0), (-5.0, 7.0)]
+
+
 def test_every_pair_of_states_is_bound(tanks: pk.Model) -> None:
     first, second = bound(form(OVERFLOW), around(tanks))
     assert (first.variant, second.variant) == ("x1,x2", "x2,x1")

@@ -259,7 +259,7 @@ def test_a_partial_answer_says_what_is_sure_and_what_is_left() -> None:
         "hysteresis): without it the best explanation leaves 12 times as much" in text
     assert "Surely: a delay: no explanation does without it" in text
     assert "Left: half of it below 3.2 Hz; louder than noise at 1 to 2.5 s" in text
-    assert "Not sure: timing: its probability is 0.93" in text
+    assert "Not sure: a delay or a lag: its probability is 0.93" in text
 
 
 def test_a_partial_answer_as_json() -> None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.comparison.runs import Run, simulator_of, weights, with_free_start
-from pikanid.problem.evaluated import delays
+from pikanid.problem.late import sample_delays
 from pikanid.problem.problem import Experiment, Samples, bind
 from pikanid.recording import Recording
 from pikanid.simulation.simulator import Response
@@ -67,7 +67,7 @@ def predict_ahead(run: Run, recording: Recording, horizon: int, window: int, ori
     index = np.array([model.parameter_names.index(str(s.initial)) for s in model.states], np.int64)
     known = dict(zip(base.model.parameter_names, run.p, strict=True))
     p = np.array([known.get(name, value) for name, value in model.values.items()])
-    late = float(np.max(delays(model.outputs, model, p), initial=0.0))
+    late = max(0.0, *(float(np.max(d)) for d in sample_delays(model, base.samples, p)))
     every = np.arange(window - 1, len(clock) - horizon)
     every = every[np.unique(np.linspace(0, len(every) - 1, min(origins, len(every))).astype(int))]
     latest = run.response

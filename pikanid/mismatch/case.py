@@ -14,6 +14,7 @@ from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.outliers import without_lone
 from pikanid.mismatch.data.own_noise import with_own_noise
 from pikanid.mismatch.data.preparation import with_refined_noise
+from pikanid.mismatch.data.put_back import put_back
 from pikanid.mismatch.data.whitened import Records, Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
@@ -86,7 +87,10 @@ class Case:
         here = self.model.with_values({n: best.values[n] for n in self.model.free_names})
         rate = sites(here, self.records.recordings)[0].rate
         explained = self.adequate(best)
-        new = with_refined_noise(self.records, fit, rate, quiet, explained)
+        records = self.records
+        if explained:
+            records = put_back(records, best.model, best.minimum.theta)
+        new = with_refined_noise(records, fit, rate, quiet, explained)
         if not explained:
             # high frequencies tell little of the colour of noise: it may be all that is left
             other = with_refined_noise(self.records, fit, rate, quiet, True)

@@ -138,15 +138,15 @@ def _diagnosed(case: Case, quiet: tuple[float, float] | None, tell: Callable[[st
     if not smaller(detection.p_value, alpha):
         case.relevelled(case.base, quiet)
         return _nothing_left(case, detection)
-    first, ranked = case.base, searched(case, tell)
-    if case.base is not first and not smaller(
+    nominal, ranked = case.base, searched(case, tell)
+    if case.base is not nominal and not smaller(
             (detection := case.detected()).p_value, alpha):
         return _nothing_left(case, detection)  # the nominal model had been in a wrong minimum
     ranked = with_noise_of_the_rest(case, ranked, quiet, tell)
     tell("confirmation")
-    answer, site, shape = _beyond(case, confirmed(case, ranked), tell)
+    answer, site, shape = _beyond(case, first := confirmed(case, ranked), tell)
     if answer.part is not None and case.adequate(late := answer.part.hypothesis) and all(
-            late.fit != h.fit for h in ranked):
+            late.fit != h.fit for h in (*ranked, *first.given)):
         # found only now, it explains all: the noise had been read through what it explains
         tell("noise once more")
         ranked = with_noise_of_the_rest(case, case.search.ranked(), quiet, tell)

@@ -35,6 +35,7 @@ class Surroundings:
         duration: Of the recordings [s].
         interval: Between samples of an output, the usual one [s].
         taken: Names that parameters and states of effects must not have.
+        unseen: States that no output shows: where they go the nominal model guesses.
     """
 
     model: Lookup
@@ -46,6 +47,7 @@ class Surroundings:
     duration: float
     interval: float
     taken: frozenset[str] = frozenset()
+    unseen: frozenset[str] = frozenset()
 
     def choices(self, kind: str, bound: Mapping[str, str]) -> list[str]:
         """What a placeholder of this kind may stand for beside those that are bound."""
@@ -90,6 +92,16 @@ class Surroundings:
         own = self.seen if kind.endswith("output") else self.ranges
         return own.get(name, (0.0, 1.0))
 
+    def reach_of(self, name: str, kind: str) -> tuple[float, float]:
+        """How low and how high it may be: of a state that is not seen as far again beyond its
+        range, without another sign.
+        """
+        low, high = self.range_of(name, kind)
+        if name not in self.unseen or kind.endswith("output"):
+            return low, high
+        lowest, highest = 2 * low - high, 2 * high - low
+        return max(lowest, 0.0) if low >= 0 else lowest, min(highest, 0.0) if high <= 0 else highest
+
     def unit(self, name: str) -> str:
         """Of a state, input, output, parameter or channel; empty where it says none."""
         own = {**{o.name: o.unit for o in self.model.outputs},
@@ -124,12 +136,15 @@ def bound(form: EffectForm, around: Surroundings) -> Iterator[Effect]:
 def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,
           alone: bool) -> Effect:
     values = {"duration": around.duration, "interval": around.interval}
+    within: dict[str, float] = {}
     for name, wanted in binding.items():
         low, high = around.range_of(wanted, form.places[name])
         values |= {f"{name}_low": low, f"{name}_high": high,
                    f"{name}_size": around.sizes.get(wanted, 1.0),
                    f"{name}_value": around.model.values.get(wanted, 1.0),
                    f"{name}_zero": units.absolute_zero(around.unit(wanted))}
+        low, high = around.reach_of(wanted, form.places[name])
+        within |= {f"{name}_low": low, f"{name}_high": high}
     where = f"'{form.source}': effect '{form.key}'"
     own = Entry(form.content, where, errors.BadModel).table(optional=None)
     parameters = own["parameters"].table(optional=None)
@@ -145,8 +160,9 @@ def _with(form: EffectForm, binding: Mapping[str, str], around: Surroundings,
     content["name"] = _filled(str(form.content.get("name", form.key)), binding)
     written = {n: around.unit(wanted) or "1" for n, wanted in binding.items()}
     content["parameters"] = {
-        renamed[n]: {k: _number(v, values, f"{where}: {k} of '{n}'")
-                     if k in _NUMBERS else _unit(v, written) if k == "unit" else v
+        renamed[n]: {k: _number(v, values | within if k == "bounds" else values,
+                                f"{where}: {k} of '{n}'") if k in _NUMBERS
+                     else _unit(v, written) if k == "unit" else v
                      for k, v in e.table(optional=None).items() for v in [v.value]}
         for n, e in parameters.items()}
     content["states"] = {

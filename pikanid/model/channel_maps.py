@@ -107,7 +107,8 @@ def map_output(model: M, name: str, parameters: Sequence[Parameter] = (), *,
 
     They apply in the order of the keywords: y -> first-order lag [s] -> gain·y -> + offset ->
     + drift·t -> function (a formula of the output's name) -> limited to clip = (lo, hi);
-    `delay` [s] shifts the whole signal: the sample at t shows y(t - delay).
+    `delay` [s] shifts the whole signal: the sample at t shows y(t - delay).  It may depend on t:
+    "-e*t" is that of a clock which runs slow by a share e.
 
     Raises:
         BadModel: Unknown output or symbol.

@@ -136,7 +136,8 @@ def validate(model: Lookup, checked: Checked) -> None:
             _check_symbols(expr, everything, f"The equation of '{name}'", model)
     for output in checked.new(model.outputs):
         _check_symbols(output.expression, everything, f"Output '{output.name}'", model)
-        _check_symbols(output.delay, constants, f"The delay of output '{output.name}'", model)
+        _check_symbols(output.delay, constants | {TIME.name},
+                       f"The delay of output '{output.name}'", model)
     for state in checked.new(model.states):
         _check_symbols(state.initial, start, f"The initial value of '{state.name}'", model)
         if splines := state.initial.atoms(AppliedUndef):

@@ -8,18 +8,19 @@
     add = { x = "-k*max(x - h, 0)" }
     null = { k = 0 }
 
-Texts in braces become the unit of what a placeholder stands for, in names its name.  Guesses and
+Texts in braces become the unit of what a placeholder stands for, in names its name. Guesses and
 bounds may be formulas of the range that a state or an output covers (``x_low``, ``x_high``), of the
 largest size of an input or a channel (``u_size``), of a parameter's value (``p_value``), of
 absolute zero on a state's scale of temperature (``x_zero``), of the recordings' duration [s] and of
-the usual interval between samples [s]: what is gone within one is as good as gone at once.  A
-parameter with a ``value`` instead of a guess is not estimated.  A coordinate is a state whose rate
-is another state: ``"its rate"``, the place after it, is that one; an angle is a coordinate with a
-unit of angles, a current or a voltage a state with one of those, and so is a voltage output, or a
-current input.  A parameter is one of the
-equation of the first place; a channel like it, recorded and not used by the model, has a unit that
-converts to its own, and a signal like it may be an input or a fixed parameter of the model as well,
-such as the temperature of the surroundings.
+the usual interval between samples [s]: what is gone within one is as good as gone at once. A state
+that no output shows may go as far again beyond its range, which the nominal model guesses: bounds
+follow that. A parameter with a ``value`` instead of a guess is not estimated. A coordinate is a
+state whose rate is another state: ``"its rate"``, the place after it, is that one; an angle is a
+coordinate with a unit of angles, a current or a voltage a state with one of those, and so is a
+voltage output, or a current input. A parameter is one of the equation of the first place; a channel
+like it, recorded and not used by the model, has a unit that converts to its own, and a signal like
+it may be an input or a fixed parameter of the model as well, such as the temperature of the
+surroundings.
 """
 
 from __future__ import annotations

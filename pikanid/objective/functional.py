@@ -26,7 +26,7 @@ from pikanid.model import Model
 from pikanid.noise.level import difference_noise
 from pikanid.objective.rows import ONE, AnyApproximator, Part, Rows, Sites, by_coefficients
 from pikanid.problem.chains import Chains
-from pikanid.problem.evaluated import delays
+from pikanid.problem.late import shown_within
 from pikanid.problem.problem import Problem, Samples
 from pikanid.simulation.vectorfield import VectorField
 
@@ -224,7 +224,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
         BadSetting: If a delay, a backlash or a rate limit is to be estimated: no functional over
             fixed sites can see them.
     """
-    late = _output_delays(problem.model)
+    _check_seen(problem.model)
     parts = []
     for r, (experiment, own, (times, weights)) in enumerate(zip(
             problem.experiments, approximators, nodes, strict=True)):
@@ -236,8 +236,7 @@ def bind(problem: Problem, vector_field: VectorField, chains: Chains,
         tops = [Shown(own[i], m, pieces[i]) for i, m in enumerate(chains.lengths)]
         data = [] if like is None else [
             sites.with_states(states) for sites in like.parts[r].data]
-        for samples in experiment.samples if like is None else ():
-            seen = np.maximum(samples.t - late[samples.output], experiment.t0)
+        for seen, samples in shown_within(experiment) if like is None else ():
             sigma = _spread(samples, len(problem.model.outputs) > 1) if weighted else 1.0
             weight = np.empty((seen.size, 1))
             weight[:, 0] = 1.0 / sigma
@@ -282,8 +281,7 @@ def _spread(samples: Samples, several: bool) -> Array | float:
     return max(difference_noise(samples.y, samples.t), 1e-6 * float(np.ptp(samples.y)), 1e-300)
 
 
-@functools.lru_cache(maxsize=64)
-def _output_delays(model: Model) -> Array:
+def _check_seen(model: Model) -> None:
     free = {symbol(name) for name in model.free_names}
     for what, items in (("input", model.inputs), ("output", model.outputs)):
         for item in items:
@@ -297,4 +295,3 @@ def _output_delays(model: Model) -> Array:
             if names:
                 raise errors.BadSetting(errors.relaxation_cannot_see(
                     names, f"the {what.replace('_', ' ')} of input '{item.name}'"))
-    return delays(model.outputs, model, np.array(list(model.values.values())))

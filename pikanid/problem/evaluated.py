@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from pikanid.formula.expressions import symbol
-from pikanid.model import Input, Model, Output
+from pikanid.model import Input, Model
 
 
 def _step(x: float, at: float) -> float:
@@ -29,16 +29,16 @@ _TOOLS = {
 }  # definition: values at zero
 
 
-def delays(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
-    """The delays [s] of inputs or outputs at parameters p (P,)."""
+def delays(items: Sequence[Input], model: Model, p: np.ndarray) -> np.ndarray:
+    """The delays (m,) [s] of inputs at parameters p (P,)."""
     table = dict(zip(model.parameter_names, p, strict=True))
-    return np.array([_number(item.delay, table) for item in items])
+    return np.array([number(item.delay, table) for item in items])
 
 
-def delay_jacobian(items: Sequence[Input | Output], model: Model, p: np.ndarray) -> np.ndarray:
-    """∂delay/∂p (channels, P)."""
+def delay_jacobian(items: Sequence[Input], model: Model, p: np.ndarray) -> np.ndarray:
+    """∂delay/∂p (m, P) of inputs."""
     table = dict(zip(model.parameter_names, p, strict=True))
-    return np.array([[_number(slope, table) for slope in _slopes(item.delay, model.parameter_names)]
+    return np.array([[number(slope, table) for slope in slopes(item.delay, model.parameter_names)]
                      for item in items]).reshape(len(items), len(p))
 
 
@@ -51,21 +51,23 @@ def paths(model: Model, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
     table = dict(zip(model.parameter_names, p, strict=True))
 
     def given(formula: sp.Expr | None) -> float:
-        return np.nan if formula is None else _number(formula, table)
+        return np.nan if formula is None else number(formula, table)
 
-    return (np.array([_number(i.backlash, table) for i in model.inputs]),
-            np.array([_number(i.rate_limit, table) if i.rate_limit != 0 else np.inf
+    return (np.array([number(i.backlash, table) for i in model.inputs]),
+            np.array([number(i.rate_limit, table) if i.rate_limit != 0 else np.inf
                       for i in model.inputs]),
             np.array([given(i.backlash_start) for i in model.inputs]),
             np.array([given(i.past) for i in model.inputs]))
 
 
 @functools.lru_cache(maxsize=256)
-def _slopes(expr: sp.Expr, names: tuple[str, ...]) -> tuple[sp.Expr, ...]:
+def slopes(expr: sp.Expr, names: tuple[str, ...]) -> tuple[sp.Expr, ...]:
+    """Its derivatives by the parameters of these names."""
     return tuple(expr.diff(symbol(n)) for n in names)
 
 
-def _number(expr: sp.Expr, table: dict[str, float]) -> float:
+def number(expr: sp.Expr, table: Mapping[str, float]) -> float:
+    """A formula of parameters alone at their values by name."""
     if expr.is_Symbol:  # most delays are one parameter
         return float(table[expr.name])
     if expr.is_number:

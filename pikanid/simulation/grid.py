@@ -66,8 +66,9 @@ class Grid:
 
 
 def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput],
-               delay_in: np.ndarray, delay_out: np.ndarray) -> Grid:
-    """Lay out the stops of one experiment for given inputs (m) and input and output delays [s].
+               delay_in: np.ndarray, delay_out: Sequence[np.ndarray | float]) -> Grid:
+    """Lay out the stops of one experiment for given inputs (m), their delays [s], and those of the
+    samples of each output.
 
     Observations are numbered output by output, in the order of `experiment.samples`.  A delayed
     output shows the initial state until t0 + delay.
@@ -75,8 +76,9 @@ def build_grid(experiment: Experiment, held: Sequence[HeldInput | PiecewiseInput
     from pikanid.simulation.stops import draw
 
     t0 = experiment.t0
-    wanted = [np.maximum(s.t - delay_out[s.output], t0) for s in experiment.samples]
-    end = max([experiment.t1 if not wanted else t0, *(w[-1] for w in wanted if len(w))])
+    wanted = [np.maximum(s.t - late, t0)
+              for s, late in zip(experiment.samples, delay_out, strict=True)]
+    end = max([experiment.t1 if not wanted else t0, *(w.max() for w in wanted if len(w))])
     pairs = list(zip(held, delay_in, strict=True))
     breaks = [b[(b > t0) & (b < end)]
               for b in (h.switches + d for h, d in pairs if len(h.switches))]

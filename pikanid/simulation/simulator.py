@@ -14,6 +14,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.model import Input, Model, Output
 from pikanid.problem.evaluated import delay_jacobian, delays, paths
+from pikanid.problem.late import sample_delay_jacobian, sample_delays
 from pikanid.problem.problem import Experiment
 from pikanid.simulation.compiled import Method, compiled
 from pikanid.simulation.grid import Grid, build_grid
@@ -107,9 +108,9 @@ class Simulator:
         if self.fixed:
             return self._fixed_grid
         delay_in = delays(self.acting.inputs, self.model, p)
-        delay_out = delays(self.model.outputs, self.model, p)
+        delay_out = sample_delays(self.model, self.experiment.samples, p)
         shapes = paths(self.model, p)
-        key = b"".join(a.tobytes() for a in (delay_in, delay_out, *shapes))
+        key = b"".join(a.tobytes() for a in (delay_in, *map(np.asarray, delay_out), *shapes))
         if self._kept.get("delays") != key:
             held = split(self.model, self.experiment.held, shapes)
             self._kept.update(
@@ -118,7 +119,7 @@ class Simulator:
 
     @functools.cached_property
     def _fixed_grid(self) -> Grid:
-        zeros = np.zeros(len(self.model.inputs)), np.zeros(len(self.model.outputs))
+        zeros = np.zeros(len(self.model.inputs)), [0.0] * len(self.experiment.samples)
         return build_grid(self.experiment, self.experiment.held, *zeros)
 
     def run(self, p: np.ndarray, active: np.ndarray | None = None, steps: Steps | None = None,
@@ -171,13 +172,12 @@ class Simulator:
         return made
 
     def _moved(self, p: np.ndarray, active: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
-        """∂delay/∂θ of inputs and outputs (channels, A), and whether any is not zero."""
+        """∂delay/∂θ of inputs (m, A) and of samples (rows, A), and whether any is not zero."""
         if self._undelayed or not self._delayed_by[active].any():
             return (*_zeros(len(self.acting.inputs), len(self.model.outputs), len(active)), False)
-        both = (delay_jacobian(c, self.model, p)[:, active]
-                for c in (self.acting.inputs, self.model.outputs))
-        dtau_in, dtau_out = map(np.ascontiguousarray, both)
-        return dtau_in, dtau_out, True
+        dtau_in = delay_jacobian(self.acting.inputs, self.model, p)[:, active]
+        return np.ascontiguousarray(dtau_in), sample_delay_jacobian(
+            self.model, self.experiment.samples, p, active), True
 
     def choose_steps(self, p: np.ndarray, tolerance: float | None = None,
                      method: MethodChoice = "auto", known: Steps | None = None,

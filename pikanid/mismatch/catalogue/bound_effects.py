@@ -65,7 +65,9 @@ def bound_to(effects: Iterable[Effect | EffectForm], sites: Sequence[Site],
         site.model, tuple(dict.fromkeys(s.v for s in sites)),
         {n: r for n, r in ranges().items() if n in site.model.state_names},
         seen, sizes, {n: first[n].unit for n in site.extra},
-        sum(r.stop - r.start for r in recordings), site.interval)
+        sum(r.stop - r.start for r in recordings), site.interval,
+        unseen=frozenset(site.model.state_names) - {
+            o.expression.name for o in site.model.outputs if o.expression.is_Symbol})
     extended = {_extended(site.model, e) for e in own}
     for effect in derived:
         made = _extended(site.model, effect)

@@ -41,6 +41,7 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (delays.delay, ("timing",)),
     (delays.input_delay, ("timing",)),
     (delays.input_lead, ("timing",)),
+    (delays.clock_error, ("timing",)),
     (channels.lags, ("timing",)),
     (channels.input_gain, ("gain",)),
     (channels.sensor_gain, ("gain",)),
@@ -67,7 +68,6 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.rigid_stop, ("restoring force",)),
     (decoys.velocity_coupled_drive, ("input curve",)),
     (decoys.soft_saturation, ("input curve",)),
-    (decoys.clock_error, ("timing",)),
     (decoys.wobble, ("slow change",)),
     (decoys.rate_limit, ("timing",)),
     (fading_memory, ("storage",)),
@@ -105,7 +105,7 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known and c.suits() and not c.refines for c in found), found[0].key
-    (37, 'coulomb_friction')
+    (38, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, or moved by one input: each is one channel

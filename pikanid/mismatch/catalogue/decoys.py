@@ -196,17 +196,6 @@ def soft_saturation(site: Site) -> list[Candidate]:
     return found
 
 
-def clock_error(site: Site) -> list[Candidate]:
-    """The sensor's clock runs fast or slow."""
-    e = Parameter(site.name("clock"), 0.0, "", (-0.5, 0.5))
-    o = site.output.name
-    return [Candidate(("clock_error",), "a clock that runs wrongly", f"{o}((1 + {e.name})*t)",
-                      "sensor", site, (e,), lambda m: m,
-                      lambda w: [TangentDirection({e.name: 1.0}, seen=w.t * w.y_rate[o])],
-                      known=False,
-                      fits=False)]
-
-
 def wobble(site: Site) -> list[Candidate]:
     """A parameter that swings, and a force that does, at frequencies of their own."""
     if not site.rate:

@@ -1,4 +1,4 @@
-"""Catalogue: an output or one of several inputs comes late, or was recorded late.
+"""Catalogue: an output or one of several inputs comes late, or was recorded late, more and more.
 
 Alone, an input that comes late is a twin of an output that does.  Where another input acts as well,
 or something moves at first, it is not.  What acted before a recording begins is not known, unless
@@ -97,6 +97,21 @@ def input_lead(site: Site) -> list[Candidate]:
         (tau,), partial(delayed, {u: f"-{tau.name}"}, {}),
         partial(_shifted, u, tau, LEADS, -1), variant=u, undoes="input_delay")
         for u in site.inputs]
+
+
+def clock_error(site: Site) -> list[Candidate]:
+    """The clock of a sensor that loses against that of the inputs, or gains: both agree when the
+    first recording begins.  Where no input acts, time is what the sensor says.
+    """
+    if not site.model.inputs:
+        return []
+    e, o = Parameter(site.name("clock"), 0.0, "", (-0.5, 0.5)), site.output.name
+    since = f"(t - {site.span[0]!r})" if site.span[0] else "t"
+    return [Candidate(
+        ("clock_error",), "a clock error of the sensor", f"{o}(t + {e.name}*{since})", "sensor",
+        site, (e,), partial(Model.map_output, name=o, delay=f"-{e.name}*{since}"),
+        lambda view: [TangentDirection(
+            {e.name: 1.0}, seen=(view.t - site.span[0]) * view.y_rate[o])])]
 
 
 def _shifted(u: str, tau: Parameter, shifts: Sequence[float], later: int, view: View

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 
 NAMED = 5  # layout: outliers whose times are told one by one
@@ -12,11 +13,12 @@ APART = 3  # layout: recordings that have a sentence each
 
 @dataclass(frozen=True, order=True)
 class LeftOut:
-    """One sample: of which output and recording, and when [s]."""
+    """One sample: of which output and recording, when [s], and what it was."""
 
     output: str
     recording: str
     time: float
+    value: float = field(default=math.nan, compare=False)
 
 
 def left_out_sentences(found: Sequence[LeftOut], which: str = "") -> list[str]:

@@ -83,7 +83,8 @@ def without_outliers(recording: Recording, output: str, settings: Settings,
     values = channel.values.copy()
     values[seen[bad]] = np.nan
     return recording.with_channels(replace(channel, values=values)), [
-        LeftOut(output, recording.name, float(channel.time[seen[k]])) for k in sorted(set(bad))]
+        LeftOut(output, recording.name, float(channel.time[k]), float(channel.values[k]))
+        for k in seen[sorted(set(bad))]]
 
 
 def _cluster(bad: Sequence[int] | np.ndarray, count: int, by_chance: float) -> bool:
@@ -193,6 +194,6 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
                 here = np.isin(channel.time, t[gone]) & np.isfinite(channel.values)
                 recordings[r] = recordings[r].with_channels(replace(
                     channel, values=np.where(here, np.nan, channel.values)))
-                found += [LeftOut(name, recordings[r].name, float(at))
-                          for at in channel.time[here]]
+                found += [LeftOut(name, recordings[r].name, float(at), float(was)) for at, was
+                          in zip(channel.time[here], channel.values[here], strict=True)]
     return replace(records, recordings=tuple(recordings), left_out=tuple(found))

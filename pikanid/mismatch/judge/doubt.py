@@ -83,12 +83,13 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
             if e.read and fewer == rest and below(gain, asks.minor_strong * len(sizes)):
                 return (f"{e.name} is too weak for its form to be sure (it lowers chi-squared by "
                         f"{gain:.0f}, {asks.minor_strong:.0f} are asked for each parameter)")
-            if (e.absent or below(gain, minor)) and below(gain, asks.minor_strong):
+            seen = 0.5 if e.absent and len(h.effects) == 1 else 1.0  # in one recording of two
+            if (e.absent or below(gain, minor)) and below(gain, seen * asks.minor_strong):
                 what = ("happens once, of which no other recording speaks, and explains so little"
                         if e.absent else "explains so little beside the rest")
                 return (f"{e.name} {what} that it may stand for anything of its size (it lowers "
                         f"chi-squared by {gain:.0f} of {minor / asks.minor:.0f}, "
-                        f"{asks.minor_strong:.0f} are asked)")
+                        f"{seen * asks.minor_strong:.0f} are asked)")
             if below(gain, asked):
                 return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
                         f"{asked:.0f} are asked)")

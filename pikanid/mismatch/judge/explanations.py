@@ -134,11 +134,15 @@ def _weighed(found: list[Weighed], nominal: Weighed, scale: float,
                        + w.hypothesis.penalty
                        + handicap * sum(not e.known for e in w.hypothesis.effects) for w in found])
     weights = np.exp(-0.5 * (scores - scores.min()))
-    before = max(nominal.predicted.misfit**2 - 1, 1e-12)
-    made = [replace(w, score=float(s), weight=float(p), share=1 - max(
-                w.predicted.misfit**2 - 1, 0.0) / before)
+    made = [replace(w, score=float(s), weight=float(p),
+                    share=explained_share(nominal.predicted, w.predicted))
             for w, s, p in zip(found, scores, weights / weights.sum(), strict=True)]
     return sorted(made, key=lambda w: (w.score, w.hypothesis.place())), counts
+
+
+def explained_share(before: HeldOut, after: HeldOut) -> float:
+    """Of the square of what the nominal model misses of held-out recordings, beside noise."""
+    return 1 - max(after.misfit**2 - 1, 0.0) / max(before.misfit**2 - 1, 1e-12)
 
 
 def dominance(lead: Weighed, others: Sequence[Weighed], rule: PartSettings) -> float:

@@ -159,6 +159,9 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         doubt = "a law outside the catalogue is more probable"
     if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
         doubt = doubt or "what explains it far better leaves something unexplained"
+    # where one law outside the catalogue does what several effects do, another one may do it
+    if proves and any(not h.known and len(h.effects) < len(known[0].effects) for h in near):
+        doubt = doubt or "fewer laws, one of them in no catalogue, explain the recording as well"
     laws = [h for h in merged if not h.next_form]  # a name's next form is of one kind with it
     apart = sum(not any(o.key < h.key for o in laws) for h in laws)
     weak = below(gained(known[0], base, predict, scale), asks.minor_strong)

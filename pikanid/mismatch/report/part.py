@@ -170,7 +170,7 @@ class Remainder:
         loud = spans(self.time, SHOWN) or "no stretch of it"
         slow = f"below {self.frequency:.3g} Hz" if self.frequency else "constant, or nearly so"
         return [f"Left: half of it {slow}; louder than noise at {loud}",
-                *(f"Not sure: {what}: {why}" for what, why in self.doubtful)]
+                *(f"Not sure: {in_words(what)}: {why}" for what, why in self.doubtful)]
 
     def to_dict(self) -> dict[str, Any]:
         """For diagnosis.json."""
@@ -215,7 +215,7 @@ class Closest:
         if self.share_explained < CLOSE:
             return [f"Nothing comes close: {enumerated(self.effects)} explains {explained}"]
         return [f"Closest, and not sure: {enumerated(self.effects)}: {explained} is explained",
-                *(f"Not sure: {what}: {why}" for what, why in self.doubtful)]
+                *(f"Not sure: {in_words(what)}: {why}" for what, why in self.doubtful)]
 
     def to_dict(self) -> dict[str, Any]:
         """For diagnosis.json."""

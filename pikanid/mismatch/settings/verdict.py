@@ -43,7 +43,7 @@ class VerdictSettings:
             of the misfit's size, as what nobody has modelled often is.
         minor_strong: [χ² in all recordings] that a minor effect must gain, and one that happens
             once, of which no other recording speaks: 10 standard deviations in each of two
-            recordings tell it from most laws of that size.
+            recordings tell it from most laws of that size, of which that needs one if it is all.
         shown: [χ²] that it must gain in the recording it was found in: the other one is the proof.
         needed: [criterion] that each of several effects must gain on held-out recordings.
         once: Share of what an effect that happens once takes away beside others that one that lasts

@@ -12,7 +12,12 @@ from pikanid.mismatch.catalogue.candidate import CURVES, Candidate, Family
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.explanations import Explanations, explanations, lasting
+from pikanid.mismatch.judge.explanations import (
+    Explanations,
+    explained_share,
+    explanations,
+    lasting,
+)
 from pikanid.mismatch.judge.kinds import Kind, kinds_in, members
 from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, surely_there
 from pikanid.mismatch.judge.verdict import Answer
@@ -54,8 +59,31 @@ def with_sure_part(case: Case, answer: Answer, site: Site) -> Answer:
     if part is None or not part.present:
         answer = replace(answer, closest=part)
         return replace(answer, verdict="unconfirmed", doubt=TOGETHER) if several else answer
-    others = tuple(h for h in answer.others if h.key != part.hypothesis.key)
-    return replace(answer, verdict="partial", given=(part.hypothesis,), part=part, others=others)
+    if answer.verdict == "unconfirmed":
+        part = _with_the_rest(case, part, answer.given)
+    shown = part.hypothesis
+    others = tuple(h for h in (*answer.given, *answer.others) if h.key != shown.key)
+    doubts = {h.key: answer.doubt for h in answer.given if answer.doubt}
+    return replace(answer, verdict="partial", given=(shown,), part=part, others=others,
+                   reasons={**answer.reasons, **doubts})
+
+
+def _with_the_rest(case: Case, part: Part, given: Sequence[Hypothesis]) -> Part:
+    """The part, shown by an explanation that leaves nothing, although not all of that is sure, if
+    one that is given holds what is.
+    """
+    before = case.predicted(case.base)
+    for h in given:
+        after = case.predicted(h)
+        if before and after and case.adequate(h) and {p.effect.key for p in part.present} <= h.key:
+            rest = [k for k in kinds_in(h, case.settings.part.dry)
+                    if not k.among([p.kind for p in part.present])]
+            why = "it explains the rest, and nothing has confirmed it"
+            return replace(
+                part, hypothesis=h, overdispersion=case.search.scale(), spread={},
+                share=explained_share(before, after), doubtful=tuple(
+                    Doubtful(k, members(k, h, case.settings.part.dry)[0], why) for k in rest))
+    return part
 
 
 def _is_all(part: Part, given: Sequence[Hypothesis]) -> bool:

@@ -20,7 +20,7 @@ def record(i, t, x, S, u, v, p, mode, act, w, seen, moves, dtau_in, dtau_out, Y,
         if moves and seen.inside[q]:
             observe_rate(w.bs, t, x, u, v, p, s, w.y)
             for a in range(A):
-                J[row, a] -= w.y[o] * dtau_out[o, a]
+                J[row, a] -= w.y[o] * dtau_out[row, a]
 
 
 @called

@@ -14,7 +14,7 @@ def show(b, q, x, S, U, V, T, first, output, row, inside, dtau_in, dtau_out, del
             if inside[k]:
                 rate = b.r[b.out[H_RATE, output[k]]]
                 for a in range(A):
-                    J[row[k], a] -= rate * dtau_out[output[k], a]
+                    J[row[k], a] -= rate * dtau_out[row[k], a]
 
 
 @called

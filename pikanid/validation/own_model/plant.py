@@ -136,8 +136,9 @@ class Plant:
         start = experiment.start
         signals = [_Signal(experiment.channels.get(i.name), i.default, i.hold,
                            start, delay) for i, delay in zip(model.inputs, late, strict=False)]
-        reads = [_instants(experiment, o.name) - delay
-                 for o, delay in zip(model.outputs, late[len(signals):], strict=True)]
+        reads = [np.array([t - self._delays(t, nothing, [0.0] * len(signals), p)[k]
+                           for t in _instants(experiment, o.name)])
+                 for k, o in enumerate(model.outputs, len(signals))]
         wanted = np.maximum(np.concatenate(reads), start)
         last = float(wanted.max())
         stops = np.unique(np.concatenate(
