@@ -220,7 +220,7 @@ def _bent_otherwise(cubic: Candidate, n: int) -> Candidate:
 
 def _rounded(clipped: Candidate) -> Candidate:
     """L tanh(y/L), in place of a limit that y keeps to and is not bent by below; of one on one side
-    (y + L - ((y - L)² + w²)^½)/2.
+    (y + L - ((y - L)² + w²)^½)/2, which is that limit where w is nothing.
     """
     site, o, old = clipped.site, clipped.site.output.name, clipped.parameters[0]
     unit = _unit(clipped, o)
@@ -234,8 +234,9 @@ def _rounded(clipped: Candidate) -> Candidate:
     sign = "" if clipped.variant == "above" else "-"
     text = (f"{sign}({sign}{o} + {limit.name} - sqrt(({sign}{o} - {limit.name})**2 "
             f"+ {knee.name}**2))/2")
-    return _curve(clipped, o, "sensor_rounded", text, (limit, knee), lambda values, states: [
+    made = _curve(clipped, o, "sensor_rounded", text, (limit, knee), lambda values, states: [
         {limit.name: values[old.name], knee.name: share * most} for share in KNEES])
+    return replace(made, covers={clipped.key: {}})
 
 
 def _unit(entry: Candidate, channel: str) -> str:

@@ -59,7 +59,7 @@ def with_simpler(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job
     """With a law that one of its effects contains in that one's place."""
     for effect in h.effects:
         for simple in candidates:
-            if simple.key in effect.covers and simple.key not in h.key:
+            if simple.key in effect.covers and simple.key not in h.key and not effect.next_to:
                 size = as_strong(h, effect, simple)
                 yield (*_rest(h, effect), simple), [
                     {**h.point, simple.parameters[0].name: size * share} for share in (1.0, 2.0)]
@@ -71,7 +71,7 @@ def with_wider(h: Hypothesis, candidates: Sequence[Candidate]) -> Iterator[Job]:
     """
     for effect in h.effects:
         for other in candidates:
-            if effect.key in other.covers:
+            if effect.key in other.covers and not other.next_to:  # that has starts of its own
                 yield _wider(h, effect, other, effect.key)
 
 

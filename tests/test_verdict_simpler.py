@@ -1,0 +1,33 @@
+"""What is asked of a name where less would do: one law of no catalogue, or something once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from test_verdict import BASE, GUARD, A, B, answered, effect, hypothesis
+
+ONCE = replace(effect("once"), absent=True)
+SPEAKS = {"": 300.0, "a": 150.0, "b": 150.0, "outside": 100.0}
+
+
+def test_what_happened_once_is_seen_in_one_recording_and_needs_half_of_what_two_would() -> None:
+    assert answered([BASE, hypothesis(1890.0, ONCE)], {"": 0.0}).verdict == "named"
+    weak = answered([BASE, hypothesis(1910.0, ONCE)])
+    assert weak.verdict == "unconfirmed" and "100 are asked" in weak.doubt
+
+
+def test_beside_another_effect_it_needs_all_of_that() -> None:
+    weak = answered([BASE, hypothesis(1500.0, A), hypothesis(1350.0, A, ONCE)], {"": 400.0})
+    assert weak.verdict == "unconfirmed" and "200 are asked" in weak.doubt
+    strong = answered([BASE, hypothesis(1500.0, A), hypothesis(1250.0, A, ONCE)], {"": 400.0})
+    assert strong.verdict == "named" and sorted(strong.given[0].key) == ["a", "once"]
+
+
+def test_several_are_not_sure_where_one_law_of_no_catalogue_explains_as_much() -> None:
+    """Though held-out recordings refuse that one: others that are in none may pass."""
+    pair = [BASE, hypothesis(1500.0, A), hypothesis(1500.0, B), hypothesis(1000.0, A, B)]
+    assert answered(pair, SPEAKS).verdict == "named"
+    near, far = (answered([*pair, hypothesis(chi2, GUARD)], SPEAKS, refused=("outside",))
+                 for chi2 in (1012.0, 1040.0))
+    assert near.verdict == "unconfirmed" and "fewer laws" in near.doubt
+    assert far.verdict == "named"
