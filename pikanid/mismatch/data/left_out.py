@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
+from pikanid.pieces.time_unit import time_unit
+
 NAMED = 5  # layout: outliers whose times are told one by one
 APART = 3  # layout: recordings that have a sentence each
 
@@ -30,6 +32,8 @@ def left_out_sentences(found: Sequence[LeftOut], which: str = "") -> list[str]:
 
     >>> left_out_sentences([LeftOut("y", "run", 3.0), LeftOut("y", "run", 1.25)])
     ["Recording 'run': 2 outliers of 'y' left out, at 1.25 and 3 s."]
+    >>> left_out_sentences([LeftOut("T", "week", 3 * 86400.0), LeftOut("T", "week", 5 * 86400.0)])
+    ["Recording 'week': 2 outliers of 'T' left out, at 3 and 5 d."]
     """
     which = f"{which} recording".strip()
     return [line for output, each in groupby(sorted(found), lambda one: one.output)
@@ -45,7 +49,8 @@ def _of_output(output: str, found: Sequence[LeftOut], which: str) -> Iterator[st
         return
     for name, at in times.items():
         count = "1 outlier" if len(at) == 1 else f"{len(at)} outliers"
-        *before, last = (f"{t:.6g}" for t in at)
-        when = (f", at {', '.join(before)}{' and ' if before else ''}{last} s"
-                if len(at) <= NAMED else f", between {at[0]:.6g} and {last} s")
+        size, unit = time_unit(at[-1])
+        *before, last = (f"{t / size:.6g}" for t in at)
+        when = (f", at {', '.join(before)}{' and ' if before else ''}{last} {unit}"
+                if len(at) <= NAMED else f", between {before[0]} and {last} {unit}")
         yield f"{which.capitalize()} '{name}': {count} of '{output}' left out{when}."

@@ -17,6 +17,7 @@ from pikanid.mismatch.report.part import values_of
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Parameter
 
+EVEN = 0.5  # layout: difference of the criterion that is rounded to nothing
 UNKNOWN = 10.0  # layout: times a value, or where it began, that the error of one not told exceeds
 
 
@@ -82,7 +83,11 @@ def _behind(gap: float) -> str:
     'chi-squared with the penalty for its parameters is higher by 12'
     >>> _behind(-0.2)
     'explains the recording no better than what is given'
+    >>> _behind(-40.0)
+    'explains the recording better, and nothing has confirmed it'
     """
-    if gap < 0.5:
+    if gap < -EVEN:
+        return "explains the recording better, and nothing has confirmed it"
+    if gap < EVEN:
         return "explains the recording no better than what is given"
     return f"chi-squared with the penalty for its parameters is higher by {gap:.0f}"
