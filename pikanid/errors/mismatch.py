@@ -139,6 +139,11 @@ def louder_than_read(p_value: str) -> str:
             "nothing is. A quiet stretch, or the same recorded again, tells which it is.")
 
 
+def after_the_inputs() -> str:
+    return ("Samples at the end are left out: by the delays that explain the recordings best they "
+            "show what came after the inputs were recorded.")
+
+
 def sizes_differ(name: str, unit: str, times: float, large: str, small: str) -> str:
     asked = f"is it in {unit} in both" if unit else "has it one unit in both"
     return f"'{name}' is {times:.3g} times as large in '{large}' as in '{small}': {asked}?"

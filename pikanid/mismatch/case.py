@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pikanid import errors
 from pikanid.estimate import Estimate
 from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.catalogue.sites import sites
+from pikanid.mismatch.data.covered import covered
 from pikanid.mismatch.data.outliers import without_lone
 from pikanid.mismatch.data.own_noise import with_own_noise
 from pikanid.mismatch.data.preparation import with_refined_noise
@@ -73,6 +75,19 @@ class Case:
         self.predictions.clear()
         self.within_train.clear()
         return self.search
+
+    def uncovered(self, best: Hypothesis) -> bool:
+        """Leave out what came after the inputs were recorded, by the delays of the best
+        explanation; whether there is any.
+        """
+        new = covered(self.records, best.model, best.values)
+        later = self.later and covered(self.later, best.model, best.values)
+        if new is self.records and later is self.later:
+            return False
+        self.records, self.later = new, later
+        self.notes.append(errors.after_the_inputs())
+        self.resumed(self.search)
+        return True
 
     def relevelled(self, best: Hypothesis, quiet: tuple[float, float] | None) -> bool:
         """Read the noise from what the best explanation leaves; whether that made a difference.

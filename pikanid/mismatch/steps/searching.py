@@ -24,10 +24,13 @@ def searched(case: Case, tell: Callable[[str], None]) -> list[Hypothesis]:
 
 def with_noise_of_the_rest(case: Case, ranked: list[Hypothesis], quiet: tuple[float, float] | None,
                            tell: Callable[[str], None]) -> list[Hypothesis]:
-    """The same, with the noise read from what the best one leaves.
+    """The same, with the noise read from what the best one leaves where the inputs are known.
 
     The first reading was made through the mismatch itself, which is out of the way by now.
     """
+    if case.uncovered(ranked[0]):
+        tell("without what came after the inputs")
+        ranked = case.search.grow(case.adequate)
     for _ in range(case.settings.budget.relevelled):
         if not case.relevelled(ranked[0], quiet):
             break
