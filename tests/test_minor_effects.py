@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 from test_partial import effect as member
+from test_partial import examined
 from test_verdict import A, B, answered, hypothesis
+from weighing import COULOMB, DRAG, weighed
 
 from pikanid.mismatch.judge.kinds import Kind
 from pikanid.mismatch.judge.partial import Part, Present
@@ -57,3 +59,13 @@ def test_a_wall_without_a_name_may_take_energy_out_itself(
     assert {d.family for d in found.doubtful} == {"restoring force", "drag"} - sure
     again = _without_shares(replace(found, doubtful=()), likely)
     assert again.present == found.present
+
+
+@pytest.mark.parametrize(("rows", "sure"), [(90.0, False), (110.0, True)])
+def test_what_gains_little_may_stand_for_anything_however_much_it_dominates(
+        rows: float, sure: bool) -> None:
+    """Two hundred of χ²: 10 standard deviations in each of two recordings."""
+    found = examined(weighed((COULOMB,), 0.1, 0.999, rows=rows),
+                     weighed((DRAG,), 2.1, 0.001, rows=rows))
+    assert isinstance(found, Present) is sure
+    assert sure or "200 are asked" in found.why  # type: ignore[union-attr]

@@ -23,7 +23,7 @@ SPRING, GAIN = effect("cubic_stiffness", "restoring force"), effect("input_gain"
 
 
 def of_two(kind: Kind, *found: Weighed) -> Present | Doubtful:
-    return _one_of_two(kind, found[0], found, RULE, DEFAULTS.least_proof, never)
+    return _one_of_two(kind, found[0], found, DEFAULTS, 1.0, never)
 
 
 def test_of_two_families_that_do_as_well_one_is_there() -> None:

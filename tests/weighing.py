@@ -36,11 +36,14 @@ DRAG = effect("quadratic_drag", "drag")
 
 
 def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: float = 0.95,
-            later: float | None = None) -> Weighed:
-    """An explanation that leaves so much [σ²], and so much of each held-out sample [σ]."""
+            later: float | None = None, rows: float = 1e6) -> Weighed:
+    """An explanation that leaves so much [σ²] of so many rows, and so much of each held-out sample
+    [σ].
+    """
     h: Any = SimpleNamespace(effects=effects, values={}, blurred=frozenset(),
+                             minimum=SimpleNamespace(chi2=rows * (1 + left)),
                              explained_away=lambda *given: False)
     predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
-                                     inert=frozenset())
+                                     deviance=0.0, inert=frozenset())
     return Weighed(h, predicted, left, 0.0, weight, share,
                    frozenset(k for e in effects for k in kinds_of(e, h, RULE.dry)))

@@ -7,9 +7,9 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.model.parts import Parameter
 
-AROUND = (0.3, 3.0)  # numerical: times the natural frequency, between which it is looked for
-TURNS = (1.0, 24.0)  # numerical: in a recording, of what has no natural frequency
-MOST = 48  # limit: frequencies that are looked at
+FASTEST = 3.0  # numerical: times the natural frequency, up to which it is looked for
+TURNS = 24.0  # numerical: in a recording, of what has no natural frequency
+MOST = 300  # limit: frequencies that are looked at
 
 
 def swinging_force(start: Candidate) -> Candidate:
@@ -22,15 +22,15 @@ def swinging_force(start: Candidate) -> Candidate:
             for name in ("swing_a", "swing_b"))
     first, last = site.span
     turn = 2 * np.pi / (last - first)
-    low, high = (site.rate * np.array(AROUND) if site.rate else turn * np.array(TURNS)).tolist()
     fastest = np.pi / site.interval
+    high = min(FASTEST * site.rate or TURNS * turn, fastest)
     w = Parameter(site.name("swing_rate"), min(site.rate or turn, fastest), "rad/s",
                   (0.0, fastest))
     text = f"{a.name}*sin({w.name}*t) + {b.name}*cos({w.name}*t)"
 
     def signs(view: View) -> list[TangentDirection]:
         # two swings can be told apart that differ by half a turn in a recording
-        rates = np.arange(low, min(high, fastest), max(0.5 * turn, (high - low) / MOST))
+        rates = np.arange(turn, high, max(0.5 * turn, (high - turn) / MOST))
         return [TangentDirection({size.name: 1.0, w.name: float(rate)}, force=wave(rate * view.t))
                 for rate in rates for size, wave in ((a, np.sin), (b, np.cos))]
 

@@ -19,8 +19,8 @@ from pikanid.mismatch.judge.explanations import (
     spread,
 )
 from pikanid.mismatch.judge.kinds import Kind, holds, kinds_in, members
+from pikanid.mismatch.judge.rivals import rivals, same, twins, wider
 from pikanid.mismatch.settings.settings import Settings
-from pikanid.mismatch.settings.verdict import PartSettings
 from pikanid.model.parts import Parameter
 
 
@@ -133,7 +133,7 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
     rule, found = settings.part, explained.weighed
     lead = explained.lead(rule.share) or found[0]
     examined = [
-        _with_a_size(_one_of_two(kind, lead, found, rule, scale * settings.least_proof, again),
+        _with_a_size(_one_of_two(kind, lead, found, settings, scale, again),
                      lead.hypothesis, explained.overdispersion, settings)
         for kind in kinds_in(lead.hypothesis, rule.dry)]
     little = EXPLAINED_AWAY if lead.hypothesis.explained_away() else ""
@@ -183,14 +183,15 @@ def _with_a_size(one: Present | Doubtful, h: Hypothesis, overdispersion: float,
     return Doubtful(one.kind, one.effect, why) if why else one
 
 
-def _one_of_two(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
-                proof: float, again: Again) -> Present | Doubtful:
+def _one_of_two(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Settings,
+                scale: float, again: Again) -> Present | Doubtful:
     """A family of the leading explanation, surely there; else that it is or another one, which all
     explanations hold that do nearly as well without it; else why neither is sure.
 
     A family that is improbable is not one of two.
     """
-    alone = _examined(kind, lead, found, rule, proof, again)
+    rule = settings.part
+    alone = _examined(kind, lead, found, settings, scale, again)
     if isinstance(alone, Present) or smaller(
             sum(w.weight for w in found if kind.among(w.kinds)), rule.rate):
         return alone
@@ -200,24 +201,31 @@ def _one_of_two(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartS
     shared = frozenset.intersection(*(w.kinds for w in near)) if near else frozenset()
     instead = [Instead(other, members(other, near[0].hypothesis, rule.dry)[0])
                for other in sorted(shared - lead.kinds)]
-    either = (_examined(kind, lead, found, rule, proof, again, other) for other in instead)
+    either = (_examined(kind, lead, found, settings, scale, again, other) for other in instead)
     return max((one for one in either if isinstance(one, Present)),
                key=lambda one: one.dominance, default=alone)
 
 
-def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSettings,
-              proof: float, again: Again, instead: Instead | None = None) -> Present | Doubtful:
+def _left(w: Weighed) -> float:
+    """χ² that an explanation leaves in all recordings."""
+    return w.hypothesis.minimum.chi2 + w.predicted.deviance
+
+
+def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Settings,
+              scale: float, again: Again, instead: Instead | None = None) -> Present | Doubtful:
     """A family of the leading explanation: surely there, or why not.
 
     Args:
         kind: Of an effect of it.
         lead: The best explanation that predicts.
         found: All explanations, best first.
-        rule: What is asked.
-        proof: χ² that the family must be worth in the held-out recordings.
+        settings: What is asked.
+        scale: That divides χ², as far as the train recordings tell.
         again: What it is worth within the train recordings.
         instead: Another family: whether it or that one is there.
     """
+    rule, proof = settings.part, scale * settings.least_proof
+    strong = scale * settings.verdict.minor_strong
     either = (kind,) if instead is None else (kind, instead.kind)
     holders = [w for w in found if any(k.among(w.kinds) for k in either)]
     others = [w for w in found if not any(k.among(w.kinds) for k in either)]
@@ -230,8 +238,13 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     if smaller(kappa, asked):
         return Doubtful(kind, effect, "without it the best explanation leaves "
                         f"{kappa:.2g} times as much, sure from {asked:.2g} on")
-    if smaller(max((dominance(w, others, rule) for w in holders if any(
-            e.known for e in members(kind, w.hypothesis, rule.dry))), default=0.0), asked):
+    found_more = min((_left(w) for w in others), default=np.inf) - _left(lead)
+    if below(found_more, strong):
+        return Doubtful(kind, effect, "it explains so little that it may stand for anything of its "
+                        f"size (it lowers chi-squared by {found_more:.0f}, {strong:.0f} are asked)")
+    listed = [w for w in holders if (own_of := members(kind, w.hypothesis, rule.dry))
+              and all(e.known for e in own_of)]
+    if smaller(max((dominance(w, others, rule) for w in listed), default=0.0), asked):
         return Doubtful(kind, effect, "only a law outside the catalogue explains so much of it")
     # what does less than a law that is in no catalogue may be a facet of what that stands for
     if smaller(kappa, max((dominance(lead, [w for w in found if not holds(w.hypothesis, e)], rule)
@@ -245,8 +258,8 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     # where a law that contains the effect leaves far less, the effect's form is another one
     other_form = not smaller(lead.left, rule.form * max(min(
         (w.left for w in holders if not holds(w.hypothesis, effect)
-         and _wider(w.hypothesis, effect)), default=np.inf), rule.floor))
-    own = sum(w.weight for w in holders if _same(w.hypothesis, effect, lead.hypothesis))
+         and wider(w.hypothesis, effect)), default=np.inf), rule.floor))
+    own = sum(w.weight for w in holders if same(w.hypothesis, effect, lead.hypothesis))
     within = dominance(lead, rivals(kind, effect, lead.hypothesis, holders), rule)
     # what needs a law outside the catalogue beside it has no name of its own, and a free exponent
     # takes up what other laws leave
@@ -256,44 +269,9 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], rule: PartSet
     clearly = rule.dominance if smaller(lead.share, rule.exact) else clearly
     exact = instead is None and all(e.known for e in own_effects) and not (
         blurred or other_form or smaller(own, 1 - rule.rate) or smaller(within, clearly))
-    twins = _twins(effect, lead, holders, clearly * max(lead.left, rule.floor))
+    alike = twins(effect, lead, holders, clearly * max(lead.left, rule.floor))
     compared = {e.key: e.name for w in holders for k in either
                 for e in members(k, w.hypothesis, rule.dry) if e.key != effect.key}
-    names = dict.fromkeys(i for e in (effect, *twins) for i in e.ids)
+    names = dict.fromkeys(i for e in (effect, *alike) for i in e.ids)
     return Present(kind, effect, tuple(names) if exact else (),
-                   compared, own, total, kappa, within, lead.share, instead, twins)
-
-
-def _twins(effect: Candidate, lead: Weighed, holders: Sequence[Weighed], enough: float
-           ) -> tuple[Candidate, ...]:
-    """What small motions cannot tell from an effect, in explanations that leave less than
-    `enough` with it in its place.
-    """
-    own = {e.key for e in lead.hypothesis.effects}
-    found = {e.key: e for w in holders if smaller(w.left, enough)
-             and all(e.key != effect.key for e in w.hypothesis.effects)
-             for e in w.hypothesis.effects if e.alike and e.alike == effect.alike and e.known
-             and not set(e.ids) <= set(effect.ids)}
-    return tuple(e for key, e in found.items() if key not in own)
-
-
-def rivals(kind: Kind, effect: Candidate, own: Hypothesis, found: Iterable[Weighed]
-           ) -> list[Weighed]:
-    """Explanations with another effect of a kind in the place of one of `own`; a law that contains
-    the effect is no rival.
-    """
-    return [w for w in found if kind.among(w.kinds) and not _same(w.hypothesis, effect, own)
-            and not _wider(w.hypothesis, effect)]
-
-
-def _same(h: Hypothesis, effect: Candidate, own: Hypothesis) -> bool:
-    """Whether a hypothesis holds an effect of `own`, or in a brief contact a shape of it."""
-    brief = effect.brief is not None and effect.brief(own.values)
-    return holds(h, effect) or (brief and any(
-        set(e.shape_of) & set(effect.ids) and e.site.v == effect.site.v for e in h.effects))
-
-
-def _wider(h: Hypothesis, effect: Candidate) -> bool:
-    """Whether one of its laws has an effect as a special case, or is a sum of which it is one."""
-    return any(effect.key in law.covers or any(effect.key in parts for parts in (
-        law.parts([p.value for p in law.parameters]) if law.parts else ())) for law in h.effects)
+                   compared, own, total, kappa, within, lead.share, instead, alike)

@@ -40,7 +40,8 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.explanations import Explanations
 from pikanid.mismatch.judge.kinds import Kind, kinds_of, members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over
-from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, rivals
+from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present
+from pikanid.mismatch.judge.rivals import rivals
 from pikanid.mismatch.settings.verdict import PartSettings
 from pikanid.model import Model
 
