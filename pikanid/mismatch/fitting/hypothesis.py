@@ -183,7 +183,7 @@ class Hypothesis:
             return False
         shared = {p.name for p in effect.parameters if p.free and p.scope == "shared"}
         unknown = [n for n, a, e in zip(names, alone, error, strict=True) if n in shared
-                   and np.isfinite(a) and e > abs(self.values[n]) and e > TOGETHER * a]
+                   and np.isfinite(a) and KNOWN * e > abs(self.values[n]) and e > TOGETHER * a]
         return len(shared) < 2 or len(unknown) < len(shared)
 
     def explained_away(self, overdispersion: float = 1.0) -> bool:
