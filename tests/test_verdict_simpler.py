@@ -6,6 +6,8 @@ from dataclasses import replace
 
 from test_verdict import BASE, GUARD, A, B, answered, effect, hypothesis
 
+from pikanid.model.parts import Parameter
+
 ONCE = replace(effect("once"), absent=True)
 SPEAKS = {"": 300.0, "a": 150.0, "b": 150.0, "outside": 100.0}
 
@@ -31,3 +33,14 @@ def test_several_are_not_sure_where_one_law_of_no_catalogue_explains_as_much() -
                  for chi2 in (1012.0, 1040.0))
     assert near.verdict == "unconfirmed" and "fewer laws" in near.doubt
     assert far.verdict == "named"
+
+
+def test_a_power_law_that_may_be_in_proportion_is_what_a_model_has() -> None:
+    """Its exponent is 1 ± 0.01 here; where a law in proportion is an entry, both are given."""
+    n = Parameter("m", 0.5)
+    power = replace(effect("power"), parameters=(Parameter("p_power", 0.0), n), exponent=n)
+    alone = answered([BASE, hypothesis(1000.0, power)])
+    assert alone.verdict == "unconfirmed" and "may be in proportion" in alone.doubt
+    entry = replace(effect("linear"), exponent=1.0)
+    both = answered([BASE, hypothesis(1000.0, power), hypothesis(1002.0, entry)])
+    assert both.verdict == "set" and not both.doubt

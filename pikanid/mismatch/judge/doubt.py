@@ -14,6 +14,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.loosened import loosened
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.settings.settings import Settings
+from pikanid.model.parts import Parameter
 
 Predict = Callable[[Hypothesis], HeldOut | None]
 # χ² that an effect is worth within the train recordings, from explanations with it and without it
@@ -110,9 +111,21 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
                 return said
             if past is not None and below(past, h.minimum.chi2 + asks.sized**2 * scale):
                 return f"a parameter past its bound would explain as much as {e.name} does"
+        if isinstance(e.exponent, Parameter) and not _in_proportion(e, h, fits):
+            n, error = h.values[e.exponent.name], h.std[e.exponent.name]
+            if below(abs(n - 1), asks.open * error):
+                return (f"{e.name} may be in proportion (its exponent is {n:.3g} with a standard "
+                        f"error of {error:.2g}), and what is so the model has itself")
         if not h.determines(e):
             return f"the recording does not determine {sizes[0].name} of {e.name}: any is as good"
     return ""
+
+
+def _in_proportion(e: Candidate, h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
+    """Whether a law in proportion has been fitted in the place of one of free exponent."""
+    rest = h.key - {e.key}
+    return any(o.exponent == 1 and key == rest | {o.key} for key, f in fits.items()
+               for o in f.effects)
 
 
 def gained(h: Hypothesis, over: Hypothesis, predict: Predict, scale: float) -> float:
