@@ -43,9 +43,11 @@ def test_what_happens_once_has_to_be_strong() -> None:
     """No other recording speaks of it: a weak one may be whatever else happens once."""
     once = replace(A, absent=True)
     assert answered([BASE, hypothesis(1000.0, once)]).verdict == "named"
-    weak = answered([WEAK, hypothesis(1000.0, once)])
+    assert answered([WEAK, hypothesis(1000.0, once)]).verdict == "named"
+    weak = answered([hypothesis(1095.0), hypothesis(1000.0, once)])
     assert weak.verdict == "unconfirmed" and "happens once" in weak.doubt
-    assert answered([WEAK, hypothesis(1000.0, A)]).verdict == "named"
+    assert "100 are asked" in weak.doubt  # half of what is asked of an effect in two recordings
+    assert answered([hypothesis(1095.0), hypothesis(1000.0, A)]).verdict == "named"
 
 
 def test_a_formula_whose_form_is_not_told_is_not_confirmed() -> None:
