@@ -38,8 +38,9 @@ def fit(names: tuple[str, ...], theta: np.ndarray, J: np.ndarray, effect: Any) -
     return Hypothesis((effect,), pk.systems.sloshing(), whitened, minimum, 0.0)
 
 
-def law(*names: str) -> Any:
-    return SimpleNamespace(key="law", parameters=tuple(Parameter(n, 0.0) for n in names))
+def law(*names: str, exponent: str = "") -> Any:
+    return SimpleNamespace(key="law", parameters=tuple(Parameter(n, 0.0) for n in names),
+                           exponent=Parameter(exponent, 0.0) if exponent else None)
 
 
 @pytest.mark.parametrize(("angle", "known"), [(1e-4, False), (0.5, True)])
@@ -51,8 +52,21 @@ def test_what_is_known_only_together_is_not_determined(angle: float, known: bool
     J = np.column_stack([30.0 * z, 9.0 * x, 9.0 * (np.cos(angle) * x + np.sin(angle) * y)])
     h = fit(("a", "size", "width"), np.array([1.0, 1.0, 1.0]), J, law("size", "width"))
     assert h.determines(h.effects[0]) == known
+    # an exponent is no size: that of a law may be nothing
+    assert fit(("a", "size", "n"), np.ones(3), J, law("size", "n", exponent="n")).determines(
+        law("size", "n", exponent="n"))
     # of one parameter the correlation with the model's own is no ridge of its own
     assert fit(("a", "size"), np.ones(2), J[:, :2], law("size")).determines(law("size"))
+
+
+@pytest.mark.parametrize(("clear", "known"), [(20.0, False), (100.0, True)])
+def test_one_parameter_of_several_has_to_be_three_standard_errors_from_nothing(
+        clear: float, known: bool) -> None:
+    """Each is `clear` standard errors from it were the other one known, and a twentieth of that."""
+    x, y = np.linalg.qr(np.random.default_rng(1).normal(size=(200, 2)))[0].T
+    J = clear * np.column_stack([x, np.cos(0.05) * x + np.sin(0.05) * y])
+    h = fit(("size", "width"), np.ones(2), J, law("size", "width"))
+    assert h.determines(h.effects[0]) == known
 
 
 def beside(angles: tuple[float, ...], errors: tuple[float, ...]) -> Hypothesis:

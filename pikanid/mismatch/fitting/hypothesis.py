@@ -181,7 +181,9 @@ class Hypothesis:
         far = max(abs(self.values[size.name] - size.value), np.min(alone[own], initial=np.inf))
         if np.any(error[own] > ENDLESS * far):
             return False
-        shared = {p.name for p in effect.parameters if p.free and p.scope == "shared"}
+        # an exponent is none of its sizes: that of nothing is a law as well
+        shared = {p.name for p in effect.parameters
+                  if p.free and p.scope == "shared" and p != effect.exponent}
         unknown = [n for n, a, e in zip(names, alone, error, strict=True) if n in shared
                    and np.isfinite(a) and KNOWN * e > abs(self.values[n]) and e > TOGETHER * a]
         return len(shared) < 2 or len(unknown) < len(shared)
