@@ -46,6 +46,13 @@ def test_the_model_file_holds_it() -> None:
         pk.systems.sloshing().map_output("theta", delay="0.1*theta_dot")
 
 
+def test_a_delay_may_use_what_formulas_have() -> None:
+    recording = pk.excitation.two_pulse()
+    late, known = (pk.simulate(pk.systems.sloshing().map_output("theta", delay=delay), recording)
+                   for delay in ("0.1*signed_power(t, 2)/5**2", "0.1*t**2/5**2"))
+    assert late["theta"].values == pytest.approx(known["theta"].values, abs=1e-9)
+
+
 def test_units_of_a_delay_that_changes() -> None:
     [said] = pk.systems.sloshing().map_output(
         "theta", [pk.Parameter("slow", 0.1, "s")], delay="slow*t").unit_disagreements

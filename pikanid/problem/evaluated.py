@@ -18,9 +18,9 @@ def _step(x: float, at: float) -> float:
     return at if x == 0 else float(x > 0)
 
 
-# what NumPy lacks of the formula language, where an initial value needs it; SymPy solves for where
+# what NumPy lacks of the formula language, value by value; SymPy solves for where
 # a step of its own is, which takes it minutes where the formula is long
-_TOOLS = {
+TOOLS: Mapping[str, Callable[..., Any]] = {
     "Heaviside": _step,
     "abs_power": lambda x, n: 0.0 if x == 0 else abs(x) ** n,
     "signed_power": lambda x, n: 0.0 if x == 0 else np.sign(x) * abs(x) ** n,
@@ -121,5 +121,5 @@ def _start_functions(start: tuple[sp.Expr, ...], parameters: tuple[sp.Symbol, ..
                      inputs: tuple[str, ...]) -> tuple[Callable[..., Any], Callable[..., Any]]:
     arguments = [parameters, [symbol(q) for q in inputs]]
     table = [[e.diff(q) for q in parameters] for e in start]
-    return (sp.lambdify(arguments, list(start), [_TOOLS, "numpy"], cse=True),
-            sp.lambdify(arguments, table, [_TOOLS, "numpy"], cse=True))
+    return (sp.lambdify(arguments, list(start), [TOOLS, "numpy"], cse=True),
+            sp.lambdify(arguments, table, [TOOLS, "numpy"], cse=True))

@@ -11,7 +11,7 @@ import sympy as sp
 
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.model import Model
-from pikanid.problem.evaluated import number, slopes
+from pikanid.problem.evaluated import TOOLS, number, slopes
 from pikanid.problem.problem import Experiment, Samples
 
 
@@ -62,4 +62,6 @@ def _at(expr: sp.Expr, table: Mapping[str, float], t: np.ndarray) -> np.ndarray 
 
 @functools.lru_cache(maxsize=64)
 def _of_time(expr: sp.Expr, names: tuple[str, ...]) -> Callable[..., Any]:
-    return cast(Callable[..., Any], sp.lambdify([TIME, *map(symbol, names)], expr, "numpy"))
+    each = {name: np.vectorize(tool, otypes=[float]) for name, tool in TOOLS.items()}
+    return cast(Callable[..., Any], sp.lambdify(
+        [TIME, *map(symbol, names)], expr, [each, "numpy"]))
