@@ -11,8 +11,11 @@ import pytest
 
 import pikanid as pk
 from pikanid import errors
+from pikanid.formula.expressions import symbol
 from pikanid.mismatch.case import Case
+from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.detect.tangent import directions
+from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
@@ -45,3 +48,25 @@ def test_what_cannot_be_added_shows_nothing(case: Case) -> None:
     bad = replace(listed["radiation"], extend=refused)
     found = directions(case.base.whitened, case.base.minimum.theta, [bad, listed["convection"]])
     assert {c.ids[0] for c in found.candidates} == {"convection"} and len(found.owner)
+
+
+def test_of_two_that_give_an_input_the_same_path_there_is_no_model_of_both(case: Case) -> None:
+    def play(name: str) -> Candidate:
+        width = pk.Parameter(name, 0.0, "W", (0.0, 1e3))
+        return replace(case.candidates[0], ids=(name,), variant="", parameters=(width,),
+                       extend=lambda model: model.map_input("P", backlash=name))
+
+    one, other = play("w_gear"), play("w_belt")
+    for alone in (one, other):
+        assert fitted(case.model, [alone], case.records, [{}], 30) is not None
+    assert fitted(case.model, [one, other], case.records, [{}], 30) is None
+
+
+def test_what_an_input_was_is_one_quantity_of_all_its_delays(case: Case) -> None:
+    late = [c for c in case.candidates if c.twin == "delay" and "u_past_T_a" in c.begins]
+    assert {c.channel for c in late} == {"input", "sensor"}
+    own, shown = (next(c for c in late if c.channel == channel) for channel in ("input", "sensor"))
+    for pair in ([own, shown], [shown, own]):
+        both = extended(case.model, pair)
+        assert both.input("T_a").past == symbol("u_past_T_a")
+        assert both.input("T_a").delay == symbol("tau_in") + symbol("tau")

@@ -234,5 +234,6 @@ class Candidate:
         Raises:
             BadUnit: If its formula has no meaning there, as a power of what a scale error has left
                 of a temperature in degC.
+            BadModel: If the model has what it adds, as a second play of an input.
         """
         return self.extend(model.with_parameters(*self.parameters))

@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site, estimates_a_start
 from pikanid.model import Model
@@ -82,7 +83,10 @@ def _before(past: Mapping[str, Parameter]) -> str:
 def delayed(by: Mapping[str, str], past: Mapping[str, Parameter], model: Model) -> Model:
     """The model whose inputs come late by so much, after what they were before a recording."""
     for u, tau in by.items():
-        model = model.map_input(u, delay=tau, past=past[u].name if u in past else None)
+        before = past[u].name if u in past else None
+        # beside another delay of the same input it was no other
+        told = before is not None and model.input(u).past == symbol(before)
+        model = model.map_input(u, delay=tau, past=None if told else before)
     return model
 
 

@@ -34,7 +34,7 @@ def equations_alone(model: Model, candidate: Candidate) -> bool | None:
     """
     try:
         extended = candidate.applied(model)
-    except errors.BadUnit:
+    except (errors.BadUnit, errors.BadModel):
         return None
     return (extended.states, extended.inputs, extended.outputs) == (
         model.states, model.inputs, model.outputs)

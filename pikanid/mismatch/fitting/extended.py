@@ -18,6 +18,7 @@ def extended(nominal: Model, effects: Sequence[Candidate]) -> Model:
 
     Raises:
         BadUnit: If an effect has no meaning beside the others.
+        BadModel: If two effects give an input the same map.
     """
     ordered = sorted(effects, key=lambda e: ORDER.index(e.channel))
     return _made(_Itself(nominal), *map(_Itself, ordered))

@@ -46,7 +46,7 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     """
     try:
         model = extended(nominal, effects)
-    except errors.BadUnit:
+    except (errors.BadUnit, errors.BadModel):
         return None
     whitened = Whitened(model, records)
     rows = max(whitened.rows, 1)
