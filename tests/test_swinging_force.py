@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -17,6 +18,7 @@ from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.diagnose import diagnose
 from pikanid.mismatch.search.neighbours import with_other_form
 from pikanid.mismatch.search.screen import Screen
+from pikanid.mismatch.search.swings import swings
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import Model
@@ -26,11 +28,11 @@ RATE, DAMPING, NOISE = 6.0, 0.36, 0.002
 TIME = np.linspace(0.0, 10.0, 801)
 
 
-def model() -> Model:
+def model(k: float = 30.0) -> Model:
     return Model.from_dict({
         "name": "cart on a spring",
         "states": {"x": {"unit": "m", "initial": 0.0}, "v": {"unit": "m/s", "initial": 0.0}},
-        "parameters": {"k": {"unit": "1/s^2", "guess": 30.0, "bounds": [1.0, 400.0]},
+        "parameters": {"k": {"unit": "1/s^2", "guess": k, "bounds": [0.0, 400.0]},
                        "c": {"unit": "1/s", "guess": 0.3, "bounds": [0.0, 20.0]}},
         "inputs": {"u": {"unit": "m/s^2"}},
         "equations": {"x": "v", "v": "u - k*x - c*v"},
@@ -124,3 +126,23 @@ def test_what_it_would_show_is_what_it_does() -> None:
               for t in TIME[24:27]]
         assert sign.force is not None
         assert sign.force[24:27] == pytest.approx(at)
+
+
+def test_of_what_hardly_turns_in_a_recording_all_frequencies_are_looked_at() -> None:
+    slow = model(0.01)
+    [site] = [s for s in sites(slow, (recorded(3),)) if s.v == "v"]
+    turn = 2 * np.pi / TIME[-1]
+    assert 0 < 3 * site.rate < turn
+    [law] = [c for c in candidates([site]) if c.ids == ("swinging_force",)]
+    assert law.signs is not None
+    rates = [s.start["swing_rate"] for s in law.signs(cast(View, SimpleNamespace(t=TIME)))]
+    assert min(rates) == pytest.approx(turn) and max(rates) > 20 * turn
+
+
+def test_where_nothing_tells_how_it_swings_no_fit_begins() -> None:
+    case = open_case(model(), (recorded(3, (0.02, 0.0)),), None, None, lambda text: None, DEFAULTS)
+    search = case.begin_search()
+    [start] = [c for c in case.candidates if c.key == "initial_state"]
+    [law] = [c for c in case.candidates if c.key == "swinging_force"]
+    silent = replace(law, directions=lambda view: [])
+    assert swings(search._fit([start], [{}]), start, silent) == []

@@ -23,7 +23,8 @@ def swinging_force(start: Candidate) -> Candidate:
     first, last = site.span
     turn = 2 * np.pi / (last - first)
     fastest = np.pi / site.interval
-    high = min(FASTEST * site.rate or TURNS * turn, fastest)
+    natural = FASTEST * site.rate  # of what hardly turns in a recording none shows
+    high = min(natural if natural > turn else TURNS * turn, fastest)
     w = Parameter(site.name("swing_rate"), min(site.rate or turn, fastest), "rad/s",
                   (0.0, fastest))
     text = f"{a.name}*sin({w.name}*t) + {b.name}*cos({w.name}*t)"

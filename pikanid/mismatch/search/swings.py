@@ -28,6 +28,8 @@ def swings(h: Hypothesis, effect: Candidate, law: Candidate) -> list[Start]:
     if about is None:
         return []
     found = directions(about.whitened, about.minimum.theta, [law])
+    if not found.directions:
+        return []
     r = about.minimum.r
     pairs = np.split(found.D, len(found.directions) // 2, axis=1)
     fits = [np.linalg.lstsq(pair, -r)[0] for pair in pairs]
