@@ -61,6 +61,7 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.even_stiffness, ("restoring force",)),
     (decoys.quintic_stiffness, ("restoring force",)),
     (decoys.linear_stiffness, ("restoring force",)),
+    (decoys.even_drag, ("one-sided drag",)),
     # half of the difference between forth and back is a constant force
     (decoys.one_way_friction, ("dry friction", "constant force")),
     (decoys.stribeck_friction, ("dry friction",)),
@@ -88,7 +89,7 @@ FORCES: frozenset[Make] = frozenset((
     friction.power_drag, friction.amplitude_damping, friction.boundary_layer, friction.hysteresis,
     forces.cubic_stiffness, forces.free_spring, forces.static_bias, forces.wall_impact,
     decoys.even_stiffness, decoys.quintic_stiffness, decoys.linear_stiffness,
-    decoys.one_way_friction, decoys.stribeck_friction, decoys.dissipating_wall,
+    decoys.even_drag, decoys.one_way_friction, decoys.stribeck_friction, decoys.dissipating_wall,
     decoys.rigid_stop))
 
 

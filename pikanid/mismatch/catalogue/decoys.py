@@ -23,6 +23,7 @@ from pikanid.problem.held import HeldInput, acting
 
 RISING = (0.025, 0.075, 0.25)  # numerical: of the usual speed, below which friction rises
 BRIEFER = 25.0  # numerical: times as stiff as what is touched for one sample
+TURNING = 0.1  # numerical: share of the largest speed, that a motion both ways has either way
 PARTS = 8  # numerical: of a step, at which a ramp within it is looked at
 Shape = Callable[[View], np.ndarray]
 
@@ -75,6 +76,24 @@ def linear_stiffness(site: Site) -> list[Candidate]:
     return [replace(law, known=False, instead_of=("input_gain", "sensor_gain"), beside=(
         "wall_impact", "dissipating_wall", "cubic_stiffness", "quintic_stiffness",
         "even_stiffness"))]
+
+
+def even_drag(site: Site) -> list[Candidate]:
+    """-c v²: to one side whichever way it moves, as the turning of another coordinate pulls."""
+    if not site.mechanical:
+        return []
+    c = Parameter(site.name("c_even"), 0.0, units.product(
+        (site.force_unit, 1), (site.speed_unit, -2)))
+    text = f"-{c.name}*{site.v}**2"
+
+    def directions(view: View) -> list[TangentDirection]:
+        v = view.x[site.v]
+        # of a motion that does not turn it is what quadratic drag is
+        turns = min(-v.min(initial=0.0), v.max(initial=0.0)) > TURNING * np.abs(v).max(initial=0.0)
+        return [TangentDirection({c.name: 1.0}, force=-v**2)] if turns else []
+
+    return [Candidate(("even_drag",), "drag that pulls to one side", text, "dynamics", site, (c,),
+                      lambda m: site.pushed(m, text), directions, known=False)]
 
 
 def one_way_friction(site: Site) -> list[Candidate]:
