@@ -14,13 +14,12 @@ from pikanid.model.parts import Parameter
 
 
 def coupled_state(site: Site) -> list[Candidate]:
-    """k y: a linear coupling to any other state; where the model has one its parameters take it up.
+    """k y: a linear coupling to any other state, of a motion to that of other coordinates; where the
+    model has one its parameters take it up.
     """
-    if site.q:
-        return []
     found = []
-    for y in (s for s in site.model.states if s.name != site.v):
-        unit = units.product((site.force_unit, 1), (y.unit, -1)) if y.unit else ""
+    for y in (s for s in site.model.states if s.name not in site.moving):
+        unit = units.product((site.force_unit, 1), (y.unit or "1", -1))
         k = Parameter(site.name("k_of", y.name), 0.0, unit)
         found.append(term(
             site, "coupled_state", f"a part of {site.v}' in proportion to {y.name}",
