@@ -14,8 +14,8 @@ from pikanid.model.parts import Parameter
 
 
 def coupled_state(site: Site) -> list[Candidate]:
-    """k y: a linear coupling to any other state, of a motion to that of other coordinates; where the
-    model has one its parameters take it up.
+    """k y: a linear coupling to any other state, of a motion to those of other coordinates; where
+    the model has one its parameters take it up.
     """
     found = []
     for y in (s for s in site.model.states if s.name not in site.moving):
