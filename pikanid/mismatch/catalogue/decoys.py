@@ -23,7 +23,7 @@ from pikanid.problem.held import HeldInput, acting
 
 RISING = (0.025, 0.075, 0.25)  # numerical: of the usual speed, below which friction rises
 BRIEFER = 25.0  # numerical: times as stiff as what is touched for one sample
-TURNING = 0.1  # numerical: share of the largest speed, that a motion both ways has either way
+TURNING = 0.1  # numerical: share of the largest v², that a motion both ways has either way
 PARTS = 8  # numerical: of a step, at which a ramp within it is looked at
 Shape = Callable[[View], np.ndarray]
 
@@ -89,8 +89,9 @@ def even_drag(site: Site) -> list[Candidate]:
     def directions(view: View) -> list[TangentDirection]:
         v = view.x[site.v]
         # of a motion that does not turn it is what quadratic drag is
-        turns = min(-v.min(initial=0.0), v.max(initial=0.0)) > TURNING * np.abs(v).max(initial=0.0)
-        return [TangentDirection({c.name: 1.0}, force=-v**2)] if turns else []
+        either = [float((v[side] ** 2).max(initial=0.0)) for side in (v < 0, v > 0)]
+        return [TangentDirection({c.name: 1.0}, force=-v**2)] if (
+            min(either) > TURNING * max(either)) else []
 
     return [Candidate(("even_drag",), "drag that pulls to one side", text, "dynamics", site, (c,),
                       lambda m: site.pushed(m, text), directions, known=False)]
