@@ -99,12 +99,12 @@ may be in proportion is none.  The other two sets of that round were not answere
 All ten sets of round 10 were answered blindly by one code.  Two of its diagnoses ended in an error
 (an input with two delays, each of which says what it was before the recording; a drive whose
 slowest motion hardly turns in one), which was mended before those sets were answered.  Of its six
-wrong answers three name what is there, one of them beside others, and leave out what the recordings do
-not tell.  Two, on the drive, are right or not given with what followed: a force in the square of a
-speed had been a push and quadratic drag, and a coupling of two coordinates, which had been looked
-for among states of other kinds only, damping and a stop.  Asked again with that, the sets of two_mass_drive, and of
-cart_pole_upright at 5 %, are right as before, and 2 of 90 wrong.  The answers of before are
-reported.
+wrong answers three name what is there, one of them beside others, and leave out what the recordings
+do not tell.  Two, on the drive, are right or not given with what followed: a force in the square of
+a speed had been a push and quadratic drag, and a coupling of two coordinates, which had been looked
+for among states of other kinds only, damping and a stop.  Asked again with that, the sets of
+two_mass_drive, and of cart_pole_upright at 5 %, are right as before, and 2 of 90 wrong.  The
+answers of before are reported.
 
 Of rounds 1 to 3, the code after round 4 has answered all sets of cascaded_tanks, dc_motor and
 thermal_rc again but three (cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at
