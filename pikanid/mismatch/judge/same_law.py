@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from pikanid.mismatch.catalogue.candidate import Candidate
@@ -53,7 +53,22 @@ def _power_law(h: Hypothesis, effect: Candidate, tried: Sequence[Hypothesis]
     """
     rest = h.key - {effect.key}
     return next(((o, e) for o in tried for e in o.effects
-                 if effect.key in e.covers and e.known and o.key == rest | {e.key}), None)
+                 if effect.key in e.covers and e.known and isinstance(e.exponent, Parameter)
+                 and o.key == rest | {e.key}), None)
+
+
+def _whose_limit(h: Hypothesis, effect: Candidate, known: Sequence[Hypothesis],
+                 asks: VerdictSettings) -> Iterator[tuple[Hypothesis, Candidate]]:
+    """The hypotheses with a law in the place of one of `h`'s effects whose limit that one is, and
+    that the recording does not tell from it; and those laws.
+    """
+    rest = h.key - {effect.key}
+    for o in known:
+        for e in o.effects:
+            if (e.limit and e.site.v == effect.site.v and {*e.limit.ids} & {*effect.ids}
+                    and o.key == rest | {e.key}
+                    and o.values[e.limit.parameter] < asks.open * o.std[e.limit.parameter]):
+                yield o, e
 
 
 class Names(NamedTuple):
@@ -84,7 +99,8 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
-    open, and an effect with a limit has that where it is narrow.  An entry in two shapes is one.
+    open, and an effect that has another one as its limit that where it is narrow, or may be
+    nothing.  An entry in two shapes is one.
     """
     first: dict[frozenset[str], Hypothesis] = {}
     twins: dict[frozenset[str], dict[str, Names]] = {}
@@ -105,6 +121,9 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
                         wider[0], e.exponent, asks):
                 table[e.key] = table[e.key].and_also(wider[1].names)
                 absorbed.add(wider[0].key)
+            for wider_one, law in _whose_limit(h, e, known, asks) if leader is h else ():
+                table[e.key] = table[e.key].and_also(law.names)
+                absorbed.add(wider_one.key)
             if leader is h and e.limit and (
                     h.values[e.limit.parameter] < asks.narrow * e.site.half_range):
                 table[e.key] = table[e.key].and_also(e.limit.ids)
