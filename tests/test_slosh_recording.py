@@ -49,8 +49,8 @@ def test_what_does_not_move_stays_exactly_still() -> None:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_gravity_along_a_tilted_vessel_is_found(recordings_folder: Path) -> None:
-    # the heights hold more than any catalogue (the cameras' dead band): never more than partial,
-    # and that the liquid's two directions pull at each other explains enough to leave the form open
+    # the heights hold more than any catalogue (the cameras' dead band): never more than partial.
+    # The family alone: its exact name was sure before motions were offered a coupling
     import diagnosis_real
 
     rows = diagnosis_real.slosh_lar(["Tilt_LE_2D_0m_6.5s_30deg", "Tilt_LE_2D_0m_6s_30deg"])
