@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from pikanid.model import Effect
 from pikanid.model.effects_file import read_effects
 from pikanid.model.parts import Parameter
 from pikanid.validation.concealed.score import judge
+from pikanid.validation.own_model import case as making
 from pikanid.validation.own_model.case import Order, acting, make
 from pikanid.validation.own_model.generate import OwnSet, generate
 from pikanid.validation.own_model.hidden import Hidden, Workbench
@@ -62,6 +64,38 @@ def test_scipys_simulator_agrees_with_the_kits(model: pk.Model) -> None:
     for name, y in ours.items():
         kit = theirs[name].values
         assert np.max(np.abs(y - kit)) < 2e-5 * (np.ptp(kit) or 1.0), name
+
+
+def test_a_late_sensor_shows_a_motion_that_is_under_way() -> None:
+    """As if all inputs came late: not its first value until then, as no sensor of a room does."""
+    room, late = pk.systems.thermal_rc(), {"delay": "2000*e"}
+    experiment = inputs(room, 100, 30.0, seed=4)
+    sensor = effect(room, outputs={"T": late})
+    frozen, seen = (Plant(sensor, under_way=way).outputs({}, experiment)["T"]
+                    for way in (False, True))
+    driven = effect(room, inputs={i.name: late for i in room.inputs})
+    assert seen == pytest.approx(Plant(driven).outputs({}, experiment)["T"], abs=1e-6)
+    assert frozen[0] == frozen[1] != frozen[3]
+    assert np.max(np.abs(frozen - seen)) > 1e-3
+
+
+@pytest.mark.parametrize("middle", [15.0, 0.0])
+def test_a_law_that_is_an_entry_in_other_words_is_not_hidden(
+        middle: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What has one gain for each sign, of an input that has one sign, has a gain."""
+    room = pk.systems.thermal_rc()
+    heard = inputs(room, 300, 1800.0)
+    shifted = heard.with_channels(*(
+        replace(heard[i.name], values=10 * heard[i.name].values + middle) for i in room.inputs))
+    rig = Rig(room, shifted, shifted, 0.005)
+    monkeypatch.setattr(making, "ATTEMPTS", 1)
+    monkeypatch.setattr(making, "_chosen", lambda kind, laws, rng: [
+        next(one for one in laws if one.id == "one_way_gain")])
+    if middle:
+        with pytest.raises(errors.SimulationFailed):
+            make(Order("001", 3, 0, "outside", rig))
+    else:
+        assert make(Order("001", 3, 0, "outside", rig)).truth["class"] == "outside"
 
 
 def test_a_fast_decay_is_simulated() -> None:

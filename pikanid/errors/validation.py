@@ -19,6 +19,10 @@ def conceal_faint() -> str:
     return "A hidden effect cannot be made as visible as is wanted in this experiment."
 
 
+def conceal_the_same() -> str:
+    return "A law that is to be in no catalogue is an entry in other words in these experiments."
+
+
 def conceal_cases(given: int, limit: int) -> str:
     return f"--cases is {given}; give 1 to {limit}."
 

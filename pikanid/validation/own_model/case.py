@@ -17,6 +17,7 @@ from pikanid.validation.own_model.law import Law
 from pikanid.validation.own_model.rig import Rig
 
 ATTEMPTS = 60  # definition: draws until a law can be seen and the motion stays finite
+THE_SAME = 0.1  # definition: [σ] from an entry, within which a law of no catalogue is that entry
 CLASSES = ("nothing", "single", "pair", "outside")
 
 
@@ -33,6 +34,9 @@ class Order:
 
 def make(order: Order) -> Case:
     """Draw, simulate, spoil and judge one case; a function of its order alone.
+
+    Drawn anew is what cannot be seen, what diverges, and a law of no catalogue that is an entry in
+    other words in these experiments.
 
     Raises:
         SimulationFailed: If no draw gives a finite motion.
@@ -67,6 +71,9 @@ def _attempt(order: Order, rng: np.random.Generator) -> Case:
     if hidden:
         rival = bench.nearest(truth, hidden, without, laws, rng)
     distance = min([rival[1], *alone]) if len(hidden) > 1 else rival[1]
+    if order.kind == "outside" and distance < THE_SAME:
+        # u + e |u| of an input that is never negative is a scale error: nothing else hides
+        raise errors.SimulationFailed(errors.conceal_the_same())
     return Case(recordings, {
         "id": order.name, "class": order.kind,
         "files": {key: f"{order.name}_{key}.csv" for key in ("train", "held_out")},

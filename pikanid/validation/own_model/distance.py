@@ -85,7 +85,7 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
         free: Names of those that are fitted, within their bounds.
         sure: Whether to go on along a valley, however long.
     """
-    plant = Plant(model)
+    plant = Plant(model, under_way=True)
     bounds = {p.name: p.bounds for p in model.parameters}
     low, high = (np.array([bounds[n][k] for n in free]) for k in (0, 1))
 

@@ -46,7 +46,7 @@ class Workbench:
     @cached_property
     def plant(self) -> Plant:
         """The nominal one."""
-        return Plant(self.model)
+        return self.simulator([])
 
     @cached_property
     def clean(self) -> Array:
@@ -73,6 +73,10 @@ class Workbench:
                 raise errors.SimulationFailed(str(failure)) from None
         return model
 
+    def simulator(self, hidden: Sequence[Hidden]) -> Plant:
+        """Of the model with laws: a sensor that is late shows a motion that is under way."""
+        return Plant(self.extended(hidden), under_way=True)
+
     def at(self, hidden: Sequence[Hidden]) -> dict[str, float]:
         """Values of the free parameters and of those of the laws."""
         return {**self.values, **{n: v for one in hidden for n, v in one.values.items()}}
@@ -83,7 +87,7 @@ class Workbench:
         Raises:
             SimulationFailed: If the motion diverges.
         """
-        return Plant(self.extended(hidden)).outputs(self.at(hidden), experiment)
+        return self.simulator(hidden).outputs(self.at(hidden), experiment)
 
     def seen(self, hidden: Sequence[Hidden]) -> Array:
         """(rows,) whitened outputs.
@@ -151,13 +155,13 @@ class Workbench:
         ranked: list[tuple[float, list[Hidden], dict[str, float]]] = []
         for out, fit in zip(hidden, without, strict=True):
             beside = [h for h in hidden if h is not out]
-            free, plant = self._free(beside), Plant(self.extended(beside))
+            free, plant = self._free(beside), self.simulator(beside)
             there = self.scene.whitened(plant.outputs(fit.values, self.scene.experiment))
             directions = sensitivities(plant, self.scene, fit.values, free, there)
             for rival in rivals:
                 size, start = rival.law.size.name, {**rival.values, **fit.values}
                 try:
-                    seen = Plant(self.extended([*beside, rival]))
+                    seen = self.simulator([*beside, rival])
                     moved = self.scene.whitened(seen.outputs(start, self.scene.experiment)) - there
                 except errors.SimulationFailed:
                     continue

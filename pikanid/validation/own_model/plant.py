@@ -67,6 +67,9 @@ class Plant:
 
     Args:
         model: Without play or rate limits of inputs, half derivatives or splines.
+        under_way: Whether the motion begins as long before an experiment as an output is late, so
+            that it shows a motion from its first sample on; else, as the model's own definition of
+            a delay has it, the initial state until then.
 
     Raises:
         BadModel: If it has any of these.
@@ -79,10 +82,10 @@ class Plant:
     0.1979
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, under_way: bool = False) -> None:
         if model.splines or any(i.shaped for i in model.inputs):
             raise errors.BadModel(errors.not_for_scipy(model.name))
-        self.model = model
+        self.model, self.under_way = model, under_way
 
     @cached_property
     def _arguments(self) -> list[Any]:
@@ -139,6 +142,8 @@ class Plant:
         reads = [np.array([t - self._delays(t, nothing, [0.0] * len(signals), p)[k]
                            for t in _instants(experiment, o.name)])
                  for k, o in enumerate(model.outputs, len(signals))]
+        if self.under_way:
+            start = min(start, *(float(times.min()) for times in reads))
         wanted = np.maximum(np.concatenate(reads), start)
         last = float(wanted.max())
         stops = np.unique(np.concatenate(
