@@ -37,7 +37,7 @@ NOISES = (0.005, 0.05)  # shares of an output's range
 WORKERS = 2
 # One for each rig, noise and round, and never looked at before
 SEEDS = {(name, noise, part): 670_000 + 100_000 * part + 10 * k + i
-         for part in range(1, 12) for k, name in enumerate(RIGS)
+         for part in range(1, 13) for k, name in enumerate(RIGS)
          for i, noise in enumerate(NOISES)}
 MAKERS = ("formula", "model", "recording", "validation")  # rooms: what makes the sets
 COUNTED = ("right", "wrong", "wrong_but_knowable", "false_alarm", "missed", "surely_in_part",

@@ -38,8 +38,9 @@ def fit(names: tuple[str, ...], theta: np.ndarray, J: np.ndarray, effect: Any) -
     return Hypothesis((effect,), pk.systems.sloshing(), whitened, minimum, 0.0)
 
 
-def law(*names: str, exponent: str = "") -> Any:
-    return SimpleNamespace(key="law", parameters=tuple(Parameter(n, 0.0) for n in names),
+def law(*names: str, exponent: str = "", scope: str = "shared") -> Any:
+    return SimpleNamespace(key="law", parameters=tuple(
+        Parameter(n, 0.0, scope=scope) for n in names),  # type: ignore[arg-type]
                            exponent=Parameter(exponent, 0.0) if exponent else None)
 
 
@@ -59,13 +60,16 @@ def test_what_is_known_only_together_is_not_determined(angle: float, known: bool
     assert fit(("a", "size"), np.ones(2), J[:, :2], law("size")).determines(law("size"))
 
 
+@pytest.mark.parametrize("scope", ["shared", "recording"])
 @pytest.mark.parametrize(("clear", "known"), [(20.0, False), (100.0, True)])
 def test_one_parameter_of_several_has_to_be_three_standard_errors_from_nothing(
-        clear: float, known: bool) -> None:
-    """Each is `clear` standard errors from it were the other one known, and a twentieth of that."""
+        clear: float, known: bool, scope: str) -> None:
+    """Each is `clear` standard errors from it were the other one known, and a twentieth of that: a
+    lag of no length, of an input that was far off before the recording, is a push.
+    """
     x, y = np.linalg.qr(np.random.default_rng(1).normal(size=(200, 2)))[0].T
     J = clear * np.column_stack([x, np.cos(0.05) * x + np.sin(0.05) * y])
-    h = fit(("size", "width"), np.ones(2), J, law("size", "width"))
+    h = fit(("size", "width"), np.ones(2), J, law("size", "width", scope=scope))
     assert h.determines(h.effects[0]) == known
 
 

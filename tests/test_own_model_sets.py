@@ -98,6 +98,21 @@ def test_a_law_that_is_an_entry_in_other_words_is_not_hidden(
         assert make(Order("001", 3, 0, "outside", rig)).truth["class"] == "outside"
 
 
+def test_a_distance_is_that_of_the_lowest_minimum() -> None:
+    """A scale error of a pump is the model's own scale: a fit from the truth missed that."""
+    tanks = pk.systems.cascaded_tanks()
+    experiment = inputs(tanks, 400, 4.0, seed=7)
+    driven = experiment.with_channels(*(replace(
+        experiment[i.name], values=2.6 + 1.3 * experiment[i.name].values) for i in tanks.inputs))
+    rig = Rig(tanks, driven, driven, 0.005)
+    values = {"k1": 0.06038, "k3": 0.04888, "k4": 0.03217, "x1_0": 4.161, "x2_0": 6.053}
+    bench = Workbench(rig.nominal, values, rig.scene(values))
+    drift, gain = (next(one for one in rig.laws(values) if one.id == key)
+                   for key in ("sensor_drift", "input_gain"))
+    hidden = [Hidden(drift, {drift.size.name: -6.5e-5}), Hidden(gain, {gain.size.name: -0.26})]
+    assert bench.fitted(bench.seen(hidden), hidden[:1], sure=True).distance < 0.01
+
+
 def test_a_fast_decay_is_simulated() -> None:
     """A lag of a millionth of a second: the explicit method alone takes too many steps."""
     experiment = inputs(MOTOR)

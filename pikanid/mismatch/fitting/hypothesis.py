@@ -182,11 +182,10 @@ class Hypothesis:
         if np.any(error[own] > ENDLESS * far):
             return False
         # an exponent is none of its sizes: that of nothing is a law as well
-        shared = {p.name for p in effect.parameters
-                  if p.free and p.scope == "shared" and p != effect.exponent}
-        unknown = [n for n, a, e in zip(names, alone, error, strict=True) if n in shared
-                   and np.isfinite(a) and KNOWN * e > abs(self.values[n]) and e > TOGETHER * a]
-        return len(shared) < 2 or len(unknown) < len(shared)
+        sizes = {p.name for p in effect.parameters if p.free and p != effect.exponent}
+        unknown = np.isfinite(alone) & (error > TOGETHER * alone) & (
+            KNOWN * error > np.abs(self.minimum.theta))
+        return len(sizes) < 2 or any(n in sizes for n in np.array(names)[~unknown])
 
     def explained_away(self, overdispersion: float = 1.0) -> bool:
         """Whether its effects take away what would be known of most of the model's own parameters

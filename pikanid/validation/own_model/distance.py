@@ -83,7 +83,8 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
         truth: Whitened.
         starts: Values of all parameters that are not the model's own; the nearest one is taken.
         free: Names of those that are fitted, within their bounds.
-        sure: Whether to go on along a valley, however long.
+        sure: Whether to go on along a valley, however long, and from every start: one may lead into
+            a minimum of its own.
     """
     plant = Plant(model, under_way=True)
     bounds = {p.name: p.bounds for p in model.parameters}
@@ -97,20 +98,25 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
 
     within = [{**s, **dict(zip(free, np.clip([s[n] for n in free], low, high), strict=True))}
               for s in starts]
-    start = min(within, key=lambda s: float(np.linalg.norm(residual(s))))
-    x = np.array([start[n] for n in free])
-    scale = np.where(x != 0, np.abs(x), 1.0)
+    begun = within if sure else [min(within, key=lambda s: float(np.linalg.norm(residual(s))))]
 
-    def at(z: Array) -> dict[str, float]:
-        return {**start, **dict(zip(free, (z * scale).tolist(), strict=True))}
+    def nearest(start: Mapping[str, float]) -> Fit:
+        x = np.array([start[n] for n in free])
+        scale = np.where(x != 0, np.abs(x), 1.0)
 
-    def left(z: Array) -> Array:
-        return residual(at(z))
+        def at(z: Array) -> dict[str, float]:
+            return {**start, **dict(zip(free, (z * scale).tolist(), strict=True))}
 
-    inside = np.clip(x / scale, low / scale, high / scale)
-    inside = np.where(inside == low / scale, inside + 1e-6, inside)
-    inside = np.where(inside >= high / scale, high / scale - 1e-6, inside)
-    found = least_squares(left, inside, bounds=(low / scale, high / scale),
-                          diff_step=np.full(len(free), STEP), ftol=SURE if sure else ENOUGH,
-                          max_nfev=MOST_SURE if sure else MOST_FITS)
-    return Fit(float(np.sqrt(2 * found.cost)), at(found.x))
+        def left(z: Array) -> Array:
+            return residual(at(z))
+
+        inside = np.clip(x / scale, low / scale, high / scale)
+        inside = np.where(inside == low / scale, inside + 1e-6, inside)
+        inside = np.where(inside >= high / scale, high / scale - 1e-6, inside)
+        found = least_squares(
+            left, inside, bounds=(low / scale, high / scale),
+            diff_step=np.full(len(free), STEP), ftol=SURE if sure else ENOUGH,
+            max_nfev=MOST_SURE if sure else MOST_FITS)
+        return Fit(float(np.sqrt(2 * found.cost)), at(found.x))
+
+    return min((nearest(start) for start in begun), key=lambda fit: fit.distance)

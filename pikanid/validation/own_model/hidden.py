@@ -24,7 +24,7 @@ LADDER = np.geomspace(1e-4, 1e3, 15)  # numerical: times the guess of a size
 HALVINGS = 8  # numerical: of the logarithm between two rungs
 SHAPES = 2  # numerical: values of a rival's shape to first order
 NOWHERE: Mapping[str, float] = MappingProxyType({})
-FULL = 5  # numerical: rivals that are refitted
+FULL = 5  # numerical: rivals that are refitted; the nearest one then along any valley
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,32 +166,46 @@ class Workbench:
                 except errors.SimulationFailed:
                     continue
                 far, steps = beyond(truth - there, np.column_stack([directions, moved]))
-                start |= {n: fit.values[n] + float(d) * (abs(fit.values[n]) or 1.0)
-                          for n, d in zip(free, steps, strict=False)}
+                start |= stepped(fit.values, free, steps)
                 null = rival.law.effect.null[1]
                 start[size] = null + float(steps[-1]) * (rival.law.effect.start - null)
                 ranked.append((far, [*beside, rival], start))
         ranked.sort(key=lambda found: found[0])
-        best: tuple[tuple[str, ...], float] = ((), np.inf)
-        for _, explanation, start in ranked[:FULL]:
-            found = self.fitted(truth, explanation, start)
-            if found.distance < best[1]:
-                best = tuple(h.law.id for h in explanation), found.distance
-        return best
+        found = sorted(((self.fitted(truth, explanation, start), explanation)
+                        for _, explanation, start in ranked[:FULL]), key=lambda o: o[0].distance)
+        if not found:
+            return (), np.inf
+        fit, explanation = found[0]
+        further = refit(self.extended(explanation), self.scene, truth, [fit.values],
+                        self._free(explanation), sure=True)
+        return tuple(h.law.id for h in explanation), min(fit.distance, further.distance)
 
     def fitted(self, truth: Array, hidden: Sequence[Hidden],
                start: Mapping[str, float] = NOWHERE, sure: bool = False) -> Fit:
         """The model with these laws, all of them refitted to a truth, from their values or from a
-        `start`; `sure`: along any valley.
+        `start`; `sure`: along any valley, from both, and from where a first step leads.
         """
-        known = self.at(hidden)
-        return refit(self.extended(hidden), self.scene, truth, [known, {**known, **start}],
-                     self._free(hidden), sure)
+        known, free = self.at(hidden), self._free(hidden)
+        starts = [known, *([{**known, **start}] if start else [])]
+        if sure and free:
+            plant = self.simulator(hidden)
+            there = self.scene.whitened(plant.outputs(known, self.scene.experiment))
+            directions = sensitivities(plant, self.scene, known, free, there)
+            starts.append(stepped(known, free, beyond(truth - there, directions)[1]))
+        return refit(self.extended(hidden), self.scene, truth, starts, free, sure)
 
     def _free(self, hidden: Sequence[Hidden]) -> list[str]:
         """Names of what is fitted with these laws."""
         return [*self.model.free_names,
                 *(p.name for h in hidden for p in h.law.effect.parameters if p.free)]
+
+
+def stepped(values: Mapping[str, float], names: Sequence[str], steps: Array) -> dict[str, float]:
+    """Values, those of these names a relative step (n,) further; steps that are left over are
+    another parameter's.
+    """
+    return {**values, **{n: values[n] + float(d) * (abs(values[n]) or 1.0)
+                         for n, d in zip(names, steps, strict=False)}}
 
 
 def _same(a: Law, b: Law) -> bool:
