@@ -77,6 +77,11 @@ def test_a_late_sensor_shows_a_motion_that_is_under_way() -> None:
     assert seen == pytest.approx(Plant(driven).outputs({}, experiment)["T"], abs=1e-6)
     assert frozen[0] == frozen[1] != frozen[3]
     assert np.max(np.abs(frozen - seen)) > 1e-3
+    # what begins at rest shows that it does
+    motor = effect(MOTOR, outputs={"omega": {"delay": "e"}})
+    one, other = (Plant(motor, under_way=way).outputs({}, inputs(MOTOR))["omega"]
+                  for way in (True, False))
+    assert np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("middle", [15.0, 0.0])

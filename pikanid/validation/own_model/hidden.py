@@ -74,7 +74,7 @@ class Workbench:
         return model
 
     def simulator(self, hidden: Sequence[Hidden]) -> Plant:
-        """Of the model with laws: a sensor that is late shows a motion that is under way."""
+        """Of the model with laws; a sensor that is late shows a motion that may be under way."""
         return Plant(self.extended(hidden), under_way=True)
 
     def at(self, hidden: Sequence[Hidden]) -> dict[str, float]:

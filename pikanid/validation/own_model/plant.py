@@ -67,9 +67,9 @@ class Plant:
 
     Args:
         model: Without play or rate limits of inputs, half derivatives or splines.
-        under_way: Whether the motion begins as long before an experiment as an output is late, so
-            that it shows a motion from its first sample on; else, as the model's own definition of
-            a delay has it, the initial state until then.
+        under_way: Whether the motion of a model whose initial state is estimated begins as long
+            before an experiment as an output is late, so that it shows a motion from its first
+            sample on; else, as of one that begins at rest, it shows the initial state until then.
 
     Raises:
         BadModel: If it has any of these.
@@ -85,7 +85,9 @@ class Plant:
     def __init__(self, model: Model, under_way: bool = False) -> None:
         if model.splines or any(i.shaped for i in model.inputs):
             raise errors.BadModel(errors.not_for_scipy(model.name))
-        self.model, self.under_way = model, under_way
+        free = {symbol(n) for n in model.free_names}
+        self.model = model
+        self.under_way = under_way and any(s.initial.free_symbols & free for s in model.states)
 
     @cached_property
     def _arguments(self) -> list[Any]:
