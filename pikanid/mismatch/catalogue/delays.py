@@ -4,6 +4,9 @@ Alone, an input that comes late is a twin of an output that does.  Where another
 or something moves at first, it is not.  What acted before a recording begins is not known, unless
 the model says so, and goes on to act for as long as the input is late: it is another unknown of
 each recording.  An input whose recorder lags behind that of the outputs acts before it is recorded.
+
+One of several sensors that is late shows, of a motion under way, what was before the recording.
+In its time all else is otherwise: inputs act late by as much, and other outputs are shown early.
 """
 
 from __future__ import annotations
@@ -14,9 +17,9 @@ from functools import partial
 
 import numpy as np
 
-from pikanid.formula.expressions import symbol
+from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
-from pikanid.mismatch.catalogue.site import Site, estimates_a_start
+from pikanid.mismatch.catalogue.site import Site, estimates_a_start, estimates_all_starts
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
@@ -40,6 +43,14 @@ def delay(site: Site) -> list[Candidate]:
     own = Candidate(
         ("sensor_delay",), "a delay of the sensor", f"{o}(t - {tau.name})", "sensor", site, (tau,),
         partial(Model.map_output, name=o, delay=tau.name), directions, twin="delay")
+    formulas = (*site.model.equations.values(), *(y.expression for y in site.model.outputs))
+    if len(site.model.outputs) > 1 and estimates_all_starts(site.model) and not any(
+            e.has(TIME) for e in formulas):
+        before = pasts(site, site.pasts)
+        return [replace(own, parameters=(tau, *before.values()),
+                        expression=f"{own.expression}{_before(before)}",
+                        extend=partial(_seen_late, o, tau.name, before),
+                        begins=tuple(p.name for p in before.values()))]
     either = replace(own, ids=("input_delay", "sensor_delay"),
                      name="a delay of the input or of the sensor")
     held = either if site.inputs and site.still else own
@@ -88,6 +99,14 @@ def delayed(by: Mapping[str, str], past: Mapping[str, Parameter], model: Model) 
         told = before is not None and model.input(u).past == symbol(before)
         model = model.map_input(u, delay=tau, past=None if told else before)
     return model
+
+
+def _seen_late(output: str, tau: str, past: Mapping[str, Parameter], model: Model) -> Model:
+    """The model in the time of an output that is late by so much."""
+    for other in model.output_names:
+        if other != output:
+            model = model.map_output(other, delay=f"-{tau}")
+    return delayed(dict.fromkeys(model.input_names, tau), past, model)
 
 
 def input_lead(site: Site) -> list[Candidate]:

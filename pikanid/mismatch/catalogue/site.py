@@ -185,8 +185,17 @@ class Site:
 
 def estimates_a_start(model: Model) -> bool:
     """Whether some initial value is estimated."""
+    return any(_is_estimated(model, s.initial) for s in model.states)
+
+
+def estimates_all_starts(model: Model) -> bool:
+    """Whether all are: the motion may be under way when a recording begins."""
+    return all(_is_estimated(model, s.initial) for s in model.states)
+
+
+def _is_estimated(model: Model, start: sp.Expr) -> bool:
     return any(q.name in model.parameter_names and model.parameter(q.name).free
-               for s in model.states for q in s.initial.free_symbols)
+               for q in start.free_symbols)
 
 
 def at_rest(model: Model, e: sp.Expr) -> sp.Expr:
