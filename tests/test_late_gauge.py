@@ -1,7 +1,8 @@
-"""One of several sensors is late while the motion is under way; plants that SciPy simulates.
+"""One of several sensors is late, or lags, while the motion is under way; plants that SciPy
+simulates.
 
-What it shows first was before the recording, which the sensor of a model that begins with the
-recording cannot show.
+What a late one shows first was before the recording, which the sensor of a model that begins with
+the recording cannot show; one that lags is behind by then.
 """
 
 from __future__ import annotations
@@ -36,19 +37,21 @@ def model(starts: str = "free") -> pk.Model:
                     "lower": {"unit": "m", "expression": "b"}}})
 
 
-def recorded(seed: int, begun: tuple[float, float], late: float = LATE) -> pk.Recording:
-    """Half a minute after the plant was begun."""
+def recorded(seed: int, begun: tuple[float, float], late: float = LATE, lag: float = 0.0
+             ) -> pk.Recording:
+    """Half a minute after the plant was begun; the lower gauge is late, or lags."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(0.5, 3.0, 30), 10)
 
     def slope(t: float, x: np.ndarray) -> list[float]:
         pumped = 0.015 * u[min(max(int(t / 3.0 + 1e-9), 0), len(u) - 1)]
         between, out = 0.02 * np.sqrt(max(x[0], 0.0)), 0.025 * np.sqrt(max(x[1], 0.0))
-        return [pumped - between, between - out]
+        return [pumped - between, between - out, (x[1] - x[2]) / (lag or 1.0)]
 
-    run = solve_ivp(slope, (-30.0, TIME[-1]), begun, "DOP853", dense_output=True, rtol=1e-8,
+    run = solve_ivp(slope, (-30.0, TIME[-1]), (*begun, begun[1]), "DOP853", dense_output=True, rtol=1e-8,
                     atol=1e-10, max_step=1.5)
-    seen = {"upper": run.sol(TIME)[0], "lower": run.sol(TIME - late)[1]}
+    lower = run.sol(TIME - late)[2 if lag else 1]
+    seen = {"upper": run.sol(TIME)[0], "lower": lower}
     noisy = {n: y + NOISE * rng.standard_normal(len(TIME)) for n, y in seen.items()}
     return pk.Recording.from_arrays(TIME, {"u": u, **noisy}, hold={"u": "zero"},
                                     units={"u": "m", "upper": "m", "lower": "m"})
@@ -70,6 +73,20 @@ def test_a_late_gauge_of_a_running_plant_is_named(seed: int) -> None:
     assert abs(found.value - LATE) < 3 * found.std < 1.0
     for name, value in {"k": 0.02, "c": 0.025, "g": 0.015}.items():
         assert answer.after.value(name) == pytest.approx(value, rel=0.005)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_one_that_lags_is_behind_at_first(seed: int) -> None:
+    """It had been "surely" late, with a part of the input in what it shows."""
+    one, other = (recorded(s, begun, 0.0, 9.0) for s, begun in (
+        (seed, (2.5, 0.6)), (seed + 1, (1.0, 2.0))))
+    answer = diagnose(model(), one, other, workers=1)
+    assert answer.verdict == "named"
+    [effect] = answer.hypotheses[0].effects
+    assert effect.ids == ("sensor_lag",)
+    lag, behind = (effect.parameters[n] for n in ("tau_s_b", "d_lag_s_b"))
+    assert abs(lag.value - 9.0) < 3 * lag.std < 1.0
+    assert behind.value < -5 * behind.std
 
 
 def test_a_punctual_one_is_not_late() -> None:
