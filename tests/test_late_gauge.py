@@ -48,8 +48,8 @@ def recorded(seed: int, begun: tuple[float, float], late: float = LATE, lag: flo
         between, out = 0.02 * np.sqrt(max(x[0], 0.0)), 0.025 * np.sqrt(max(x[1], 0.0))
         return [pumped - between, between - out, (x[1] - x[2]) / (lag or 1.0)]
 
-    run = solve_ivp(slope, (-30.0, TIME[-1]), (*begun, begun[1]), "DOP853", dense_output=True, rtol=1e-8,
-                    atol=1e-10, max_step=1.5)
+    run = solve_ivp(slope, (-30.0, TIME[-1]), (*begun, begun[1]), "DOP853", dense_output=True,
+                    rtol=1e-8, atol=1e-10, max_step=1.5)
     lower = run.sol(TIME - late)[2 if lag else 1]
     seen = {"upper": run.sol(TIME)[0], "lower": lower}
     noisy = {n: y + NOISE * rng.standard_normal(len(TIME)) for n, y in seen.items()}
