@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from pikanid.formula import units
-from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.begun import begun
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
 from pikanid.mismatch.catalogue.site import Site, estimates_all_starts
 from pikanid.model import Model
@@ -153,17 +152,12 @@ def lags(site: Site) -> list[Candidate]:
             one_sided=True, null=0.0) for s in step * np.array(LAGS)]
 
     found = [Candidate(("sensor_lag",), "a lag of the sensor", f"{o} behind a lag {tau.name}",
-                       "sensor", site, (tau,), partial(Model.map_output, name=o, lag=tau.name),
-                       seen, twin="lag")]
-    if estimates_all_starts(site.model):
-        # of a motion under way the sensor is behind when the recording begins
-        d = Parameter(site.name("d_lag_s"), 0.0, site.output.unit, scope="recording")
-        found.append(_begun(found[0], d, partial(Model.map_output, name=o, lag=tau.name)))
+                       "sensor", site, (tau,), lambda m: m.map_output(o, lag=tau.name), seen,
+                       twin="lag")]
+    if estimates_all_starts(site.model):  # of a motion under way the sensor is behind at first
+        found.append(begun(found[0], site.name("d_lag_s"), site.output.unit))
     for u in site.inputs:
         t_u = Parameter(site.name("tau_a", site.variant(u)), 0.5 * step, "s", within)
-        begun = Parameter(site.name("d_lag", site.variant(u)), 0.0, site.model.input(u).unit,
-                          scope="recording")
-
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[TangentDirection]:
             from pikanid.mismatch.catalogue.recurrences import lag_of_held
 
@@ -176,21 +170,8 @@ def lags(site: Site) -> list[Candidate]:
         found.append(lag)
         if u in site.operating:
             # an actuator need not be in balance with what it is told at first
-            found.append(_begun(lag, begun, partial(Model.map_input, name=u, lag=t_u.name)))
+            found.append(begun(lag, site.name("d_lag", site.variant(u)), site.model.input(u).unit))
     return found
-
-
-def _begun(lag: Candidate, above: Parameter, lagging: Callable[[Model], Model]) -> Candidate:
-    """A lag of a channel that begins `above` what it follows, rather than at it."""
-    def extend(model: Model) -> Model:
-        model = lagging(model)
-        held = model.states[-1]
-        return model.with_initial(**{held.name: held.initial + symbol(above.name)})
-
-    return replace(
-        lag, parameters=(*lag.parameters, above), extend=extend, begins=(above.name,),
-        variant=",".join(filter(None, ("begun", lag.variant))), covers={lag.key: {above.name: 0.0}},
-        expression=f"{lag.expression}, {above.name} above it at first")
 
 
 def _input(site: Site, u: str, identifier: str, name: str, parameters: tuple[Parameter, ...],

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import sympy as sp
 
-from pikanid.formula.expressions import symbol
+from pikanid.mismatch.catalogue.begun import begun
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.forces import INF
 from pikanid.mismatch.catalogue.site import Site, estimates_all_starts
@@ -20,8 +19,7 @@ MEMORIES = (0.01, 0.03, 0.1, 0.3)  # numerical: of a recording, how long a state
 def fading_memory(site: Site) -> list[Candidate]:
     """k (w - x), w' = r (x - w): of a state x that is no other one's rate, or of a rate that the
     model resists, without a restoring force at the guesses.  With one it is a boundary layer's next
-    form (`neighbouring_forms`); without any resistance it would stand for that.  What it remembers
-    at first is not known of a motion that is under way.
+    form (`neighbouring_forms`); without any resistance it would stand for that.
     """
     if site.q and (site.rate or not site.resisted):
         return []
@@ -30,13 +28,10 @@ def fading_memory(site: Site) -> list[Candidate]:
     slow, fast = 0.5 / span, max(0.5 / site.interval, 2 / span)
     r = Parameter(site.name("r_wake"), min(10 / span, 0.5 * (slow + fast)), "1/s", (slow, fast))
     text = f"{k.name}*({w} - {x})"
-    above = [Parameter(site.name("d_wake"), 0.0, site.model.state(x).unit, scope="recording")
-             ] if estimates_all_starts(site.model) else []
 
     def extend(model: Model) -> Model:
         state = model.state(x)
-        begun = sp.Add(state.initial, *(symbol(d.name) for d in above))
-        return model.with_state(State(w, unit=state.unit, initial=begun),
+        return model.with_state(State(w, unit=state.unit, initial=state.initial),
                                 f"{r.name}*({x} - {w})").with_term(x, text)
 
     def directions(view: View) -> list[TangentDirection]:
@@ -47,9 +42,10 @@ def fading_memory(site: Site) -> list[Candidate]:
             force=lagged(view.t, view.x[x], view.rates[x], share * span) - view.x[x])
             for share in MEMORIES]
 
-    return [Candidate(("fading_memory",), "a memory that fades", text, "dynamics", site,
-                      (k, r, *above), extend, directions, known=False,
-                      begins=tuple(d.name for d in above))]
+    memory = Candidate(("fading_memory",), "a memory that fades", text, "dynamics", site, (k, r),
+                       extend, directions, known=False)
+    return [memory, *([begun(memory, site.name("d_wake"), site.model.state(x).unit)]
+                      if estimates_all_starts(site.model) else [])]
 
 
 def without_store(memory: Candidate) -> Candidate:

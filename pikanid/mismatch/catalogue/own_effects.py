@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from pikanid import errors
+from pikanid.mismatch.catalogue.begun import begun
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
-from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.site import Site, estimates_all_starts
 from pikanid.model import Effect, Model
 from pikanid.model.parts import Parameter
 
@@ -41,7 +42,10 @@ def own_effects(effects: Iterable[Effect], sites: Sequence[Site],
         for twin in effect.twins:
             if twin not in ids:
                 raise errors.BadModel(errors.not_in_catalogue(twin, sorted(ids)))
-        made[known] = _candidate(effect, sites)
+        made[known] = own = _candidate(effect, sites)
+        if len(effect.states) == 1 and estimates_all_starts(sites[0].model):
+            [state] = effect.states
+            made[f"{known} begun"] = begun(own, f"d_{state}", effect.states[state].unit)
     return [*made.values()]
 
 

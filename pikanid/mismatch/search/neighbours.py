@@ -98,7 +98,8 @@ def _wider(h: Hypothesis, effect: Candidate, other: Candidate, special: str) -> 
     rest = [e for e in h.effects if e is not effect and e is not other]
     size, *more = other.parameters
     if begun := other.covers[special]:
-        starts = [{size.name: as_strong(h, effect, other, [begun[p.name] for p in more]), **begun}]
+        there = {**h.values, **begun}  # what both have stays as it is
+        starts = [{size.name: as_strong(h, effect, other, [there[p.name] for p in more]), **begun}]
     else:
         starts = [{size.name: as_strong(h, effect, other),
                    **{p.name: p.value for p in more if p.name not in h.point},
