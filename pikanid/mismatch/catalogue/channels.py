@@ -10,7 +10,7 @@ import numpy as np
 from pikanid.formula import units
 from pikanid.mismatch.catalogue.begun import begun
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
-from pikanid.mismatch.catalogue.site import Site, estimates_all_starts
+from pikanid.mismatch.catalogue.site import Site, may_be_under_way
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.problem.held import PIECES
@@ -154,7 +154,7 @@ def lags(site: Site) -> list[Candidate]:
     found = [Candidate(("sensor_lag",), "a lag of the sensor", f"{o} behind a lag {tau.name}",
                        "sensor", site, (tau,), lambda m: m.map_output(o, lag=tau.name), seen,
                        twin="lag")]
-    if estimates_all_starts(site.model):  # of a motion under way the sensor is behind at first
+    if may_be_under_way(site.model):  # of a motion under way the sensor is behind at first
         found.append(begun(found[0], site.name("d_lag_s"), site.output.unit))
     for u in site.inputs:
         t_u = Parameter(site.name("tau_a", site.variant(u)), 0.5 * step, "s", within)

@@ -9,7 +9,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.begun import begun
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection, View
 from pikanid.mismatch.catalogue.forces import INF
-from pikanid.mismatch.catalogue.site import Site, estimates_all_starts
+from pikanid.mismatch.catalogue.site import Site, may_be_under_way
 from pikanid.model import Model
 from pikanid.model.parts import Parameter, State
 
@@ -45,7 +45,7 @@ def fading_memory(site: Site) -> list[Candidate]:
     memory = Candidate(("fading_memory",), "a memory that fades", text, "dynamics", site, (k, r),
                        extend, directions, known=False)
     return [memory, *([begun(memory, site.name("d_wake"), site.model.state(x).unit)]
-                      if estimates_all_starts(site.model) else [])]
+                      if may_be_under_way(site.model) else [])]
 
 
 def without_store(memory: Candidate) -> Candidate:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pikanid import errors
 from pikanid.mismatch.catalogue.begun import begun
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
-from pikanid.mismatch.catalogue.site import Site, estimates_all_starts
+from pikanid.mismatch.catalogue.site import Site, may_be_under_way
 from pikanid.model import Effect, Model
 from pikanid.model.parts import Parameter
 
@@ -43,8 +43,7 @@ def own_effects(effects: Iterable[Effect], sites: Sequence[Site],
             if twin not in ids:
                 raise errors.BadModel(errors.not_in_catalogue(twin, sorted(ids)))
         made[known] = own = _candidate(effect, sites)
-        if len(effect.states) == 1 and estimates_all_starts(sites[0].model):
-            [state] = effect.states
+        for state in _begun_as_another(effect, sites[0].model):
             made[f"{known} begun"] = begun(own, f"d_{state}", effect.states[state].unit)
     return [*made.values()]
 
@@ -69,6 +68,15 @@ def _candidate(effect: Effect, sites: Sequence[Site]) -> Candidate:
         families=(effect.family or effect.name,), probes=probes,
         argument=_argument(effect, site, nominal),
         levels=tuple({size.name: effect.start, **probe} for probe in probes))
+
+
+def _begun_as_another(effect: Effect, model: Model) -> list[str]:
+    """Its state if it has one, which begins where one of the model's does, and nobody knows where
+    that is.
+    """
+    starts = [str(s.initial) for s in model.states] if may_be_under_way(model) else []
+    return [n for n, state in effect.states.items()
+            if len(effect.states) == 1 and state.initial.strip("()") in starts]  # as forms bind it
 
 
 def _site(effect: Effect, sites: Sequence[Site]) -> Site:

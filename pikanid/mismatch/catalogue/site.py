@@ -185,17 +185,22 @@ class Site:
 
 def estimates_a_start(model: Model) -> bool:
     """Whether some initial value is estimated."""
-    return any(_is_estimated(model, s.initial) for s in model.states)
+    return any(q.name in model.parameter_names and model.parameter(q.name).free
+               for s in model.states for q in s.initial.free_symbols)
 
 
 def estimates_all_starts(model: Model) -> bool:
-    """Whether all are: the motion may be under way when a recording begins."""
-    return all(_is_estimated(model, s.initial) for s in model.states)
+    """Whether each is a free parameter by itself: the motion may be under way when a recording
+    begins, as it is not where a dose or a given place says how.
+    """
+    return all(s.initial.is_Symbol and s.initial.name in model.free_names for s in model.states)
 
 
-def _is_estimated(model: Model, start: sp.Expr) -> bool:
-    return any(q.name in model.parameter_names and model.parameter(q.name).free
-               for q in start.free_symbols)
+def may_be_under_way(model: Model) -> bool:
+    """Whether inputs may have driven it before a recording begins, so that what no output shows is
+    not in balance then.
+    """
+    return bool(model.inputs) and estimates_all_starts(model)
 
 
 def at_rest(model: Model, e: sp.Expr) -> sp.Expr:

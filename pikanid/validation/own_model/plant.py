@@ -87,7 +87,7 @@ class Plant:
             raise errors.BadModel(errors.not_for_scipy(model.name))
         free = {symbol(n) for n in model.free_names}
         self.model = model
-        self.under_way = under_way and all(s.initial.free_symbols & free for s in model.states)
+        self.under_way = under_way and all(s.initial in free for s in model.states)
 
     @cached_property
     def _arguments(self) -> list[Any]:
