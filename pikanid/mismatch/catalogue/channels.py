@@ -158,6 +158,7 @@ def lags(site: Site) -> list[Candidate]:
         found.append(begun(found[0], site.name("d_lag_s"), site.output.unit))
     for u in site.inputs:
         t_u = Parameter(site.name("tau_a", site.variant(u)), 0.5 * step, "s", within)
+
         def pushed(view: View, u: str = u, t_u: Parameter = t_u) -> list[TangentDirection]:
             from pikanid.mismatch.catalogue.recurrences import lag_of_held
 
