@@ -70,3 +70,21 @@ def test_what_an_input_was_is_one_quantity_of_all_its_delays(case: Case) -> None
         both = extended(case.model, pair)
         assert both.input("T_a").past == symbol("u_past_T_a")
         assert both.input("T_a").delay == symbol("tau_in") + symbol("tau")
+
+
+def test_what_can_be_put_together_in_one_order_only_stays_in_that(case: Case) -> None:
+    """A temperature that is limited and then scaled: a scale error has no limit in degC."""
+    def added(name: str, before: str) -> Candidate:
+        size = pk.Parameter(name, 0.0, "")
+
+        def extend(model: pk.Model) -> pk.Model:
+            if before in model.parameter_names:
+                raise errors.BadUnit("a limit of what is scaled")
+            return model.map_input("P", gain=f"1 + {name}")
+
+        return replace(case.candidates[0], ids=(name,), variant="", parameters=(size,),
+                       extend=extend, channel="input")
+
+    limit, scale = added("e_limit", "e_scale"), added("e_scale", "")
+    found = fitted(case.model, [limit, scale], case.records, [{}], 30)
+    assert found is not None and [e.ids[0] for e in found.effects] == ["e_limit", "e_scale"]

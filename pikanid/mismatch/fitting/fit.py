@@ -44,9 +44,8 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
     Returns:
         The best local fit, or None where no start can be simulated or no model holds all effects.
     """
-    try:
-        model = extended(nominal, effects)
-    except (errors.BadUnit, errors.BadModel):
+    model = _together(nominal, effects)
+    if model is None:
         return None
     whitened = Whitened(model, records)
     rows = max(whitened.rows, 1)
@@ -87,7 +86,9 @@ def fitted(nominal: Model, effects: Sequence[Candidate], records: Records,
 def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, closest: Closest,
              limit: int, beyond: Callable[[float], bool]) -> Hypothesis | None:
     """The fit with the same effects put together in another way, where that is closer."""
-    model = extended(nominal, effects)
+    model = _together(nominal, effects)
+    if model is None:
+        return None
     whitened = Whitened(model, found.whitened.records)
     theta, least = place(whitened, found.point), whitened.settings.fits.other_order
     if not closest.choose_steps(whitened, theta, partial(per_row, rows=max(whitened.rows, 1))) or \
@@ -97,6 +98,14 @@ def _instead(found: Hypothesis, effects: tuple[Candidate, ...], nominal: Model, 
     if best is None or best.chi2 > found.minimum.chi2 - least:
         return None
     return Hypothesis(effects, model, whitened, best, found.penalty)
+
+
+def _together(nominal: Model, effects: Sequence[Candidate]) -> Model | None:
+    """The model with effects added in this order, if it can hold them so."""
+    try:
+        return extended(nominal, effects)
+    except (errors.BadUnit, errors.BadModel):
+        return None
 
 
 def read_otherwise(effects: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
