@@ -40,7 +40,7 @@ def fit(names: tuple[str, ...], theta: np.ndarray, J: np.ndarray, effect: Any) -
 
 def law(*names: str, exponent: str = "", scope: str = "shared") -> Any:
     return SimpleNamespace(key="law", parameters=tuple(
-        Parameter(n, 0.0, scope=scope) for n in names),  # type: ignore[arg-type]
+        Parameter(n, 0.0, scope=scope) for n in names),  # type: ignore[arg-type]  # of the two
                            exponent=Parameter(exponent, 0.0) if exponent else None)
 
 

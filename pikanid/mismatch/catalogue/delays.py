@@ -33,7 +33,11 @@ def delay(site: Site) -> list[Candidate]:
     """
     tau = Parameter(site.name("tau"), 0.0, "s", (0.0, float("inf")))
     o = site.output.name
-    past = pasts(site, site.pasts) if len(site.model.outputs) == 1 else {}
+    several = len(site.model.outputs) > 1
+    formulas = (*site.model.equations.values(), *(y.expression for y in site.model.outputs))
+    under_way = several and estimates_all_starts(site.model) and not any(
+        e.has(TIME) for e in formulas)
+    past = pasts(site, site.pasts) if under_way or not several else {}
 
     def directions(view: View) -> list[TangentDirection]:
         step = float(np.median(np.diff(view.t)))
@@ -43,23 +47,15 @@ def delay(site: Site) -> list[Candidate]:
     own = Candidate(
         ("sensor_delay",), "a delay of the sensor", f"{o}(t - {tau.name})", "sensor", site, (tau,),
         partial(Model.map_output, name=o, delay=tau.name), directions, twin="delay")
-    formulas = (*site.model.equations.values(), *(y.expression for y in site.model.outputs))
-    if len(site.model.outputs) > 1 and estimates_all_starts(site.model) and not any(
-            e.has(TIME) for e in formulas):
-        before = pasts(site, site.pasts)
-        return [replace(own, parameters=(tau, *before.values()),
-                        expression=f"{own.expression}{_before(before)}",
-                        extend=partial(_seen_late, o, tau.name, before),
-                        begins=tuple(p.name for p in before.values()))]
     either = replace(own, ids=("input_delay", "sensor_delay"),
                      name="a delay of the input or of the sensor")
     held = either if site.inputs and site.still else own
-    if not past:
+    if not (past or under_way):
         return [held]
     moving = replace(
-        either if len(past) == 1 else own, parameters=(tau, *past.values()),
+        either if len(past) == 1 and not several else own, parameters=(tau, *past.values()),
         expression=f"{own.expression}{_before(past)}",
-        extend=partial(delayed, dict.fromkeys(past, tau.name), past),
+        extend=partial(_seen_late, o, tau.name, past),
         begins=tuple(p.name for p in past.values()))
     return [moving] if estimates_a_start(site.model) else [
         held, replace(moving, variant="moving", beside=("initial_state",))]

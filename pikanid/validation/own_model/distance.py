@@ -81,10 +81,10 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
         model: Whatever explains.
         scene: Experiment and noise.
         truth: Whitened.
-        starts: Values of all parameters that are not the model's own; the nearest one is taken.
+        starts: Values of all parameters that are not the model's own; the nearest one is taken, or
+            each where that is to be `sure`: one may lead into a minimum of its own.
         free: Names of those that are fitted, within their bounds.
-        sure: Whether to go on along a valley, however long, and from every start: one may lead into
-            a minimum of its own.
+        sure: Whether to go on along a valley, however long.
     """
     plant = Plant(model, under_way=True)
     bounds = {p.name: p.bounds for p in model.parameters}
@@ -100,7 +100,7 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
               for s in starts]
     begun = within if sure else [min(within, key=lambda s: float(np.linalg.norm(residual(s))))]
 
-    def nearest(start: Mapping[str, float]) -> Fit:
+    def descended(start: Mapping[str, float]) -> Fit:
         x = np.array([start[n] for n in free])
         scale = np.where(x != 0, np.abs(x), 1.0)
 
@@ -119,4 +119,4 @@ def refit(model: Model, scene: Scene, truth: Array, starts: Sequence[Mapping[str
             max_nfev=MOST_SURE if sure else MOST_FITS)
         return Fit(float(np.sqrt(2 * found.cost)), at(found.x))
 
-    return min((nearest(start) for start in begun), key=lambda fit: fit.distance)
+    return min((descended(start) for start in begun), key=lambda fit: fit.distance)
