@@ -148,7 +148,7 @@ def test_no_curve_stands_for_either_of_two_families(
             name * zero_at_zero))
     monkeypatch.setattr(curves, "with_and_instead", lambda *args: (None, None))
     h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
-    case: Any = SimpleNamespace(model=MODEL)
+    case: Any = SimpleNamespace(model=MODEL, search=SimpleNamespace(workers=1))
     assert all(kappa == np.inf for _, kappa in curves._in_its_place(
         case, h, sure_of(*families), [], 1.0, []))
     assert asked == tried

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import pytest
-from weighing import COULOMB, DRAG, never, weighed
+from weighing import COULOMB, DRAG, weighed
 
 import pikanid as pk
 from pikanid.estimate import Estimate
@@ -22,7 +22,7 @@ from pikanid.reporting.diagnosis_page import _closest
 
 
 def judged(*found: Weighed) -> Part:
-    return surely_there(Explanations(found, 1.0), 1.0, DEFAULTS, never)
+    return surely_there(Explanations(found, 1.0), 1.0, DEFAULTS)
 
 
 def test_what_explains_too_little_is_no_more_than_closest() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from opened import case, hypothesis, keys
-from weighing import COULOMB, DRAG, RULE, effect, never, weighed
+from weighing import COULOMB, DRAG, RULE, effect, weighed
 
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.judge import explanations
@@ -23,7 +23,7 @@ SPRING, GAIN = effect("cubic_stiffness", "restoring force"), effect("input_gain"
 
 
 def of_two(kind: Kind, *found: Weighed) -> Present | Doubtful:
-    return _one_of_two(kind, found[0], found, DEFAULTS, 1.0, never)
+    return _one_of_two(kind, found[0], found, DEFAULTS, 1.0)
 
 
 def test_of_two_families_that_do_as_well_one_is_there() -> None:

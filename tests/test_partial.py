@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from weighing import COULOMB, DRAG, HYSTERESIS, effect, never, weighed
+from weighing import COULOMB, DRAG, HYSTERESIS, effect, weighed
 
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import Candidate
@@ -28,7 +28,7 @@ from pikanid.reporting.diagnosis_page import page
 
 
 def examined(*found: Weighed, family: Any = "dry friction") -> Present | Doubtful:
-    return _examined(Kind(family, "v"), found[0], found, DEFAULTS, 1.0, never)
+    return _examined(Kind(family, "v"), found[0], found, DEFAULTS, 1.0)
 
 
 def test_a_family_that_dominates_is_there_and_has_a_name() -> None:
@@ -54,7 +54,7 @@ def test_a_scale_error_has_to_dominate_far_more(left: float, sure: bool) -> None
     """Free stiffness and damping take up their share of what is missing, and nothing its gain."""
     gain = effect("sensor_gain", "gain")
     found = _examined(Kind("gain", ""), lead := weighed((gain,), 1.0, 0.999),
-                      [lead, weighed((DRAG,), left, 0.001)], DEFAULTS, 1.0, never)
+                      [lead, weighed((DRAG,), left, 0.001)], DEFAULTS, 1.0)
     assert isinstance(found, Present) is sure
     other = examined(weighed((COULOMB,), 1.0, 0.999), weighed((DRAG,), left, 0.001))
     assert isinstance(other, Present)
@@ -218,7 +218,7 @@ def test_a_name_holds_what_small_motions_cannot_tell_from_it(
     lead = weighed((lag,), 1.0, 0.995, share)
     every = [lead, weighed((other,), left, 0.003), weighed((rounded,), 1.0, 0.001),
              weighed((DRAG,), 9.0, 0.001)]
-    found = _examined(Kind("timing", ""), lead, every, DEFAULTS, 1.0, never)
+    found = _examined(Kind("timing", ""), lead, every, DEFAULTS, 1.0)
     assert isinstance(found, Present) and found.names == names
     assert [e.key for e in found.twins] == list(names[1:])
 

@@ -194,5 +194,5 @@ def test_what_holds_a_rig_at_rest_is_not_idle() -> None:
     found = fitted(case.model, [friction], case.records, [{"c": 1.8}], 30)
     assert found is not None and found.values["c"] == pytest.approx(2.0, abs=0.1)
     held, moved = (case.predicted(h) for h in (found, case.base))
-    assert held is not None and moved is not None and held.motion < 1.0 and not held.inert
+    assert held is not None and moved is not None and held.motion < 1.0 and not held.acts
     assert worth(friction, held, moved) > 10 * DEFAULTS.least_proof

@@ -19,7 +19,7 @@ T = np.arange(3.0)
 def held(rmse: float) -> Any:
     return SimpleNamespace(
         rmse={"y": rmse}, rmse_moved={"y": 0.9 * rmse}, t=T, measured=T + 1, predicted=rmse * T,
-        moved=T - 1, inert=frozenset({"p_a limit"}), detection=SimpleNamespace(p_value=0.25),
+        moved=T - 1, acts={"p_a limit": 0.0}, detection=SimpleNamespace(p_value=0.25),
         residuals=())
 
 

@@ -93,14 +93,14 @@ def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
         return cast(HeldOut, SimpleNamespace(
             detection=found(h), together=found(h, contradicted), deviance=value,
             misfit=rounded((misfit or {}).get(name, 1.0)), rest=rest, motion=motion,
-            inert=frozenset(f"p_{one}" for one in inert)))
+            acts={f"p_{one}": 0.0 if one in inert else 9.0 for one in keys}))
 
     def adequate(h: Hypothesis) -> Detection:
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
 
     ranked = sorted(fits, key=lambda h: h.score())
     # what is asked for ahead of time is done ahead of time, as by several threads
-    asked = adequate, predicted, lambda *_: 0.0, True, True, DEFAULTS
+    asked = adequate, predicted, True, True, DEFAULTS
     answer = settle([h for h in ranked if not h.symbolic], 1.0, *asked,
                     lambda jobs: [job() for job in jobs] and None)
     return with_formulas(answer, ranked, 1.0, *asked) if answer.verdict == "unnamed" else answer
@@ -197,22 +197,30 @@ def test_no_name_is_sure_while_what_is_refused_does_far_better() -> None:
 def test_a_held_out_recording_proves_only_what_it_could_have_refuted() -> None:
     fits = [BASE, hypothesis(1000.0, A)]
     assert answered(fits).verdict == "named"
-    for given in (answered(fits, unseen=("a",)), answered(fits, inert=("a",))):
-        assert given.verdict == "unconfirmed" and "could not have refuted a" in given.doubt
+    given = answered(fits, unseen=("a",))
+    assert given.verdict == "unconfirmed" and "could not have refuted a" in given.doubt
     # each of several effects
     both = [*fits, hypothesis(1900.0, B), hypothesis(900.0, A, B)]
     deviance = {"a": 50.0, "b": 50.0}
     assert answered(both, deviance).verdict == "named"
     assert "refuted b" in answered(both, deviance, unseen=("b",)).doubt
-    assert "refuted b" in answered(both, deviance, inert=("b",)).doubt
+    assert "b does not act in any other" in answered(both, deviance, inert=("b",)).doubt
 
 
-def test_what_happened_once_is_proved_by_a_motion_without_it() -> None:
-    once = replace(effect("a"), absent=True)
-    fits = [BASE, hypothesis(1000.0, once)]
-    assert answered(fits, unseen=("a",)).verdict == "named"
-    still = answered(fits, unseen=("a",), motion=3.0)
+@pytest.mark.parametrize(("a", "inert"), [(replace(effect("a"), absent=True), ()), (A, ("a",))])
+def test_what_acts_in_no_other_recording_is_proved_by_a_motion_without_it(
+        a: Candidate, inert: tuple[str, ...]) -> None:
+    """What happened once, and a limit that is not met there."""
+    fits = [BASE, hypothesis(1000.0, a)]
+    assert answered(fits, unseen=("a",), inert=inert).verdict == "named"
+    still = answered(fits, unseen=("a",), inert=inert, motion=3.0)
     assert still.verdict == "unconfirmed" and "could not have refuted a" in still.doubt
+    weak = answered([hypothesis(1090.0), hypothesis(1000.0, a)], inert=inert)
+    assert weak.verdict == "unconfirmed" and "a does not act in any other" in weak.doubt
+    # another effect, that lasts, would take up most of it, and does not act there either
+    for b, acting in ((B, inert), (B, (*inert, "b"))):
+        most = answered([*fits, hypothesis(1300.0, b)], inert=acting)
+        assert ("a lasting effect would take up most" in most.doubt) is ("b" not in acting)
 
 
 def test_what_proves_an_effect_grows_with_the_certainty_that_is_asked() -> None:

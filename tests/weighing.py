@@ -15,11 +15,6 @@ from pikanid.mismatch.settings.settings import DEFAULTS
 RULE = DEFAULTS.part
 
 
-def never(*_: object) -> float:
-    """An effect that does not act again in the train recordings."""
-    return 0.0
-
-
 def effect(name: str, *families: str, covers: tuple[str, ...] = (), known: bool = True,
            twin: str = "", parts: Any = None, shape_of: tuple[str, ...] = (),
            brief: Any = None) -> Candidate:
@@ -44,6 +39,6 @@ def weighed(effects: tuple[Candidate, ...], left: float, weight: float, share: f
                              minimum=SimpleNamespace(chi2=rows * (1 + left)),
                              explained_away=lambda *given: False)
     predicted: Any = SimpleNamespace(rest=np.full(100, left if later is None else later),
-                                     deviance=0.0, inert=frozenset())
+                                     deviance=0.0, acts={})
     return Weighed(h, predicted, left, 0.0, weight, share,
                    frozenset(k for e in effects for k in kinds_of(e, h, RULE.dry)))

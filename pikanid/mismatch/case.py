@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,7 +50,6 @@ class Case:
     predictions: dict[tuple[frozenset[str], float], HeldOut | None]
     repeats: Repeats | None = None
     excuse: str = ""  # why held-out recordings that were given prove nothing
-    within_train: dict[tuple[object, ...], float] = field(default_factory=dict)
 
     @property
     def settings(self) -> Settings:
@@ -73,7 +72,6 @@ class Case:
         self.base = self.search.base()
         self.tests.clear()
         self.predictions.clear()
-        self.within_train.clear()
         return self.search
 
     def uncovered(self, best: Hypothesis) -> bool:

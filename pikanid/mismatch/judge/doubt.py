@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -17,31 +17,29 @@ from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Parameter
 
 Predict = Callable[[Hypothesis], HeldOut | None]
-# χ² that an effect is worth within the train recordings, from explanations with it and without it
-Again = Callable[[Candidate, Hypothesis, Hypothesis], float]
+NOTHING = 1e-6  # numerical: of a row, where a limit is not met
 EXPLAINED_AWAY = "most of the model's own parameters are not known beside it"
 
 
-def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again: Again,
-            scale: float, settings: Settings) -> str:
+def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale: float,
+            settings: Settings) -> str:
     """Why a hypothesis is not proved on other data; empty where it is.
 
     Each effect has to be strong.  What is weak can be a facet of anything: laws that no catalogue
     holds leave nothing beside it that a test would find; a minor one beside what explains most can
     be whatever else the rig has that nobody modelled.  The held-out recording has to be one that
-    could have refuted it; a limit that it does not meet has to be met again where the train
-    recordings go on.  And it has to speak for each of several: one is easily found that takes up
-    what the others leave, whatever that is.  Where a bound holds a parameter without the effect,
+    could have refuted it.  And it has to speak for each of several: one is easily found that takes
+    up what the others leave, whatever that is.  Where a bound holds a parameter without the effect,
     one that has a size must do what that parameter would not do past the bound (a reversed sign is
     what a gain would do there); its own error has to say that there is any where that is another
-    effect's, which means nothing there.  What happens once, of which it cannot speak, takes up
-    anything: there, what lasts must not do most of that as well and predict as well.
+    effect's, which means nothing there.  What happens once, or is a limit that is not met there, of
+    which it cannot speak, takes up anything: then what lasts must not do most of that as well and
+    predict as well.
 
     Args:
         h: To prove.
         ranked: All hypotheses.
         predict: What they make of the held-out recordings.
-        again: What an effect that does not act there is worth within the train recordings.
         scale: That divides χ².
         settings: What counts as a proof.
     """
@@ -60,6 +58,7 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
     for e in h.effects:
         rest = h.key - {e.key}
         sizes = [p for p in e.parameters if p.free]
+        once = e.absent if proof is None else _once(e, proof)
         if h.symbolic and sizes:
             size, error = h.values[sizes[0].name], h.std[sizes[0].name]
             if below(abs(size), asks.sized * error):
@@ -75,33 +74,32 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, again
             if below((o.minimum.chi2 - h.minimum.chi2) / scale, asks.shown):
                 return f"the recording itself hardly shows {e.name}"
             power = worth(e, predict(h), predict(o)) / scale
-            repeated = proof is not None and idle(e, proof) and not below(
-                again(e, h, o) / scale, least_proof)
-            if below(power, least_proof) and not repeated:
+            if below(power, least_proof):
                 return (f"the held-out recording could not have refuted {e.name} (it is worth "
                         f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
             gain = gained(h, o, predict, scale)
             if e.read and fewer == rest and below(gain, asks.minor_strong * len(sizes)):
                 return (f"{e.name} is too weak for its form to be sure (it lowers chi-squared by "
                         f"{gain:.0f}, {asks.minor_strong:.0f} are asked for each parameter)")
-            seen = 0.5 if e.absent and len(h.effects) == 1 else 1.0  # in one recording of two
-            if (e.absent or below(gain, minor)) and below(gain, seen * asks.minor_strong):
-                what = ("happens once, of which no other recording speaks, and explains so little"
-                        if e.absent else "explains so little beside the rest")
+            seen = 0.5 if once and len(h.effects) == 1 else 1.0  # in one recording of two
+            if (once or below(gain, minor)) and below(gain, seen * asks.minor_strong):
+                what = ("does not act in any other recording, and explains so little"
+                        if once else "explains so little beside the rest")
                 return (f"{e.name} {what} that it may stand for anything of its size (it lowers "
                         f"chi-squared by {gain:.0f} of {minor / asks.minor:.0f}, "
                         f"{seen * asks.minor_strong:.0f} are asked)")
             if below(gain, asked):
                 return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
                         f"{asked:.0f} are asked)")
-            if len(h.effects) > 1 and not (e.absent or repeated) and not speaks(
+            if len(h.effects) > 1 and not once and not speaks(
                     h, o, predict, asks.needed * scale):
                 return f"the held-out recording does not need {e.name}"
             most = asks.once * (o.minimum.chi2 - h.minimum.chi2)
-            if e.absent and any(
+            if once and any(
                     smaller(most, o.minimum.chi2 - other.minimum.chi2)
+                    and _lasts(other, rest, predict)
                     and not speaks(h, other, predict, asks.needed * scale)
-                    for other in _lasting(rest, o, fits.values())):
+                    for other in fits.values() if len(other.effects) == len(o.effects) + 1):
                 return f"a lasting effect would take up most of what {e.name} does"
         if h.pinned and (said := no_size(e, h, 1.0, settings)):
             return said
@@ -158,11 +156,18 @@ def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: S
             f"standard error of {error:.2g})")
 
 
-def _lasting(rest: frozenset[str], fewer: Hypothesis, fits: Iterable[Hypothesis]
-             ) -> list[Hypothesis]:
-    """The hypotheses with one more effect than `rest`, which `fewer` holds, that lasts."""
-    return [o for o in fits if rest < o.key and len(o.effects) == len(fewer.effects) + 1
-            and not any(e.absent for e in o.effects if e.key not in rest)]
+def _lasts(h: Hypothesis, rest: frozenset[str], predict: Predict) -> bool:
+    """Whether a hypothesis is a rest and effects that act in held-out recordings as well."""
+    seen = predict(h)
+    return rest < h.key and not any(e.absent or (seen is not None and idle(e, seen))
+                                    for e in h.effects if e.key not in rest)
+
+
+def _once(effect: Candidate, seen: HeldOut) -> bool:
+    """Whether nothing of an effect is there: it has happened once, or is a limit that is not met.
+    A law that a small motion hardly shows is there.
+    """
+    return effect.absent or idle(effect, seen, NOTHING)
 
 
 def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float = 0.0) -> bool:
@@ -171,21 +176,22 @@ def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float =
     return a is not None and b is not None and below(a.deviance, b.deviance - margin)
 
 
-def idle(effect: Candidate, seen: HeldOut) -> bool:
-    """Whether an effect does not act in held-out recordings."""
-    return bool(effect.parameters) and {p.name for p in effect.parameters} <= seen.inert
+def idle(effect: Candidate, seen: HeldOut, below_norm: float = 1.0) -> bool:
+    """Whether an effect that lasts changes less than a row of what is held out."""
+    return bool(effect.parameters) and all(
+        seen.acts.get(p.name, np.inf) < below_norm for p in effect.parameters)
 
 
 def worth(effect: Candidate, with_it: HeldOut | None, without: HeldOut | None) -> float:
     """χ² that an effect is worth in held-out recordings, where it is there: how far apart the
     predictions with it and without it lie, each with its parameters moved within their errors.
 
-    A limit that is not met there is worth nothing.  What happens once is not there at all: then the
-    motion has to be seen, or any lasting effect in the place of what happened would go unnoticed.
+    What is not there is worth nothing: then the motion has to be seen, or any lasting effect in
+    its place would go unnoticed.
     """
     if with_it is None or without is None:
         return 0.0
-    if effect.absent:
+    if _once(effect, with_it):
         return with_it.motion
     if idle(effect, with_it):
         return 0.0

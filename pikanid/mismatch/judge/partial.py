@@ -10,7 +10,7 @@ import numpy as np
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import EXPLAINED_AWAY, Again, idle, no_size, worth
+from pikanid.mismatch.judge.doubt import EXPLAINED_AWAY, no_size, worth
 from pikanid.mismatch.judge.explanations import (
     Explanations,
     Weighed,
@@ -119,7 +119,7 @@ class Part:
     spread: Mapping[str, float] = field(default_factory=dict)
 
 
-def surely_there(explained: Explanations, scale: float, settings: Settings, again: Again) -> Part:
+def surely_there(explained: Explanations, scale: float, settings: Settings) -> Part:
     """What is there whatever the remainder is; where nothing is, what keeps the families of the
     best explanation from being sure.
 
@@ -127,13 +127,11 @@ def surely_there(explained: Explanations, scale: float, settings: Settings, agai
         explained: Explanations, weighed.
         scale: That divides χ², as far as the train recordings tell.
         settings: What is asked.
-        again: χ² that an effect that does not act in the held-out recordings is worth where it acts
-            again in the train recordings.
     """
     rule, found = settings.part, explained.weighed
     lead = explained.lead(rule.share) or found[0]
     examined = [
-        _with_a_size(_one_of_two(kind, lead, found, settings, scale, again),
+        _with_a_size(_one_of_two(kind, lead, found, settings, scale),
                      lead.hypothesis, explained.overdispersion, settings)
         for kind in kinds_in(lead.hypothesis, rule.dry)]
     little = EXPLAINED_AWAY if lead.hypothesis.explained_away() else ""
@@ -184,14 +182,14 @@ def _with_a_size(one: Present | Doubtful, h: Hypothesis, overdispersion: float,
 
 
 def _one_of_two(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Settings,
-                scale: float, again: Again) -> Present | Doubtful:
+                scale: float) -> Present | Doubtful:
     """A family of the leading explanation, surely there; else that it is or another one, which all
     explanations hold that do nearly as well without it; else why neither is sure.
 
     A family that is improbable is not one of two.
     """
     rule = settings.part
-    alone = _examined(kind, lead, found, settings, scale, again)
+    alone = _examined(kind, lead, found, settings, scale)
     if isinstance(alone, Present) or smaller(
             sum(w.weight for w in found if kind.among(w.kinds)), rule.rate):
         return alone
@@ -201,7 +199,7 @@ def _one_of_two(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: S
     shared = frozenset.intersection(*(w.kinds for w in near)) if near else frozenset()
     instead = [Instead(other, members(other, near[0].hypothesis, rule.dry)[0])
                for other in sorted(shared - lead.kinds)]
-    either = (_examined(kind, lead, found, settings, scale, again, other) for other in instead)
+    either = (_examined(kind, lead, found, settings, scale, other) for other in instead)
     return max((one for one in either if isinstance(one, Present)),
                key=lambda one: one.dominance, default=alone)
 
@@ -212,7 +210,7 @@ def _left(w: Weighed) -> float:
 
 
 def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Settings,
-              scale: float, again: Again, instead: Instead | None = None) -> Present | Doubtful:
+              scale: float, instead: Instead | None = None) -> Present | Doubtful:
     """A family of the leading explanation: surely there, or why not.
 
     Args:
@@ -221,7 +219,6 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Set
         found: All explanations, best first.
         settings: What is asked.
         scale: That divides χ², as far as the train recordings tell.
-        again: What it is worth within the train recordings.
         instead: Another family: whether it or that one is there.
     """
     rule, proof = settings.part, scale * settings.least_proof
@@ -250,9 +247,7 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Set
     if smaller(kappa, max((dominance(lead, [w for w in found if not holds(w.hypothesis, e)], rule)
                            for e in lead.hypothesis.effects if not e.known), default=0.0)):
         return Doubtful(kind, effect, "beside it a law outside the catalogue explains more")
-    if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof) and (
-            not idle(effect, lead.predicted)
-            or below(again(effect, lead.hypothesis, others[0].hypothesis), proof)):
+    if others and below(power := worth(effect, lead.predicted, others[0].predicted), proof):
         return Doubtful(kind, effect, "the held-out recording could not have refuted it (it is "
                         f"worth {power:.2g} of chi-squared there, {proof:.2g} are asked)")
     # where a law that contains the effect leaves far less, the effect's form is another one

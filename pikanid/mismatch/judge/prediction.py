@@ -42,7 +42,8 @@ class HeldOut:
         moved, rmse_moved: The same prediction, and the RMSE of each output, with the parameters
             moved within their errors to where they suit this recording best.
         rest: (N,) whitened residual with that forgiveness.
-        inert: Names of parameters that hardly act there: a limit that is not met.
+        acts: By parameter, the norm of what its whole size changes in `rest`; none where the
+            recording is at rest.
         motion: χ² of the whole predicted motion about its mean: what can be seen there at all.
         residuals: Number of the recording, output, times (N,) and residual (N,) of every one.
         known: Tests made so far.
@@ -61,7 +62,7 @@ class HeldOut:
     rmse_moved: Mapping[str, float]
     residuals: tuple[Residual, ...]
     rest: np.ndarray
-    inert: frozenset[str]
+    acts: Mapping[str, float]
     motion: float
     known: dict[str, Detection | None] = field(default_factory=dict, repr=False)
 
@@ -136,7 +137,7 @@ def held_out(hypothesis: Hypothesis, nominal: Model, records: Records,
                    chi2 + room(found.J, shared, fit, functools.partial(
                        elsewhere, prior, hypothesis, found.theta[shared])),
                    samples.t, samples.y, predicted, moved, _rmse(_residuals(whitened, closer)),
-                   residuals, found.r[: whitened.rows], _inert(whitened, found, nominal),
+                   residuals, found.r[: whitened.rows], _acts(whitened, found, nominal),
                    _motion(whitened, gaps))
 
 
@@ -178,15 +179,16 @@ def _moved(hypothesis: Hypothesis, whitened: Whitened, guess: np.ndarray, shared
     return found, prior
 
 
-def _inert(whitened: Whitened, found: Minimum, nominal: Model) -> frozenset[str]:
-    """Names of the parameters whose whole size changes the residual by less than one row of it;
-    none where none of the nominal model does: what holds a rig at rest is not idle.
+def _acts(whitened: Whitened, found: Minimum, nominal: Model) -> Mapping[str, float]:
+    """By parameter that the recordings share, the norm of what its whole size changes in the
+    residual; none where none of the nominal model does: what holds a rig at rest is not idle.
     """
-    acts = np.linalg.norm(found.J[: whitened.rows], axis=0) * np.abs(found.theta)
-    free = whitened.problem.free
-    inert = frozenset(f.name for f, size in zip(free, acts, strict=True) if size < 1)
-    own = {f.name for f in free if f.recording is None} & set(nominal.free_names)
-    return inert if own - inert else frozenset()
+    size = np.linalg.norm(found.J[: whitened.rows], axis=0) * np.abs(found.theta)
+    found_of: dict[str, float] = {}
+    for f, acts in zip(whitened.problem.free, size, strict=True):
+        found_of[f.name] = min(float(acts), found_of.get(f.name, np.inf))
+    own = {f.name for f in whitened.problem.free if f.recording is None} & set(nominal.free_names)
+    return found_of if any(found_of[n] >= 1 for n in own) else {}
 
 
 def _motion(whitened: Whitened, gaps: Sequence[np.ndarray]) -> float:

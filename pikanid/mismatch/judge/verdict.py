@@ -13,7 +13,7 @@ from pikanid.mismatch.catalogue.candidate import Channel
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import below, in_order, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import Again, Predict, gained, speaks, why_not
+from pikanid.mismatch.judge.doubt import Predict, gained, speaks, why_not
 from pikanid.mismatch.judge.partial import Part
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.judge.same_law import Names, integer_laws, merged_twins, signature
@@ -49,8 +49,8 @@ class Answer:
     channels: tuple[Channel, ...] = ()
 
 
-def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict, again: Again,
-           checked: bool, proves: bool, settings: Settings,
+def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict, checked: bool,
+           proves: bool, settings: Settings,
            ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None) -> Answer:
     """Choose what is given.
 
@@ -58,7 +58,6 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
         ranked: All hypotheses, best first.
         scale: That divides χ².
         test, predict: Adequacy on the train and on the held-out recordings.
-        again: What an effect that does not act there is worth within the train ones.
         checked: Whether there is anything held out.
         proves: Whether that is a recording of its own.
         settings: What counts as evidence.
@@ -136,14 +135,14 @@ def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Pred
             return Answer("unconfirmed", _most_probable_first(merged, predict, scale, asks),
                           tuple(h for h in rest if h not in most)[:5], twins, reasons)
         return Answer("unnamed", (), rest[:5], {}, reasons)
-    doubt = why_not(known[0], ranked, predict, again, scale, settings) if proves else ""
+    doubt = why_not(known[0], ranked, predict, scale, settings) if proves else ""
     if doubt and not outside:
         # what it holds may be sure by itself, whatever may be there besides
         reach = total(known[0]) + asks.behind * within
         simplest = min((h for h in adequate_known if _within(h, known[0])
                         and (h is known[0] or below(total(h), reach))),
                        key=lambda h: len(h.effects))
-        sure = not why_not(simplest, ranked, predict, again, scale, settings)
+        sure = not why_not(simplest, ranked, predict, scale, settings)
         if sure and all(h is not simplest for h in known):
             reasons.pop(simplest.key, None)  # that more predicts better is not sure
             sure = explains_all(simplest)
@@ -245,8 +244,7 @@ def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothe
 
 
 def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, test: Test,
-                  predict: Predict, again: Again, checked: bool, proves: bool,
-                  settings: Settings) -> Answer:
+                  predict: Predict, checked: bool, proves: bool, settings: Settings) -> Answer:
     """The answer where nothing in the catalogue would do, after formulas have been fitted as well.
 
     A formula is given where it explains about as much as the laws outside the catalogue that kept
@@ -255,7 +253,7 @@ def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, te
     if not any(h.symbolic for h in ranked):
         return answer
     asks = settings.verdict
-    found = settle(ranked, scale, test, predict, again, checked, proves, settings)
+    found = settle(ranked, scale, test, predict, checked, proves, settings)
     totals = {h.key: criterion(h, predict(h), scale, asks) - _handicap(h, asks)
               for h in found.given}
     least = min((totals[h.key] for h in found.given if h.symbolic), default=-np.inf)

@@ -282,9 +282,9 @@ class DiagnosisData:
             if len(once) == len(effects):
                 return f"as what happened once, and not {met}, which is predicted without it"
             return f"{met}, {enumerated(once)} as what happened once"
-        again = "where the recording meets it again: the held-out one does not"
-        return met if not later else again if len(later) == len(effects) else (
-            f"{met}, and {enumerated(later)} {again}")
+        here = "where this recording meets it: the held-out one does not"
+        return met if not later else here if len(later) == len(effects) else (
+            f"{met}, and {enumerated(later)} {here}")
 
 
 def _first(titles: Sequence[str]) -> str:

@@ -37,6 +37,7 @@ from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.fitting.parallel import side_by_side
 from pikanid.mismatch.judge.explanations import Explanations
 from pikanid.mismatch.judge.kinds import Kind, kinds_of, members
 from pikanid.mismatch.judge.left_over import left_in_train, left_over
@@ -74,7 +75,7 @@ def against_curves(case: Case, explained: Explanations, part: Part,
             continue
         if own:
             rest = [e for e in h.effects if e not in own]
-            found = _against(p, h, rule, [*_in_its_place(case, h, p, rest, own_left, noise)])
+            found = _against(p, h, rule, _in_its_place(case, h, p, rest, own_left, noise))
             if isinstance(found, Doubtful):
                 doubtful.append(found)
                 continue
@@ -186,7 +187,7 @@ def _beside(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | 
 
 
 def _in_its_place(case: Case, h: Hypothesis, p: Present, rest: Sequence[Candidate], own_left: float,
-                  noise: Sequence[dict[str, float]]) -> Iterator[tuple[Kind | None, float]]:
+                  noise: Sequence[dict[str, float]]) -> list[tuple[Kind | None, float]]:
     """Of free curves beside the `rest` of the effects, of what a family's members do not depend on:
     the family that each is of, of a rate it would be of two, and how many times as much is left.
 
@@ -204,17 +205,18 @@ def _in_its_place(case: Case, h: Hypothesis, p: Present, rest: Sequence[Candidat
             min(own_left, _least(case, [both], noise, own_left)), case.settings.part.floor)
         return _least(case, [instead], noise, p.dominance * left) / left
 
-    for name in (*states, *inputs):
+    def compared(name: str) -> tuple[Kind | None, float]:
         kind = (Kind("input curve") if name in inputs else
                 Kind("restoring force", site.v) if name == site.q else None)
         if "constant force" in families:
             curve = (input_curve(h, name, site, zero_at_zero=True) if name in inputs else
                      state_curve(h, name, site, zero_at_zero=True))
             both, instead = with_and_instead(nominal, h, rest, curve, near)
-            yield kind, times_as_much(instead, both)
-        else:
-            curve_of = with_free_input if name in inputs else with_free_curve
-            yield kind, times_as_much(curve_of(nominal, h, rest, name, site, near))
+            return kind, times_as_much(instead, both)
+        curve_of = with_free_input if name in inputs else with_free_curve
+        return kind, times_as_much(curve_of(nominal, h, rest, name, site, near))
+
+    return side_by_side([*states, *inputs], compared, case.search.workers)
 
 
 def _with_its_form_free(nominal: Model, h: Hypothesis, p: Present) -> Iterator[Hypothesis | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.formulas import symbolic_candidates
@@ -11,7 +10,6 @@ from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.verdict import Answer, settle, with_formulas
-from pikanid.mismatch.steps.within_train import worth_within_train
 
 
 def confirmed(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
@@ -40,11 +38,9 @@ def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site)
     search = case.search
     search.offer(symbolic_candidates(shape, site, case.candidates, case.settings))
     return with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
-                         partial(worth_within_train, case), case.later is not None, case.proves,
-                         case.settings)
+                         case.later is not None, case.proves, case.settings)
 
 
 def _settled(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
     return settle(ranked, case.search.scale(), case.test, case.predicted,
-                  partial(worth_within_train, case), case.later is not None, case.proves,
-                  case.settings, case.ahead)
+                  case.later is not None, case.proves, case.settings, case.ahead)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 
 from pikanid.mismatch.beyond.free_channels import sure_channels
 from pikanid.mismatch.case import Case
@@ -35,7 +34,6 @@ from pikanid.mismatch.search.neighbours import (
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.steps.against_curves import against_curves
-from pikanid.mismatch.steps.within_train import worth_within_train
 
 TOGETHER = "several effects together can take up most of anything, and none is sure by itself"
 
@@ -104,7 +102,7 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
         found = explanations(search.ranked(), search.scale(), case.predicted, noise, settings,
                              case.ahead)
         return found, None if found is None else surely_there(
-            found, search.scale(), settings, partial(worth_within_train, case))
+            found, search.scale(), settings)
 
     # a search that what happens once has led leaves what lasts half explained
     for _ in range(settings.budget.effects):
