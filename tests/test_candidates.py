@@ -298,3 +298,20 @@ def test_a_state_beside_a_coordinate_has_an_equation_of_its_own() -> None:
     # what the model has is offered once: viscous damping where there is none
     assert "linear_drag" in found and "linear_drag_w" not in found
     assert "linear_drag" not in {c.key for c in made(systems.sloshing())}
+
+
+def test_limits_are_out_of_reach_in_any_unit() -> None:
+    """An encoder counts to 1e9, and an amplifier takes 1e9 V."""
+    counts = Model.from_dict({
+        "name": "axis", "states": {"x": {"initial": 0.0}, "v": {"unit": "1/s", "initial": 0.0}},
+        "inputs": {"u": {"unit": "V"}}, "outputs": {"x": {"expression": "x"}},
+        "parameters": {"k": {"unit": "1/s^2", "guess": 40.0}, "b": {"unit": "1/(V*s^2)",
+                                                                   "guess": 40.0}},
+        "equations": {"x": "v", "v": "b*u - k*x"}})
+    t = np.arange(400) / 100
+    recording = Recording.from_arrays(t, {"u": 1e9 * np.sin(3 * t), "x": 1e9 * np.sin(3 * t)},
+                                      {"u": "V"})
+    for c in candidates(sites(counts, (recording,))):
+        assert all(p.bounds[0] <= p.value <= p.bounds[1] for p in c.parameters), c.key
+        if c.fits:
+            c.applied(counts)

@@ -205,8 +205,9 @@ def input_limits(site: Site) -> list[Candidate]:
         unit = site.model.input(u).unit
         width = Parameter(site.name("u_dead", site.variant(u)), 0.0, unit, (0.0, INF))
         for side, words in SIDES.items():
-            limit = Parameter(site.name("u_max", site.variant(u)), 1e6, unit,
-                              (_lowest_limit(*site.ranges[u], side), INF))
+            lowest = _lowest_limit(*site.ranges[u], side)
+            limit = Parameter(site.name("u_max", site.variant(u)), max(1e6, 10 * lowest), unit,
+                              (lowest, INF))
 
             def clipped(view: View, u: str = u, p: Parameter = limit, side: str = side
                         ) -> list[TangentDirection]:

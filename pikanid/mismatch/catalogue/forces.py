@@ -141,7 +141,8 @@ def wall_impact(site: Site) -> list[Candidate]:
     walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.half_range, np.array([0.03, 0.1, 0.3])
 
     # what is touched about the rest is no wall but a spring that differs between the sides
-    w = Parameter(site.name("wall"), 1e6, site.unit, (NEAREST * site.half_range, INF))
+    w = Parameter(site.name("wall"), max(1e6, 10 * site.half_range), site.unit,
+                  (NEAREST * site.half_range, INF))
     k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
 
     def one(variant: str, name: str = "impact on a wall") -> Candidate:
