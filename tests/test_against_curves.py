@@ -11,10 +11,10 @@ from weighing import effect
 
 import pikanid as pk
 from pikanid.mismatch.case import Case
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.judge.explanations import Explanations
 from pikanid.mismatch.judge.kinds import Kind, kinds_of
 from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present
-from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.screen import Screen
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import against_curves as curves

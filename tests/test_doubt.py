@@ -48,7 +48,7 @@ def doubt(case: Case, ranked: list[Hypothesis], later: Recording) -> tuple[str, 
     other = replace(case, later=held, predictions={})
     predicted = other.predicted(case.base)
     assert predicted is not None
-    said = why_not(ranked[0], ranked, other.predicted, 1.0, DEFAULTS)
+    said = why_not(ranked[0], replace(other.evidence(ranked), scale=1.0))
     return said, predicted.motion
 
 
@@ -76,7 +76,7 @@ def test_what_a_parameter_would_do_past_its_bound_is_no_effect(guess: float) -> 
         effect = next(c for c in case.candidates if c.key == key)
         found = fitted(case.model, [effect], case.records, [start], 30)
         assert found is not None and case.base.values["zeta"] < 1e-6
-        return why_not(found, [found, case.base], case.predicted, 1.0, DEFAULTS)
+        return why_not(found, replace(case.evidence([found, case.base]), scale=1.0))
 
     said = judged(0.8, 0.0, "push", {"q": 0.1})
     assert said == "a parameter past its bound would explain as much as push does"

@@ -14,7 +14,7 @@ from pikanid.mismatch.beyond.latent_force import ForceOverTime, _means, _Motion,
 from pikanid.mismatch.beyond.penalised import critical_value
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
-from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.report.locate import locate
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case

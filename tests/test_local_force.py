@@ -18,7 +18,7 @@ from pikanid.mismatch.beyond.local_force import (
     local_force,
 )
 from pikanid.mismatch.case import Case
-from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.report.findings import Where
 from pikanid.mismatch.report.locate import locate
 from pikanid.mismatch.settings.settings import DEFAULTS

@@ -12,7 +12,7 @@ from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.report.locate import locate, smallest
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from weighing import effect
 
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.judge.kinds import Kind
 from pikanid.mismatch.judge.partial import Part
-from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps import surely
 

@@ -58,7 +58,7 @@ def test_a_play_wider_than_the_motion_could_have_any_size(insulated: bool) -> No
     assert case.base is not None and found.minimum.chi2 < 0.1 * case.base.minimum.chi2
     assert found.determines(found.effects[0]) is not insulated
     assert lasting([found, case.base]) == ([case.base] if insulated else [found, case.base])
-    said = why_not(found, [found, case.base], case.predicted, 1.0, DEFAULTS)
+    said = why_not(found, replace(case.evidence([found, case.base]), scale=1.0))
     assert ("any is as good" in said) is insulated
     if not insulated:
         off = found.values["half_play_T_a"] - 2.0

@@ -13,8 +13,11 @@ from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate
 from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.answer import Answer
+from pikanid.mismatch.judge.evidence import Evidence, Jobs
+from pikanid.mismatch.judge.laws_outside import with_formulas
 from pikanid.mismatch.judge.prediction import HeldOut
-from pikanid.mismatch.judge.verdict import Answer, criterion, settle, with_formulas
+from pikanid.mismatch.judge.verdict import settle
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.settings.thresholds import least_proof
 from pikanid.model.parts import Parameter
@@ -99,11 +102,17 @@ def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
         return cast(Detection, SimpleNamespace(p_value=0.5 if h.effects else 1e-9))
 
     ranked = sorted(fits, key=lambda h: h.score())
-    # what is asked for ahead of time is done ahead of time, as by several threads
-    asked = adequate, predicted, True, True, DEFAULTS
-    answer = settle([h for h in ranked if not h.symbolic], 1.0, *asked,
-                    lambda jobs: [job() for job in jobs] and None)
-    return with_formulas(answer, ranked, 1.0, *asked) if answer.verdict == "unnamed" else answer
+    def ahead(jobs: Jobs) -> None:
+        """Done ahead of time, as by several threads."""
+        for job in jobs:
+            job()
+
+    known = Evidence([h for h in ranked if not h.symbolic], 1.0, adequate, predicted, True, True,
+                     DEFAULTS, ahead)
+    answer = settle(known)
+    if answer.verdict != "unnamed":
+        return answer
+    return with_formulas(answer, replace(known, ranked=ranked))
 
 
 BASE = hypothesis(2000.0)
@@ -255,8 +264,8 @@ def test_exact_ties_fall_the_same_way_whatever_the_rounding() -> None:
 def test_the_most_probable_explanation_comes_first() -> None:
     """Also where it is a law outside the catalogue, or a part of what is missing."""
     given = answered([BASE, hypothesis(1000.0, A), hypothesis(985.0, GUARD)], {"a": -12.0})
-    found = [criterion(h, None, 1.0, DEFAULTS.verdict)
-             + {"a": -12.0}.get("+".join(h.key), 0.0) for h in given.given]
+    scores = {h.key: h.score() + ODDS * (not h.known) for h in given.given}
+    found = [scores[h.key] + {"a": -12.0}.get("+".join(h.key), 0.0) for h in given.given]
     assert len(found) == 2 and found == sorted(found)
     for one in (A, replace(A, exponent=2.0)):  # also where no law of free exponent stands beside
         part = answered([BASE, hypothesis(1000.0, one), hypothesis(1001.0, B)],

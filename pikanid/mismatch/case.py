@@ -26,6 +26,7 @@ from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.lowest import lowest
 from pikanid.mismatch.fitting.parallel import side_by_side
 from pikanid.mismatch.fitting.repeats import Repeats
+from pikanid.mismatch.judge.evidence import Evidence
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.search.search import Search
 from pikanid.mismatch.settings.settings import Settings
@@ -197,6 +198,11 @@ class Case:
     def ahead(self, jobs: Sequence[Callable[[], object]]) -> None:
         """Do this side by side."""
         side_by_side(jobs, lambda job: job(), self.search.workers)
+
+    def evidence(self, ranked: Sequence[Hypothesis]) -> Evidence:
+        """What all recordings say of ranked hypotheses."""
+        return Evidence(ranked, self.search.scale(), self.test, self.predicted,
+                        self.later is not None, self.proves, self.settings, self.ahead)
 
     def predicts(self, fewer: Hypothesis, more: Hypothesis) -> bool:
         """Whether a hypothesis is worth its effects beyond another one.

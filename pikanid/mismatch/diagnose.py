@@ -16,7 +16,7 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.parallel import blas_on_one_thread, threads
-from pikanid.mismatch.judge.verdict import Answer
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.locate import affected
 from pikanid.mismatch.settings.settings import DEFAULTS, Settings

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -12,17 +14,17 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.fitting.loosened import loosened
+from pikanid.mismatch.judge.evidence import Evidence
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.settings.verdict import VerdictSettings
 from pikanid.model.parts import Parameter
 
-Predict = Callable[[Hypothesis], HeldOut | None]
 NOTHING = 1e-6  # numerical: of a row, where a limit is not met
 EXPLAINED_AWAY = "most of the model's own parameters are not known beside it"
 
 
-def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale: float,
-            settings: Settings) -> str:
+def why_not(h: Hypothesis, evidence: Evidence) -> str:
     """Why a hypothesis is not proved on other data; empty where it is.
 
     Each effect has to be strong.  What is weak can be a facet of anything: laws that no catalogue
@@ -35,102 +37,179 @@ def why_not(h: Hypothesis, ranked: Sequence[Hypothesis], predict: Predict, scale
     effect's, which means nothing there.  What happens once, or is a limit that is not met there, of
     which it cannot speak, takes up anything: then what lasts must not do most of that as well and
     predict as well.
-
-    Args:
-        h: To prove.
-        ranked: All hypotheses.
-        predict: What they make of the held-out recordings.
-        scale: That divides χ².
-        settings: What counts as a proof.
     """
-    fits = {o.key: o for o in ranked}
-    asks, least_proof = settings.verdict, settings.least_proof
-    nominal = predict(fits[frozenset()])
-    proof = predict(h)
-    if nominal and proof and smaller(asks.worse * nominal.misfit, proof.misfit):
+    nominal, proof = evidence.predict(evidence.nominal), evidence.predict(h)
+    if nominal and proof and smaller(
+            evidence.settings.verdict.worse * nominal.misfit, proof.misfit):
         return "as it stands it predicts the held-out recording worse than the nominal model"
     if h.explained_away():
         return EXPLAINED_AWAY
-    spread = min(h.whitened.records.spread, settings.noise.order_only)
-    louder = float(np.exp(settings.louder * spread))
-
-    minor = asks.minor * gained(h, fits[frozenset()], predict, scale)
-    for e in h.effects:
-        rest = h.key - {e.key}
-        sizes = [p for p in e.parameters if p.free]
-        once = e.absent if proof is None else _once(e, proof)
-        if h.symbolic and sizes:
-            size, error = h.values[sizes[0].name], h.std[sizes[0].name]
-            if below(abs(size), asks.sized * error):
-                return (f"the recording does not determine {sizes[0].name} of {e.name} ({size:.3g} "
-                        f"with a standard error of {error:.2g}): other forms do as well")
-        count = max(len(h.effects), len(e.covers) if h.symbolic else 1)
-        asked = asks.strong[count - 1] * louder
-        # a formula that is the sum of two entries must need both
-        for fewer in (rest, *(rest | {part} for part in e.covers if h.symbolic)):
-            o = fits.get(fewer)
-            if o is None:
-                continue
-            if below((o.minimum.chi2 - h.minimum.chi2) / scale, asks.shown):
-                return f"the recording itself hardly shows {e.name}"
-            power = worth(e, predict(h), predict(o)) / scale
-            if below(power, least_proof):
-                return (f"the held-out recording could not have refuted {e.name} (it is worth "
-                        f"{power:.1f} of chi-squared there, {least_proof:.0f} are asked)")
-            gain = gained(h, o, predict, scale)
-            if e.read and fewer == rest and below(gain, asks.minor_strong * len(sizes)):
-                return (f"{e.name} is too weak for its form to be sure (it lowers chi-squared by "
-                        f"{gain:.0f}, {asks.minor_strong:.0f} are asked for each parameter)")
-            seen = 0.5 if once and len(h.effects) == 1 else 1.0  # in one recording of two
-            if (once or below(gain, minor)) and below(gain, seen * asks.minor_strong):
-                what = ("does not act in any other recording, and explains so little"
-                        if once else "explains so little beside the rest")
-                return (f"{e.name} {what} that it may stand for anything of its size (it lowers "
-                        f"chi-squared by {gain:.0f} of {minor / asks.minor:.0f}, "
-                        f"{seen * asks.minor_strong:.0f} are asked)")
-            if below(gain, asked):
-                return (f"{e.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
-                        f"{asked:.0f} are asked)")
-            if len(h.effects) > 1 and not once and not speaks(
-                    h, o, predict, asks.needed * scale):
-                return f"the held-out recording does not need {e.name}"
-            most = asks.once * (o.minimum.chi2 - h.minimum.chi2)
-            if once and any(
-                    smaller(most, o.minimum.chi2 - other.minimum.chi2)
-                    and _lasts(other, rest, predict)
-                    and not speaks(h, other, predict, asks.needed * scale)
-                    for other in fits.values() if len(other.effects) == len(o.effects) + 1):
-                return f"a lasting effect would take up most of what {e.name} does"
-        if h.pinned and (said := no_size(e, h, 1.0, settings)):
-            return said
-        if sizes and rest in fits and fits[rest].pinned:
-            past = loosened(fits[rest], h)
-            if past is None and (said := no_size(e, h, 1.0, settings)):
-                return said
-            if past is not None and below(past, h.minimum.chi2 + asks.sized**2 * scale):
-                return f"a parameter past its bound would explain as much as {e.name} does"
-        if isinstance(e.exponent, Parameter) and not _in_proportion(e, h, fits):
-            n, error = h.values[e.exponent.name], h.std[e.exponent.name]
-            if below(abs(n - 1), asks.open * error):
-                return (f"{e.name} may be in proportion (its exponent is {n:.3g} with a standard "
-                        f"error of {error:.2g}), and what is so the model has itself")
-        if not h.determines(e):
-            return f"the recording does not determine {sizes[0].name} of {e.name}: any is as good"
-    return ""
+    fits = {o.key: o for o in evidence.ranked}
+    claims = (_Claim(evidence, h, e, fits) for e in h.effects)
+    return next((why for claim in claims for why in claim.doubts() if why), "")
 
 
-def _in_proportion(e: Candidate, h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
-    """Whether a law in proportion has been fitted in the place of one of free exponent."""
-    rest = h.key - {e.key}
-    return any(o.exponent == 1 and key == rest | {o.key} for key, f in fits.items()
-               for o in f.effects)
+@dataclass(frozen=True)
+class _Claim:
+    """That an effect of a hypothesis is there."""
+
+    evidence: Evidence
+    h: Hypothesis
+    effect: Candidate
+    fits: Mapping[frozenset[str], Hypothesis]
+
+    @property
+    def asks(self) -> VerdictSettings:
+        return self.evidence.settings.verdict
+
+    @property
+    def rest(self) -> frozenset[str]:
+        return self.h.key - {self.effect.key}
+
+    @property
+    def sizes(self) -> list[Parameter]:
+        return [p for p in self.effect.parameters if p.free]
+
+    @cached_property
+    def once(self) -> bool:
+        """Whether held-out recordings do not speak of it."""
+        proof = self.evidence.predict(self.h)
+        return self.effect.absent if proof is None else _once(self.effect, proof)
+
+    def without(self) -> Iterator[Hypothesis]:
+        """The fits of the others; of a formula that is the sum of two entries with either, both of
+        which it must need.
+        """
+        parts = self.effect.covers if self.h.symbolic else ()
+        return (self.fits[key] for key in (self.rest, *(self.rest | {p} for p in parts))
+                if key in self.fits)
+
+    def doubts(self) -> Iterator[str]:
+        """Of every rule, empty where it has none."""
+        yield _undetermined_formula(self)
+        for other in self.without():
+            yield from (rule(self, other) for rule in COMPARED)
+        yield from (rule(self) for rule in BY_ITSELF)
 
 
-def gained(h: Hypothesis, over: Hypothesis, predict: Predict, scale: float) -> float:
-    """χ² in all recordings that a hypothesis takes away from what another one leaves."""
-    a, b = predict(h), predict(over)
-    later = 0.0 if a is None or b is None else max(b.deviance - a.deviance, 0.0)
-    return (over.minimum.chi2 - h.minimum.chi2 + later) / scale
+def _undetermined_formula(c: _Claim) -> str:
+    if not c.h.symbolic or not c.sizes:
+        return ""
+    name = c.sizes[0].name
+    size, error = c.h.values[name], c.h.std[name]
+    if not below(abs(size), c.asks.sized * error):
+        return ""
+    return (f"the recording does not determine {name} of {c.effect.name} ({size:.3g} with a "
+            f"standard error of {error:.2g}): other forms do as well")
+
+
+def _hardly_shown(c: _Claim, other: Hypothesis) -> str:
+    gain = (other.minimum.chi2 - c.h.minimum.chi2) / c.evidence.scale
+    return f"the recording itself hardly shows {c.effect.name}" if below(gain, c.asks.shown) else ""
+
+
+def _not_refutable(c: _Claim, other: Hypothesis) -> str:
+    least = c.evidence.settings.least_proof
+    power = worth(c.effect, c.evidence.predict(c.h), c.evidence.predict(other)) / c.evidence.scale
+    if not below(power, least):
+        return ""
+    return (f"the held-out recording could not have refuted {c.effect.name} (it is worth "
+            f"{power:.1f} of chi-squared there, {least:.0f} are asked)")
+
+
+def _too_weak_for_its_form(c: _Claim, other: Hypothesis) -> str:
+    gain, asked = c.evidence.gained(c.h, other), c.asks.minor_strong
+    if not c.effect.read or other.key != c.rest or not below(gain, asked * len(c.sizes)):
+        return ""
+    return (f"{c.effect.name} is too weak for its form to be sure (it lowers chi-squared by "
+            f"{gain:.0f}, {asked:.0f} are asked for each parameter)")
+
+
+def _too_little_beside_the_rest(c: _Claim, other: Hypothesis) -> str:
+    whole = c.evidence.gained(c.h, c.evidence.nominal)
+    gain = c.evidence.gained(c.h, other)
+    asked = c.asks.minor_strong
+    if c.once and len(c.h.effects) == 1:
+        asked *= 0.5  # it is in one recording of two
+    if not (c.once or below(gain, c.asks.minor * whole)) or not below(gain, asked):
+        return ""
+    what = ("does not act in any other recording, and explains so little" if c.once else
+            "explains so little beside the rest")
+    return (f"{c.effect.name} {what} that it may stand for anything of its size (it lowers "
+            f"chi-squared by {gain:.0f} of {whole:.0f}, {asked:.0f} are asked)")
+
+
+def _too_weak(c: _Claim, other: Hypothesis) -> str:
+    settings, gain = c.evidence.settings, c.evidence.gained(c.h, other)
+    spread = min(c.h.whitened.records.spread, settings.noise.order_only)
+    count = max(len(c.h.effects), len(c.effect.covers) if c.h.symbolic else 1)
+    asked = c.asks.strong[count - 1] * float(np.exp(settings.louder * spread))
+    if not below(gain, asked):
+        return ""
+    return (f"{c.effect.name} is too weak to be sure of (it lowers chi-squared by {gain:.0f}, "
+            f"{asked:.0f} are asked)")
+
+
+def _not_needed(c: _Claim, other: Hypothesis) -> str:
+    margin = c.asks.needed * c.evidence.scale
+    if len(c.h.effects) == 1 or c.once or c.evidence.speaks(c.h, other, margin):
+        return ""
+    return f"the held-out recording does not need {c.effect.name}"
+
+
+def _taken_up_by_what_lasts(c: _Claim, other: Hypothesis) -> str:
+    evidence = c.evidence
+    most = c.asks.once * (other.minimum.chi2 - c.h.minimum.chi2)
+    if not c.once or not any(
+            smaller(most, other.minimum.chi2 - o.minimum.chi2) and _lasts(o, c.rest, evidence)
+            and not evidence.speaks(c.h, o, c.asks.needed * evidence.scale)
+            for o in evidence.ranked if len(o.effects) == len(other.effects) + 1):
+        return ""
+    return f"a lasting effect would take up most of what {c.effect.name} does"
+
+
+def _no_size_at_a_bound(c: _Claim) -> str:
+    return no_size(c.effect, c.h, 1.0, c.evidence.settings) if c.h.pinned else ""
+
+
+def _past_a_bound(c: _Claim) -> str:
+    fewer = c.fits.get(c.rest)
+    if not c.sizes or fewer is None or not fewer.pinned:
+        return ""
+    past = loosened(fewer, c.h)
+    if past is None:
+        return no_size(c.effect, c.h, 1.0, c.evidence.settings)
+    if not below(past, c.h.minimum.chi2 + c.asks.sized**2 * c.evidence.scale):
+        return ""
+    return f"a parameter past its bound would explain as much as {c.effect.name} does"
+
+
+def _may_be_in_proportion(c: _Claim) -> str:
+    exponent = c.effect.exponent
+    if not isinstance(exponent, Parameter) or any(
+            o.exponent == 1 and key == c.rest | {o.key} for key, f in c.fits.items()
+            for o in f.effects):  # a law in proportion has been fitted in its place
+        return ""
+    n, error = c.h.values[exponent.name], c.h.std[exponent.name]
+    if not below(abs(n - 1), c.asks.open * error):
+        return ""
+    return (f"{c.effect.name} may be in proportion (its exponent is {n:.3g} with a standard error "
+            f"of {error:.2g}), and what is so the model has itself")
+
+
+def _any_is_as_good(c: _Claim) -> str:
+    if c.h.determines(c.effect):
+        return ""
+    return (f"the recording does not determine {c.sizes[0].name} of {c.effect.name}: any is as "
+            "good")
+
+
+COMPARED: tuple[Callable[[_Claim, Hypothesis], str], ...] = (
+    _hardly_shown, _not_refutable, _too_weak_for_its_form, _too_little_beside_the_rest, _too_weak,
+    _not_needed, _taken_up_by_what_lasts)  # definition: rules, of a fit without the effect
+BY_ITSELF: tuple[Callable[[_Claim], str], ...] = (
+    _no_size_at_a_bound, _past_a_bound, _may_be_in_proportion, _any_is_as_good,
+)  # definition: rules
 
 
 def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: Settings,
@@ -156,9 +235,9 @@ def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: S
             f"standard error of {error:.2g})")
 
 
-def _lasts(h: Hypothesis, rest: frozenset[str], predict: Predict) -> bool:
+def _lasts(h: Hypothesis, rest: frozenset[str], evidence: Evidence) -> bool:
     """Whether a hypothesis is a rest and effects that act in held-out recordings as well."""
-    seen = predict(h)
+    seen = evidence.predict(h)
     return rest < h.key and not any(e.absent or (seen is not None and idle(e, seen))
                                     for e in h.effects if e.key not in rest)
 
@@ -168,12 +247,6 @@ def _once(effect: Candidate, seen: HeldOut) -> bool:
     A law that a small motion hardly shows is there.
     """
     return effect.absent or idle(effect, seen, NOTHING)
-
-
-def speaks(one: Hypothesis, other: Hypothesis, predict: Predict, margin: float = 0.0) -> bool:
-    """Whether held-out recordings speak for one hypothesis rather than another, by a `margin`."""
-    a, b = predict(one), predict(other)
-    return a is not None and b is not None and below(a.deviance, b.deviance - margin)
 
 
 def idle(effect: Candidate, seen: HeldOut, below_norm: float = 1.0) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import needed
-from pikanid.mismatch.judge.doubt import Predict
+from pikanid.mismatch.judge.evidence import Predict
 from pikanid.mismatch.judge.kinds import Kind, kinds_in, kinds_of, members
 from pikanid.mismatch.judge.left_over import left_over
 from pikanid.mismatch.judge.prediction import HeldOut

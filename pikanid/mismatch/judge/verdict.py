@@ -2,196 +2,232 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
-from pikanid.mismatch.catalogue.candidate import Channel
-from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.decisions import below, in_order, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import Predict, gained, speaks, why_not
-from pikanid.mismatch.judge.partial import Part
-from pikanid.mismatch.judge.prediction import HeldOut
-from pikanid.mismatch.judge.same_law import Names, integer_laws, merged_twins, signature
-from pikanid.mismatch.settings.settings import Settings
-from pikanid.mismatch.settings.verdict import VerdictSettings
+from pikanid.mismatch.judge.answer import Answer, Verdict
+from pikanid.mismatch.judge.doubt import why_not
+from pikanid.mismatch.judge.evidence import Evidence
+from pikanid.mismatch.judge.same_law import integer_laws, merged_twins, signature
 
-Test = Callable[[Hypothesis], Detection]
 NO_ENTRY = "holds a law of no catalogue: others may do the same"
 
-Verdict = Literal["none", "named", "set", "partial", "unconfirmed", "unnamed"]
-
-
-@dataclass(frozen=True)
-class Answer:
-    """Verdict, hypotheses given (most probable first) and the closest ones not given.
-
-    `twins` lists, for a hypothesis given, the effects that stand for each other in it; `reasons`
-    why others are not given, and `doubt` what keeps the first one from being confirmed.  `rivals`
-    are laws outside the catalogue that explain all as well, but are not likely enough to be given.
-    `part` is what is surely there although something is left, `closest` what comes closest where
-    nothing is, and `channels` are those in which something is, whatever it is.
-    """
-
-    verdict: Verdict
-    given: tuple[Hypothesis, ...]
-    others: tuple[Hypothesis, ...]
-    twins: dict[frozenset[str], dict[str, Names]] = field(default_factory=dict)
-    reasons: dict[frozenset[str], str] = field(default_factory=dict)
-    doubt: str = ""
-    rivals: tuple[Hypothesis, ...] = ()
-    part: Part | None = None
-    closest: Part | None = None
-    channels: tuple[Channel, ...] = ()
-
-
-def settle(ranked: Sequence[Hypothesis], scale: float, test: Test, predict: Predict, checked: bool,
-           proves: bool, settings: Settings,
-           ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None) -> Answer:
-    """Choose what is given.
-
-    Args:
-        ranked: All hypotheses, best first.
-        scale: That divides χ².
-        test, predict: Adequacy on the train and on the held-out recordings.
-        checked: Whether there is anything held out.
-        proves: Whether that is a recording of its own.
-        settings: What counts as evidence.
-        ahead: Given work that is all needed, before it is: to do it side by side.
-    """
-    reasons: dict[frozenset[str], str] = {}
-    spare: dict[frozenset[str], str] = {}
-    asks, budget, adequate = settings.verdict, settings.budget, settings.adequate
-    within = asks.indistinct
-    tried = [h for h in ranked if h.effects]
-    base = next(h for h in ranked if not h.effects)
-    if not tried or not below(tried[0].score(scale), base.score(scale)):
+def settle(evidence: Evidence) -> Answer:
+    """Choose what is given."""
+    tried = evidence.tried
+    if not tried or not below(evidence.score(tried[0]), evidence.score(evidence.nominal)):
         return Answer("unnamed", (), tuple(tried[:3]))
-    lowest = min(_handicapped(h, scale, asks) for h in tried)
-    close = [h for h in tried
-             if below(h.score(scale) - h.assumed, lowest + within)][:budget.tested]
-    near = integer_laws(close, asks)
-    for h in (h for h in close if h not in near):
-        spare[h.key] = "its exponent is a whole number: that law has a name of its own"
-    ahead([partial(ask, h) for h in near for ask in (predict, test)])
+    choice = _Choice(evidence)
+    near, given = choice.needed(choice.near())
+    if evidence.checked:
+        given += choice.predicting_better(near)
+        given = choice.not_spoken_against(given)
+    adequate = given
+    if evidence.checked and len(given) > 1:
+        given = choice.likely(given)
+    given = choice.explaining_all(given)
+    if not any(h.known for h in given):
+        return choice.without_a_name(near, given)
+    return choice.with_names(near, adequate, given)
 
-    def total(h: Hypothesis) -> float:
-        return criterion(h, predict(h), scale, asks) if predict(h) or not checked else np.inf
 
-    def passes(h: Hypothesis) -> bool:
+@dataclass
+class _Choice:
+    """What is given, step by step, and why the rest is not.
+
+    Attributes:
+        evidence: Of all hypotheses.
+        reasons: Why hypotheses that are near are not given.
+        spare: Why others need not be.
+    """
+
+    evidence: Evidence
+    reasons: dict[frozenset[str], str] = field(default_factory=dict)
+    spare: dict[frozenset[str], str] = field(default_factory=dict)
+
+    @property
+    def within(self) -> float:
+        return self.evidence.settings.verdict.indistinct
+
+    @property
+    def lowest(self) -> float:
+        return min(map(self.evidence.handicapped, self.evidence.tried))
+
+    def near(self) -> list[Hypothesis]:
+        """What the train recordings do not tell from the best, tested and predicted."""
+        evidence = self.evidence
+        reach = self.lowest + self.within
+        close = [h for h in evidence.tried if below(evidence.score(h) - h.assumed, reach)
+                 ][:evidence.settings.budget.tested]
+        near = integer_laws(close, evidence.settings.verdict)
+        self.spare |= {h.key: "its exponent is a whole number: that law has a name of its own"
+                       for h in close if h not in near}
+        evidence.ahead([partial(ask, h) for h in near for ask in (evidence.predict, evidence.test)])
+        if evidence.checked:
+            evidence.ahead([partial(getattr, seen, "detection") for h in near
+                            if evidence.adequate(evidence.test(h).p_value)
+                            and (seen := evidence.predict(h))])
+        return near
+
+    def passes(self, h: Hypothesis) -> bool:
+        """Whether a hypothesis is adequate, on the train recordings and on the held-out ones."""
+        evidence = self.evidence
         if h.blurred:
-            reasons[h.key] = "what it calls dry friction rises with all speeds of the motion"
-        elif smaller(test(h).p_value, adequate):
-            reasons[h.key] = "leaves something unexplained in the recording"
-        elif checked and ((seen := predict(h)) is None
-                          or smaller(seen.detection.p_value, adequate)):
-            reasons[h.key] = "does not predict the held-out recording"
-        return h.key not in reasons
+            self.reasons[h.key] = "what it calls dry friction rises with all speeds of the motion"
+        elif not evidence.adequate(evidence.test(h).p_value):
+            self.reasons[h.key] = "leaves something unexplained in the recording"
+        elif evidence.checked and ((seen := evidence.predict(h)) is None
+                                   or not evidence.adequate(seen.detection.p_value)):
+            self.reasons[h.key] = "does not predict the held-out recording"
+        return h.key not in self.reasons
 
-    def explains_all(h: Hypothesis) -> bool:
-        seen = predict(h)
-        if checked and seen and (both := seen.together) and smaller(
-                both.p_value, settings.refusal_together):
-            reasons[h.key] = "leaves something unexplained in all recordings together"
-        return h.key not in reasons
+    def needed(self, near: list[Hypothesis]) -> tuple[list[Hypothesis], list[Hypothesis]]:
+        """What is near, and what of it is adequate, without what holds more than is needed."""
+        given = [h for h in near if self.passes(h)]
+        needless = [h for h in given if _needless(h, near, given, self.evidence)]
+        self.spare |= {h.key: "holds more than is needed" for h in needless}
+        return ([h for h in near if h not in needless], [h for h in given if h not in needless])
 
-    if checked:
-        ahead([partial(getattr, seen, "detection") for h in near
-               if not smaller(test(h).p_value, adequate) and (seen := predict(h))])
-    given = [h for h in near if passes(h)]
-    needless = [h for h in given if _needless(h, near, given, scale, asks)]
-    spare |= {h.key: "holds more than is needed" for h in needless}
-    given, near = ([h for h in some if h not in needless] for some in (given, near))
-    if checked:
-        # what the recording speaks against a little may predict better
-        best = min(map(total, near))
-        behind = [h for h in tried if h not in near
-                  and below(_handicapped(h, scale, asks), lowest + asks.behind * within)
-                  ][:budget.predicted]
-        given += [h for h in behind if below(total(h), best) and passes(h)]
-        for h in [h for h in given if any(
-                o.key < h.key and below(total(o), total(h)) and speaks(o, h, predict)
-                for o in given)]:
-            reasons[h.key] = "the held-out recording speaks against one of its effects"
-            given.remove(h)
-    adequate_known = [h for h in given if h.known]
-    if checked and len(given) > 1:
-        given = _by_evidence(given, total, reasons, asks)
-    if checked:
-        ahead([partial(getattr, seen, "together") for h in given if (seen := predict(h))])
-    given = [h for h in given if explains_all(h)]
-    outside = [h for h in given if not h.known]
-    known = [h for h in given if h.known]
-    if not known:
-        reasons |= {h.key: NO_ENTRY for h in given}
-        rest = tuple(given) + tuple(h for h in near if h not in given)
-        most = _largest_part(base, tried, scale, predict, settings) if not given else ()
-        if most:
-            merged, twins = merged_twins(list(most), tried, asks)
-            return Answer("unconfirmed", _most_probable_first(merged, predict, scale, asks),
-                          tuple(h for h in rest if h not in most)[:5], twins, reasons)
-        return Answer("unnamed", (), rest[:5], {}, reasons)
-    doubt = why_not(known[0], ranked, predict, scale, settings) if proves else ""
-    if doubt and not outside:
-        # what it holds may be sure by itself, whatever may be there besides
-        reach = total(known[0]) + asks.behind * within
-        simplest = min((h for h in adequate_known if _within(h, known[0])
-                        and (h is known[0] or below(total(h), reach))),
-                       key=lambda h: len(h.effects))
-        sure = not why_not(simplest, ranked, predict, scale, settings)
-        if sure and all(h is not simplest for h in known):
-            reasons.pop(simplest.key, None)  # that more predicts better is not sure
-            sure = explains_all(simplest)
-            known += [simplest] if sure else []
-        doubt = "" if sure else doubt
-    merged, twins = merged_twins(known, tried, asks)
-    # laws outside the catalogue that would do as well are for the reader to know
-    lowest = min(map(total, known))
-    open_to, more = merged_twins([h for h in outside if below(total(h), lowest + within)],
-                                 tried, asks)
-    merged, twins = merged + open_to, {**twins, **more}
-    if proves and not known[0].symbolic and any(below(total(h), lowest) for h in outside):
-        doubt = "a law outside the catalogue is more probable"
-    if proves and any(below(total(h), lowest - within) for h in near if h.key in reasons):
-        doubt = doubt or "what explains it far better leaves something unexplained"
-    # where one law outside the catalogue does what several effects do, another one may do it
-    if proves and any(not h.known and len(h.effects) < len(known[0].effects) for h in near):
-        doubt = doubt or "fewer laws, one of them in no catalogue, explain the recording as well"
-    laws = [h for h in merged if not h.next_form]  # a name's next form is of one kind with it
-    apart = sum(not any(o.key < h.key for o in laws) for h in laws)
-    weak = below(gained(known[0], base, predict, scale), asks.minor_strong)
-    if proves and (apart > asks.crowd) + any(not h.known for h in laws) + weak > 1:
-        doubt = doubt or "where all of these would do, a law that nobody has listed may"
-    verdict: Verdict = ("unconfirmed" if doubt or not proves
-                        else "named" if len(merged) == 1 else "set")
-    told = set(map(signature, merged))
-    others = [h for h in tried if signature(h) not in told][:5]
-    return Answer(verdict, _most_probable_first(merged, predict, scale, asks), tuple(others), twins,
-                  {**spare, **reasons}, doubt,
-                  tuple(h for h in outside if not any(h is o for o in merged)))
+    def predicting_better(self, near: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """What the train recordings speak against a little, and the held-out ones for."""
+        evidence = self.evidence
+        best = min(map(evidence.total, near))
+        reach = self.lowest + evidence.settings.verdict.behind * self.within
+        behind = [h for h in evidence.tried if h not in near
+                  and below(evidence.handicapped(h), reach)][:evidence.settings.budget.predicted]
+        return [h for h in behind if below(evidence.total(h), best) and self.passes(h)]
+
+    def not_spoken_against(self, given: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Without those of which the held-out recordings speak against an effect."""
+        evidence = self.evidence
+        against = [h for h in given if any(
+            o.key < h.key and below(evidence.total(o), evidence.total(h))
+            and evidence.speaks(o, h) for o in given)]
+        self.reasons |= {h.key: "the held-out recording speaks against one of its effects"
+                         for h in against}
+        return [h for h in given if h not in against]
+
+    def likely(self, given: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Without those that predict the held-out recording clearly worse than another does."""
+        evidence = self.evidence
+        reach = min(map(evidence.total, given)) + self.within
+        # what says how recordings begin costs in the one and in the other
+        kept = [h for h in given if below(
+            evidence.total(h) - evidence.handicap(h) - h.assumed - h.begun, reach)]
+        self.reasons |= {h.key: "predicts the held-out recording worse"
+                         for h in given if h not in kept}
+        return in_order(kept, evidence.total, Hypothesis.place)
+
+    def explaining_all(self, given: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Those that one fit of all recordings leaves nothing unexplained of."""
+        evidence = self.evidence
+        if not evidence.checked:
+            return list(given)
+        evidence.ahead([partial(getattr, seen, "together") for h in given
+                        if (seen := evidence.predict(h))])
+        for h in given:
+            if (seen := evidence.predict(h)) and (both := seen.together) and smaller(
+                    both.p_value, evidence.settings.refusal_together):
+                self.reasons[h.key] = "leaves something unexplained in all recordings together"
+        return [h for h in given if h.key not in self.reasons]
+
+    def without_a_name(self, near: Sequence[Hypothesis], given: Sequence[Hypothesis]) -> Answer:
+        """The answer where no entry of the catalogue explains all."""
+        tried = self.evidence.tried
+        self.reasons |= {h.key: NO_ENTRY for h in given}
+        rest = (*given, *(h for h in near if h not in given))
+        most = _largest_part(self.evidence) if not given else ()
+        if not most:
+            return Answer("unnamed", (), rest[:5], {}, self.reasons)
+        merged, twins = merged_twins(list(most), tried, self.evidence.settings.verdict)
+        return Answer("unconfirmed", self.evidence.most_probable_first(merged),
+                      tuple(h for h in rest if h not in most)[:5], twins, self.reasons)
+
+    def with_names(self, near: Sequence[Hypothesis], adequate: Sequence[Hypothesis],
+                   given: Sequence[Hypothesis]) -> Answer:
+        """The answer where entries of the catalogue do, and how sure one may be of them."""
+        evidence, tried = self.evidence, self.evidence.tried
+        asks, proves = evidence.settings.verdict, evidence.proves
+        known, outside = ([h for h in given if h.known is of] for of in (True, False))
+        doubt = why_not(known[0], evidence) if proves else ""
+        if doubt and not outside and (sure := self.sure_by_itself(known, adequate)):
+            known += [sure] if all(h is not sure for h in known) else []
+            doubt = ""
+        merged, twins = merged_twins(known, tried, asks)
+        # laws outside the catalogue that would do as well are for the reader to know
+        lowest = min(map(evidence.total, known))
+        open_to, more = merged_twins(
+            [h for h in outside if below(evidence.total(h), lowest + self.within)], tried, asks)
+        merged, twins = merged + open_to, {**twins, **more}
+        if proves:
+            doubt = self.doubted(doubt, known, outside, near, merged)
+        verdict: Verdict = ("unconfirmed" if doubt or not proves
+                            else "named" if len(merged) == 1 else "set")
+        told = set(map(signature, merged))
+        others = [h for h in tried if signature(h) not in told][:5]
+        return Answer(verdict, evidence.most_probable_first(merged), tuple(others), twins,
+                      {**self.spare, **self.reasons}, doubt,
+                      tuple(h for h in outside if not any(h is o for o in merged)))
+
+    def sure_by_itself(self, known: Sequence[Hypothesis], adequate: Sequence[Hypothesis]
+                       ) -> Hypothesis | None:
+        """The simplest part of the best that is sure, whatever may be there besides, if any is."""
+        evidence, best = self.evidence, known[0]
+        reach = evidence.total(best) + evidence.settings.verdict.behind * self.within
+        simplest = min((h for h in adequate if h.known and _within(h, best) and (
+            h is best or below(evidence.total(h), reach))), key=lambda h: len(h.effects))
+        if why_not(simplest, evidence):
+            return None
+        if any(h is simplest for h in known):
+            return simplest
+        self.reasons.pop(simplest.key, None)  # that more predicts better is not sure
+        return next(iter(self.explaining_all([simplest])), None)
+
+    def doubted(self, doubt: str, known: Sequence[Hypothesis], outside: Sequence[Hypothesis],
+                near: Sequence[Hypothesis], merged: Sequence[Hypothesis]) -> str:
+        """What keeps the answer from being sure: a law outside the catalogue, the doubt about the
+        best explanation itself, or else how many others would do.
+        """
+        evidence, asks, best = self.evidence, self.evidence.settings.verdict, known[0]
+        lowest = min(map(evidence.total, known))
+        if not best.symbolic and any(below(evidence.total(h), lowest) for h in outside):
+            return "a law outside the catalogue is more probable"
+        if doubt:
+            return doubt
+        if any(below(evidence.total(h), lowest - self.within)
+               for h in near if h.key in self.reasons):
+            return "what explains it far better leaves something unexplained"
+        # where one law outside the catalogue does what several effects do, another one may do it
+        if any(not h.known and len(h.effects) < len(best.effects) for h in near):
+            return "fewer laws, one of them in no catalogue, explain the recording as well"
+        laws = [h for h in merged if not h.next_form]  # a name's next form is of one kind with it
+        apart = sum(not any(o.key < h.key for o in laws) for h in laws)
+        weak = below(evidence.gained(best, evidence.nominal), asks.minor_strong)
+        if (apart > asks.crowd) + any(not h.known for h in laws) + weak > 1:
+            return "where all of these would do, a law that nobody has listed may"
+        return ""
 
 
-def _largest_part(base: Hypothesis, tried: Sequence[Hypothesis], scale: float,
-                  predict: Predict, settings: Settings) -> tuple[Hypothesis, ...]:
+def _largest_part(evidence: Evidence) -> tuple[Hypothesis, ...]:
     """The smallest known hypotheses that predict held-out data as well as any, and far better than
     nothing does, though not down to the noise: part of what is missing, given as unconfirmed.
     """
-    asks = settings.verdict
+    asks, settings = evidence.settings.verdict, evidence.settings
     # what happens once takes up much of any misfit, and no other recording can confirm it
-    lasting = [h for h in tried if h.known and not any(e.absent for e in h.effects)]
-    count = settings.budget.predicted
-    known = in_order(lasting, lambda h: h.score(scale), Hypothesis.place)[:count]
-    closest = in_order(tried, lambda h: _handicapped(h, scale, asks), Hypothesis.place)[0]
-    nominal = predict(base)
+    lasting = [h for h in evidence.tried if h.known and not any(e.absent for e in h.effects)]
+    known = in_order(lasting, evidence.score, Hypothesis.place)[:settings.budget.predicted]
+    closest = in_order(evidence.tried, evidence.handicapped, Hypothesis.place)[0]
+    nominal = evidence.predict(evidence.nominal)
     if not known or nominal is None or (
-            not closest.known and scale < settings.fits.gross
-            and below(_handicapped(closest, scale, asks), known[0].score(scale))):
+            not closest.known and evidence.scale < settings.fits.gross
+            and below(evidence.handicapped(closest), evidence.score(known[0]))):
         return ()
-    found = {h.key: p.misfit for h in known if (p := predict(h)) is not None}
+    found = {h.key: p.misfit for h in known if (p := evidence.predict(h)) is not None}
     lowest = min(found.values(), default=np.inf)
     if smaller(asks.part * nominal.misfit, lowest):
         return ()
@@ -208,27 +244,8 @@ def _within(fewer: Hypothesis, more: Hypothesis) -> bool:
                for e in fewer.effects)
 
 
-def _handicap(h: Hypothesis, asks: VerdictSettings) -> float:
-    return asks.decoy_handicap * sum(not e.known for e in h.effects)
-
-
-def _handicapped(h: Hypothesis, scale: float, asks: VerdictSettings) -> float:
-    return h.score(scale) + _handicap(h, asks)
-
-
-def criterion(h: Hypothesis, predicted: HeldOut | None, scale: float, asks: VerdictSettings
-              ) -> float:
-    """The criterion over the recording and the held-out one, where there is one."""
-    return _handicapped(h, scale, asks) + (0.0 if predicted is None else predicted.deviance / scale)
-
-
-def _most_probable_first(given: Sequence[Hypothesis], predict: Predict, scale: float,
-                         asks: VerdictSettings) -> tuple[Hypothesis, ...]:
-    return tuple(in_order(given, lambda h: criterion(h, predict(h), scale, asks), Hypothesis.place))
-
-
 def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothesis],
-              scale: float, asks: VerdictSettings) -> bool:
+              evidence: Evidence) -> bool:
     """Whether a hypothesis adds effects to a far better one, or laws outside the catalogue to a
     better one.
 
@@ -236,57 +253,8 @@ def _needless(h: Hypothesis, near: Sequence[Hypothesis], given: Sequence[Hypothe
     the reader to know.
     """
     if h.symbolic and any(o.symbolic and len(o.minimum.theta) < len(h.minimum.theta)
-                          and not below(h.score(scale), o.score(scale)) for o in given):
+                          and not below(evidence.score(h), evidence.score(o)) for o in given):
         return True  # a longer formula for the same
-    own = _handicapped(h, scale, asks)
-    return any(o.key < h.key and not below(own, _handicapped(o, scale, asks) + (
-        0.0 if o in given and not h.known else asks.needless)) for o in near)
-
-
-def with_formulas(answer: Answer, ranked: Sequence[Hypothesis], scale: float, test: Test,
-                  predict: Predict, checked: bool, proves: bool, settings: Settings) -> Answer:
-    """The answer where nothing in the catalogue would do, after formulas have been fitted as well.
-
-    A formula is given where it explains about as much as the laws outside the catalogue that kept
-    names away, and predicts what is held out; those that do about as well stand beside it.
-    """
-    if not any(h.symbolic for h in ranked):
-        return answer
-    asks = settings.verdict
-    found = settle(ranked, scale, test, predict, checked, proves, settings)
-    totals = {h.key: criterion(h, predict(h), scale, asks) - _handicap(h, asks)
-              for h in found.given}
-    least = min((totals[h.key] for h in found.given if h.symbolic), default=-np.inf)
-    given = tuple(h for h in found.given if h.symbolic
-                  or below(asks.same_law, abs(totals[h.key] - least)))
-    if not given or any(h.known and not h.symbolic for h in given):
-        return answer
-    best = next((h for h in given if h.symbolic), given[0]).score(scale)
-    reach = best + asks.behind * asks.indistinct
-    likely = [h for h in ranked if h.effects and not h.known and h not in given
-              and below(h.score(scale), reach)][:settings.budget.predicted]
-    apart = [criterion(h, predict(h), scale, asks) - _handicap(h, asks) - least
-             for h in likely if predict(h)]
-    if any(below(asks.same_law, abs(d)) and below(d, asks.indistinct) for d in apart):
-        doubt = "another law outside the catalogue explains it about as well"
-        return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
-    if len(given) > 1:
-        # forms that nobody has tried would do as well
-        doubt = "these recordings do not tell which form it has"
-        return replace(found, given=given, verdict="unconfirmed", doubt=found.doubt or doubt)
-    return replace(found, given=given,
-                   verdict="named" if found.verdict == "set" else found.verdict)
-
-
-def _by_evidence(given: list[Hypothesis], total: Callable[[Hypothesis], float],
-                 reasons: dict[frozenset[str], str], asks: VerdictSettings) -> list[Hypothesis]:
-    """Without those that predict the held-out recording clearly worse than another does."""
-    found = {h.key: total(h) for h in given}
-    best = min(found.values())
-    # what says how recordings begin costs in the one and in the other
-    kept = [h for h in given if below(found[h.key] - _handicap(h, asks) - h.assumed - h.begun,
-                                      best + asks.indistinct)]
-    for h in given:
-        if h not in kept:
-            reasons[h.key] = "predicts the held-out recording worse"
-    return in_order(kept, lambda h: found[h.key], Hypothesis.place)
+    own, needless = evidence.handicapped(h), evidence.settings.verdict.needless
+    return any(o.key < h.key and not below(own, evidence.handicapped(o) + (
+        0.0 if o in given and not h.known else needless)) for o in near)

@@ -13,7 +13,7 @@ from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.design.next_experiment import NextExperiment, next_experiment
 from pikanid.mismatch.design.profiles import profiles
 from pikanid.mismatch.design.ranges import ranges_of
-from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.mismatch.judge.answer import Verdict
 from pikanid.mismatch.report.findings import Explanation, titles_apart
 from pikanid.model import Model
 from pikanid.model.parts import Input

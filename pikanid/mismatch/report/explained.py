@@ -7,30 +7,26 @@ from collections.abc import Mapping
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.doubt import Predict
+from pikanid.mismatch.judge.answer import Answer
+from pikanid.mismatch.judge.evidence import Evidence
 from pikanid.mismatch.judge.same_law import Names
-from pikanid.mismatch.judge.verdict import Answer, Test, criterion
 from pikanid.mismatch.report.findings import Explanation, NamedEffect
 from pikanid.mismatch.report.part import values_of
-from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Parameter
 
 EVEN = 0.5  # layout: difference of the criterion that is rounded to nothing
 UNKNOWN = 10.0  # layout: times a value, or where it began, that the error of one not told exceeds
 
 
-def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
-                 settings: Settings, overdispersion: float, spread: Mapping[str, float], time: str
+def explanations(answer: Answer, evidence: Evidence, overdispersion: float,
+                 spread: Mapping[str, float], time: str
                  ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
     """Given and rejected hypotheses, for reports.
 
     Args:
         answer: That is reported.
-        scale: That divides χ² where hypotheses are compared.
-        test, predict: Adequacy on the train and on the held-out recordings.
-        settings: What counts as evidence, and as adequate.
+        evidence: By which hypotheses are compared.
         overdispersion: That variances of parameters are multiplied by.
         spread: By name, whose square is added to those of what is given.
         time: Unit in which parameters are told.
@@ -39,13 +35,12 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
     if not pool:
         return (), ()
 
-    asks = settings.verdict
+    asks = evidence.settings.verdict
     # where even these leave something, it is nearly sure that something else acts
     elsewhere = asks.unforeseen if any(
-        not smaller(test(h).p_value, settings.adequate) for h in answer.given) else (
+        evidence.adequate(evidence.test(h).p_value) for h in answer.given) else (
             1 - asks.unforeseen)
-    scores = np.array([criterion(h, predict(h), scale, asks)
-                       for h in (*answer.given, *answer.rivals)] or [0.0])
+    scores = np.array([*map(evidence.total, (*answer.given, *answer.rivals))] or [0.0])
     weights = np.exp(-0.5 * (scores - scores.min()))
     weights *= (1 - elsewhere) / weights.sum()
 
@@ -57,15 +52,15 @@ def explanations(answer: Answer, scale: float, test: Test, predict: Predict,
             values_of(_told(e, h), h.values, h.std, overdispersion,
                       spread if h in answer.given else {}, time), e.channel, e.site.v, e.absent)
             for e, names in zip(h.effects, named, strict=True))
-        p = predict(h) if h in answer.given else None
+        p = evidence.predict(h) if h in answer.given else None
         return Explanation(effects, probability, h.model.with_values(
-            {n: v for n, v in h.values.items()}), h.score(scale),
-            test(h).p_value if h in answer.given else None,
+            {n: v for n, v in h.values.items()}), evidence.score(h),
+            evidence.test(h).p_value if h in answer.given else None,
             None if p is None else p.detection.p_value, why)
 
     given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
-    best = answer.given[0].score(scale) if answer.given else pool[0].score(scale)
-    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(h.score(scale) - best))
+    best = evidence.score(pool[0])
+    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(evidence.score(h) - best))
                    for h in answer.others)
     return given, others
 

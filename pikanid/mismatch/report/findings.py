@@ -14,7 +14,7 @@ from pikanid.mismatch.beyond.latent_force import ForceOverTime
 from pikanid.mismatch.beyond.patch import Patch
 from pikanid.mismatch.beyond.region import Interval
 from pikanid.mismatch.catalogue.candidate import Channel
-from pikanid.mismatch.judge.verdict import Verdict
+from pikanid.mismatch.judge.answer import Verdict
 from pikanid.mismatch.report.part import CLOSE, SHOWN, Closest, Present, Remainder, Value
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model import Model

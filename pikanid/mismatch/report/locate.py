@@ -19,8 +19,8 @@ from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.detect.residual_tests import unit_columns
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.judge.channels import acts_in
-from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Where
 from pikanid.mismatch.report.own_time import SECOND, told_in
 from pikanid.mismatch.report.part import Value, values_of

@@ -9,27 +9,30 @@ from pikanid.mismatch.beyond.formulas import symbolic_candidates
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
-from pikanid.mismatch.judge.verdict import Answer, settle, with_formulas
+from pikanid.mismatch.judge.answer import Answer
+from pikanid.mismatch.judge.laws_outside import with_formulas
+from pikanid.mismatch.judge.verdict import settle
 
 
 def confirmed(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
     """What the held-out recordings leave of the hypotheses, with rivals looked for again."""
     case.clear_later(ranked[0])
     search = case.search
-    answer = _settled(case, ranked)
+    answer = settle(case.evidence(ranked))
     for _ in range(case.settings.budget.rechecked):
         before = {h.fit for h in search.ranked()}
         if not search.closer(answer.given):
             break
         # one that is better has rivals of its own
         known = search.ranked()[0].fit in before
-        answer = _settled(case, search.ranked() if known else search.grow(case.adequate))
+        answer = settle(case.evidence(
+            search.ranked() if known else search.grow(case.adequate)))
     best = search.ranked()[0]
     if answer.verdict == "unnamed" and len(best.effects) == 1 and case.adequate(best):
         # one was enough for the recordings it was fitted to, and is not for the others
         failed = {h.fit for h in search.ranked()}
-        answer = _settled(case, search.grow(
-            lambda h: case.adequate(h) and h.fit not in failed))
+        answer = settle(case.evidence(search.grow(
+            lambda h: case.adequate(h) and h.fit not in failed)))
     return answer
 
 
@@ -37,10 +40,4 @@ def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site)
     """The answer, once formulas read from the shape of the force have been offered as well."""
     search = case.search
     search.offer(symbolic_candidates(shape, site, case.candidates, case.settings))
-    return with_formulas(answer, search.ranked(), search.scale(), case.test, case.predicted,
-                         case.later is not None, case.proves, case.settings)
-
-
-def _settled(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
-    return settle(ranked, case.search.scale(), case.test, case.predicted,
-                  case.later is not None, case.proves, case.settings, case.ahead)
+    return with_formulas(answer, case.evidence(search.ranked()))

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.signal import periodogram
 
 from pikanid.mismatch.case import Case
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.judge.partial import Doubtful, Part
 from pikanid.mismatch.judge.partial import Present as Sure
-from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.findings import Proof
 from pikanid.mismatch.report.locate import loud_windows
 from pikanid.mismatch.report.part import Closest, Present, Remainder, values_of

@@ -14,10 +14,10 @@ from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate, widened
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.judge.doubt import idle
 from pikanid.mismatch.judge.explanations import spread
 from pikanid.mismatch.judge.prediction import HeldOut
-from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.report.advice import advice
 from pikanid.mismatch.report.diagnosis import Diagnosis
 from pikanid.mismatch.report.explained import explanations
@@ -52,8 +52,8 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
              spread(best, answer.given) if len(answer.given) > 1 else {})
     after = widened(as_estimate(best, case.before), counts, apart) if answer.given else before
     time = own_time(case.model, case.records.recordings)
-    given, rejected = explanations(answer, case.search.scale(), case.test, case.predicted,
-                                   case.settings, counts, apart if answer.part else {}, time)
+    given, rejected = explanations(answer, case.evidence(case.search.ranked()), counts,
+                                   apart if answer.part else {}, time)
     proof = _proof(case, answer, best)
     alone = not smaller(case.detected().p_value, alpha)
     if alone and not answer.given and proof is not None and proof.p_value < alpha:

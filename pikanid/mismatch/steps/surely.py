@@ -11,6 +11,7 @@ from pikanid.mismatch.catalogue.candidate import CURVES, Candidate, Family
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.fitting.decisions import smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.judge.explanations import (
     Explanations,
     explained_share,
@@ -19,7 +20,6 @@ from pikanid.mismatch.judge.explanations import (
 )
 from pikanid.mismatch.judge.kinds import Kind, kinds_in, members
 from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, surely_there
-from pikanid.mismatch.judge.verdict import Answer
 from pikanid.mismatch.search.neighbours import (
     Job,
     beside,
