@@ -8,7 +8,7 @@ best one with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -17,12 +17,11 @@ import numpy as np
 from pikanid.mismatch.fitting.decisions import below, smaller
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.channels import needed
-from pikanid.mismatch.judge.evidence import Predict
+from pikanid.mismatch.judge.evidence import Evidence
 from pikanid.mismatch.judge.kinds import Kind, kinds_in, kinds_of, members
 from pikanid.mismatch.judge.left_over import left_over
 from pikanid.mismatch.judge.prediction import HeldOut
 from pikanid.mismatch.search.overdispersion import repeated
-from pikanid.mismatch.settings.settings import Settings
 from pikanid.mismatch.settings.verdict import PartSettings
 
 
@@ -60,31 +59,24 @@ class Explanations:
         return (lead,) if lead is first else (lead, first)
 
 
-def explanations(ranked: Sequence[Hypothesis], scale: float, predict: Predict,
-                 noise: Sequence[dict[str, float]], settings: Settings,
-                 ahead: Callable[[Sequence[Callable[[], object]]], None] = lambda jobs: None
-                 ) -> Explanations | None:
+def explanations(evidence: Evidence, noise: Sequence[dict[str, float]]) -> Explanations | None:
     """Explanations to be compared, weighed; None where the held-out recordings prove nothing.
 
     Args:
-        ranked: All hypotheses, best first, the nominal model among them.
-        scale: That divides χ², as far as the train recordings tell.
-        predict: What a hypothesis makes of the held-out recordings.
+        evidence: Of all hypotheses.
         noise: σ of each output by name, in the train and in the held-out recordings.
-        settings: What is asked.
-        ahead: Given work that is all needed, before it is: to do it side by side.
     """
-    rule = settings.part
-    pool = _pool(ranked, rule)
-    ahead([partial(predict, h) for h in pool])
+    rule, predict = evidence.settings.part, evidence.predict
+    pool = _pool(evidence.ranked, rule)
+    evidence.ahead([partial(predict, h) for h in pool])
     found = [Weighed(h, p, left_over(h, p, noise), kinds=frozenset(
                  k for e in h.effects for k in kinds_of(e, h, rule.dry)))
              for h in pool if (p := predict(h)) is not None]
     nominal = next((w for w in found if not w.hypothesis.effects), None)
     if nominal is None or len(found) < 2 or below(nominal.predicted.chi2 - len(
-            nominal.predicted.rest), settings.least_proof):
+            nominal.predicted.rest), evidence.settings.least_proof):
         return None
-    found, counts = _weighed(found, nominal, scale, settings.verdict.decoy_handicap)
+    found, counts = _weighed(found, nominal, evidence)
     return Explanations(tuple(found), counts)
 
 
@@ -120,8 +112,8 @@ def _pool(ranked: Sequence[Hypothesis], rule: PartSettings) -> list[Hypothesis]:
     return list({h.fit: h for h in chosen}.values())
 
 
-def _weighed(found: list[Weighed], nominal: Weighed, scale: float,
-             handicap: float) -> tuple[list[Weighed], float]:
+def _weighed(found: list[Weighed], nominal: Weighed, evidence: Evidence
+             ) -> tuple[list[Weighed], float]:
     """The same with criterion and weights, best first; and what divides χ².
 
     That is the larger one of the overdispersions of the train recordings and of the best
@@ -129,10 +121,9 @@ def _weighed(found: list[Weighed], nominal: Weighed, scale: float,
     """
     closest = min(found, key=lambda w: w.predicted.chi2)
     level = max(1.0, closest.predicted.chi2 / max(len(closest.predicted.rest), 1))
-    counts = max(scale, level * repeated(closest.predicted.rest) ** (1 - 1 / level))
-    scores = np.array([(w.hypothesis.minimum.chi2 + w.predicted.deviance) / counts
-                       + w.hypothesis.penalty
-                       + handicap * sum(not e.known for e in w.hypothesis.effects) for w in found])
+    counts = max(evidence.scale, level * repeated(closest.predicted.rest) ** (1 - 1 / level))
+    louder = replace(evidence, scale=counts)
+    scores = np.array([louder.total(w.hypothesis) for w in found])
     weights = np.exp(-0.5 * (scores - scores.min()))
     made = [replace(w, score=float(s), weight=float(p),
                     share=explained_share(nominal.predicted, w.predicted))

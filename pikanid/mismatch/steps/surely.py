@@ -99,10 +99,9 @@ def _sure(case: Case) -> tuple[Explanations | None, Part | None]:
     search.spent = 0.0  # what is sure has a budget of its own
 
     def weighed() -> tuple[Explanations | None, Part | None]:
-        found = explanations(search.ranked(), search.scale(), case.predicted, noise, settings,
-                             case.ahead)
-        return found, None if found is None else surely_there(
-            found, search.scale(), settings)
+        evidence = case.evidence(search.ranked())
+        found = explanations(evidence, noise)
+        return found, None if found is None else surely_there(found, evidence.scale, settings)
 
     # a search that what happens once has led leaves what lasts half explained
     for _ in range(settings.budget.effects):
