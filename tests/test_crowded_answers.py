@@ -58,3 +58,13 @@ def test_a_formula_whose_form_is_not_told_is_not_confirmed() -> None:
     assert "which form" in given.doubt
     clear = answered([*fits, hypothesis(1030.0, other)], {"outside": 9.0}, refused=("a",))
     assert clear.verdict == "named" and clear.given[0].key == {LAW.key}
+
+
+def test_a_formula_that_was_read_has_to_be_strong_for_its_form() -> None:
+    """Another form would do as well where it is weak: more is asked than of an entry."""
+    assert LAW.read and not A.read
+    asked = DEFAULTS.verdict.minor_strong
+    for more, verdict in ((-1.0, "unconfirmed"), (1.0, "named")):
+        found = answered([hypothesis(1000.0 + asked + more), hypothesis(1000.0, LAW)])
+        assert found.verdict == verdict
+        assert ("too weak for its form" in found.doubt) is (more < 0)
