@@ -171,6 +171,20 @@ def test_what_explains_all_tells_a_colour_that_high_frequencies_hide() -> None:
     assert np.all(np.abs(rho[:, 1] - 0.65) < 0.15)
 
 
+def test_a_colour_is_read_though_times_vary() -> None:
+    """By a fifth of an interval; where the residual is far smoother than its noise, it is not."""
+    rng = np.random.default_rng(5)
+    t = 0.01 * (np.arange(1000) + rng.uniform(-0.21, 0.21, 1000))
+    for seed in range(5):
+        y = coloured(0.8, 7000 + seed)[:1000]
+        level = refined(WHITE, Channel("y", t, y), t, y, 14.4, None, DEFAULTS, True)
+        assert level.rho == pytest.approx(0.8, abs=0.1)
+        assert level.sigma == pytest.approx(np.std(y), rel=0.15)
+    moving = coloured(0.0, 3)[:1000] + 40 * np.sin(12 * t)
+    level = refined(WHITE, Channel("y", t, moving), t, moving, 14.4, None, DEFAULTS)
+    assert (level.sigma, level.rho) == (pytest.approx(1.0, abs=0.1), 0.0)
+
+
 def test_no_explanation_makes_sure_noise_louder() -> None:
     """White noise, and a slow misfit of the same power that is said to be none."""
     t = np.arange(2001) * 0.01

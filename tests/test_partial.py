@@ -146,7 +146,7 @@ def test_nothing_is_sure_of_an_explanation_that_was_not_tried_without_it(
     search = SimpleNamespace(refine=refine, ranked=list, scale=lambda: 1.0, settings=DEFAULTS)
     records = SimpleNamespace(levels=[{}])
     case: Any = SimpleNamespace(search=search, settings=DEFAULTS, later=records, records=records,
-                                predicted=None, ahead=None)
+                                evidence=lambda ranked: SimpleNamespace(scale=1.0))
     _, part = surely._sure(case)
     assert part is not None and part.hypothesis is without
     assert tried == [("coulomb_friction",), ("quadratic_drag",), ()]

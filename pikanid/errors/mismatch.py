@@ -139,6 +139,13 @@ def louder_than_read(p_value: str) -> str:
             "nothing is. A quiet stretch, or the same recorded again, tells which it is.")
 
 
+def may_be_noise(correlations: Sequence[float]) -> str:
+    told = listed(f"{rho:.2f}" for rho in correlations)
+    told = f", with a correlation of {told} between neighbours" if correlations else ""
+    return (f"it may be noise alone{told}, which a quiet stretch or the same recorded again would "
+            "tell")
+
+
 def after_the_inputs() -> str:
     return ("Samples at the end are left out: by the delays that explain the recordings best they "
             "show what came after the inputs were recorded.")

@@ -119,6 +119,16 @@ class Case:
             self.heard(self.search.ranked()[0])
         return True
 
+    def noise_alone(self, quiet: tuple[float, float] | None) -> Records | None:
+        """The records with noise, of whatever colour, that is all that the nominal model leaves;
+        None where no such noise is, or repeats have told it.
+        """
+        if self.repeats is not None:
+            return None
+        other = with_refined_noise(self.records, as_estimate(self.base, self.before), self.rate,
+                                   quiet, True)
+        return other if self._clears(self.base, other) else None
+
     def heard(self, best: Hypothesis) -> bool:
         """Read the noise of held-out recordings from what the best explanation leaves of them;
         whether that made a difference.

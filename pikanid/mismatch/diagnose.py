@@ -155,6 +155,9 @@ def _diagnosed(case: Case, quiet: tuple[float, float] | None, tell: Callable[[st
     if answer.verdict == "unnamed" and not smaller((again := case.detected()).p_value, alpha):
         case.notes.append(errors.louder_than_read(p_text(detection.p_value, 1)))
         return _nothing_left(case, again)
+    if answer.verdict == "unnamed" and (noise := case.noise_alone(quiet)) is not None:
+        correlations = [level.rho for level in noise.levels[0].values() if level.rho]
+        answer = replace(answer, doubt=errors.may_be_noise(correlations))
     mend = None
     if answer.verdict == "unnamed" and case.later is not None:
         mend = patch(case.base, case.model, shape, site, case.records, case.later, case.predicted)

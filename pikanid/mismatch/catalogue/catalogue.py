@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from pikanid import errors
 from pikanid.formula import units
+from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue import channels, decoys, delays, forces, friction
 from pikanid.mismatch.catalogue.backlash import input_backlash
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
@@ -77,6 +78,7 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
 OF_QUANTITY = {
     "Coulomb friction": "a constant loss",
     "Coulomb friction with a rounded reversal": "a rounded constant loss",
+    "viscous damping": "a loss in proportion",
     "quadratic drag": "a quadratic loss",
     "drag with an exponent of its own": "a power-law loss",
     "friction in one direction": "a one-sided constant loss",
@@ -133,12 +135,24 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     stored = {state for effect in effects if effect.states for state in effect.add}
     made = {key: without_store(c) if c.ids == ("fading_memory",) and c.site.v in stored else c
             for key, c in made.items()}
-    own = own_effects(effects, sites, made)
     model = sites[0].model
+    lost = {state for effect in effects if _is_a_loss(effect, model) for state in effect.add}
+    made = {key: c for key, c in made.items()
+            if c.ids != ("linear_drag",) or c.site.v not in lost}
+    own = own_effects(effects, sites, made)
     measured = [*(s.unit for s in model.states), *(o.unit for o in model.outputs)]
     if any(map(units.begins_elsewhere, measured)):
         made = {key: c for key, c in made.items() if _has_meaning(c, model)}
     return tuple(with_twins([*own, *made.values()], effects))
+
+
+def _is_a_loss(effect: Effect, model: Model) -> bool:
+    """Whether it is a loss of one state in proportion to that: one law is offered once."""
+    if len(effect.add) != 1 or len(effect.parameters) != 1:
+        return False
+    (state,) = effect.add
+    more = model.with_effect(effect).equations[state] - model.equations[state]
+    return bool(more == -symbol(effect.parameters[0].name) * symbol(state))
 
 
 def _of_sensor(site: Site, table: Sequence[tuple[Make, tuple[Family, ...]]]

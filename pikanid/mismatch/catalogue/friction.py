@@ -54,8 +54,8 @@ def coulomb_friction(site: Site) -> list[Candidate]:
 
 
 def linear_drag(site: Site) -> list[Candidate]:
-    """Resistance in proportion to the speed, where the model has none."""
-    if not site.q or site.resisted:
+    """Resistance in proportion to the speed, or a loss to a quantity, where the model has none."""
+    if site.resisted:
         return []
     k = Parameter(site.name("k_1"), 0.0, "1/s", (0.0, INF))
     law = term(site, "linear_drag", "viscous damping", f"-{k.name}*{site.v}", k,

@@ -24,6 +24,7 @@ from pikanid.recording.channel import Array, Channel
 
 LONGEST = 50  # numerical: samples of a gap beyond which a line across it leaves nothing that counts
 UNEVEN = 0.2  # numerical: of an interval, by which samples may be off an even grid
+MOVED = 0.3  # numerical: of the noise, by which a residual may change on the way to the grid
 TAPER = 0.2  # numerical: share of a residual that the window tapers, half of it at each end
 TAPERED = 0.9  # numerical: (Σw²)²/(N Σw⁴): share of the ordinates that stay independent under that
 BRIDGED = 0.1  # numerical: least share of white noise's power that a spectrum is divided by
@@ -161,10 +162,17 @@ def _spectrum(level: NoiseModel, t: np.ndarray, residual: np.ndarray, rate: floa
     from scipy.signal.windows import tukey
 
     h = level.interval
-    grid = np.round((t - t[0]) / h).astype(int)
-    uneven = np.max(np.abs((t - t[0]) / h - grid)) > UNEVEN
-    if uneven or len(t) < settings.least_spectrum:
+    if len(t) < settings.least_spectrum:
         return None
+    steps = np.maximum(np.rint(np.diff(t) / h), 1.0)
+    grid = np.concatenate([[0], np.cumsum(steps)]).astype(int)
+    interval, start = np.polyfit(grid, t, 1)
+    off = (t - start) / interval - grid
+    if np.abs(off).max() > UNEVEN:
+        # times that vary blur what is smooth; noise alone is one series, whatever its times
+        moved = off.std() * np.sqrt(np.mean((np.diff(residual) / steps) ** 2))
+        if np.abs(off).max() > 0.5 or moved > MOVED * difference_noise(residual, t):
+            return None
     even = np.interp(np.arange(grid[-1] + 1), grid, residual)
     window = tukey(len(even), TAPER)
     power = np.abs(np.fft.rfft(even * window)) ** 2 / np.sum(window**2)

@@ -243,9 +243,7 @@ class DiagnosisData:
             titles_apart(self.rejected), self.rejected, strict=True)]
 
     def odds(self, h: Explanation) -> str:
-        """How probable a hypothesis is, to stand after its title; of one that leaves something
-        beside what is surely there, nothing.
-        """
+        """How probable a hypothesis is, to stand after its title; nothing where more is left."""
         return "" if self.verdict == "partial" else f" (probability {h.probability:.3f})"
 
     def sentence(self) -> str:
@@ -271,8 +269,9 @@ class DiagnosisData:
             near = enumerated(self.closest.effects) if self.closest else _first(titles)
             return (f"{head}nothing in the catalogue explains it; closest comes {near}, "
                     f"not confirmed{doubt}")
-        nearly = self.closest is not None and self.closest.share_explained >= CLOSE
-        return f"{head}nothing in the catalogue explains {'all of it' if nearly else 'it'}."
+        it = "all of it" if self.closest and self.closest.share_explained >= CLOSE else "it"
+        doubt = f"; {self.doubt}" if self.doubt else ""
+        return f"{head}nothing in the catalogue explains {it}{doubt}."
 
     @property
     def _confirmed_on(self) -> str:
