@@ -189,3 +189,19 @@ def test_what_happened_once_is_not_confirmed_elsewhere() -> None:
     records = cast(Records, None)
     assert "take that effect out" in advice("named", [once], records, 1.0, True)
     assert advice("named", [given], records, 1.0, True) == ""
+
+
+def test_effects_of_one_name_are_told_apart_by_their_equations() -> None:
+    law = explanation("a memory that fades", "k*z")
+    one, other, third = (replace(law.effects[0], name=name, equation=of) for name, of in (
+        ("a memory that fades", "x1"), ("a memory that fades", "x2"), ("an offset", "h")))
+    assert replace(law, effects=(one, other, third)).title == (
+        "a memory that fades in x1', a memory that fades in x2' and an offset")
+    assert replace(law, effects=(one, third)).title == "a memory that fades and an offset"
+
+
+def test_noise_that_may_be_all_is_said() -> None:
+    said = replace(diagnosis("unnamed"), doubt=pk.errors.may_be_noise([0.83])).sentence()
+    assert said.endswith("explains it; it may be noise alone, with a correlation of 0.83 between "
+                         "neighbours, which a quiet stretch or the same recorded again would tell.")
+    assert "correlation" not in pk.errors.may_be_noise([])

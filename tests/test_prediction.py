@@ -196,3 +196,5 @@ def test_what_holds_a_rig_at_rest_is_not_idle() -> None:
     held, moved = (case.predicted(h) for h in (found, case.base))
     assert held is not None and moved is not None and held.motion < 1.0 and not held.acts
     assert worth(friction, held, moved) > 10 * DEFAULTS.least_proof
+    # where no model without it can be run, that there is a motion is all that can be seen
+    assert worth(friction, held, None) == held.motion and worth(friction, None, moved) == 0.0

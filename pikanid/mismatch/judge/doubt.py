@@ -260,11 +260,12 @@ def worth(effect: Candidate, with_it: HeldOut | None, without: HeldOut | None) -
     predictions with it and without it lie, each with its parameters moved within their errors.
 
     What is not there is worth nothing: then the motion has to be seen, or any lasting effect in
-    its place would go unnoticed.
+    its place would go unnoticed; nor is there more to compare with where a model without it cannot
+    be run.
     """
-    if with_it is None or without is None:
+    if with_it is None:
         return 0.0
-    if _once(effect, with_it):
+    if without is None or _once(effect, with_it):
         return with_it.motion
     if idle(effect, with_it):
         return 0.0

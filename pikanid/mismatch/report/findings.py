@@ -58,8 +58,10 @@ class Explanation:
 
     @property
     def title(self) -> str:
-        """In words."""
-        return enumerated([e.name for e in self.effects] or ["nothing"])
+        """In words, with the equation of those that share a name."""
+        names = [e.name for e in self.effects]
+        return enumerated([n if names.count(n) == 1 else f"{n} in {e.equation}'"
+                           for n, e in zip(names, self.effects, strict=True)] or ["nothing"])
 
 
 @dataclass(frozen=True)
@@ -127,9 +129,8 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """Held-out record: errors of each output by name, p-value, the curves of each by name, the
-    names of the recordings, and those of the effects given first that are not met there: these
-    only the train recordings can confirm, where they go on.
+    """Held-out record: errors of each output by name, p-value, the curves of each by name, and
+    names: of the recordings, and of the effects given first that are not met there.
     """
 
     outputs: Mapping[str, OutputError]
@@ -249,8 +250,8 @@ class DiagnosisData:
     def sentence(self) -> str:
         """The verdict as an engineer would put it."""
         if self.verdict == "none":
-            return (f"The model explains the recording: nothing beyond noise (p = "
-                    f"{self.p_value:.2g}).")
+            p = f"p = {self.p_value:.2g}"
+            return f"The model explains the recording: nothing beyond noise ({p})."
         head = f"Something is missing in the model ({p_text(self.p_value, 1)}): "
         titles = list(dict.fromkeys(titles_apart(self.hypotheses)))
         if self.verdict == "named" or (self.verdict == "set" and len(titles) == 1):
