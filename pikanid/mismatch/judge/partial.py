@@ -233,8 +233,8 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Set
     if smaller(total, 1 - rule.rate):
         return Doubtful(kind, effect, f"its probability is {total:.3g}")
     if smaller(kappa, asked):
-        return Doubtful(kind, effect, "without it the best explanation leaves "
-                        f"{kappa:.2g} times as much, sure from {asked:.2g} on")
+        return Doubtful(kind, effect, "without it the best explanation leaves " + (
+            f"{kappa:.2g} times as much, sure from {asked:.2g} on" if kappa >= 1 else "less"))
     found_more = min((_left(w) for w in others), default=np.inf) - _left(lead)
     if below(found_more, strong):
         return Doubtful(kind, effect, "it explains so little that it may stand for anything of its "
