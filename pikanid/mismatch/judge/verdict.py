@@ -17,6 +17,7 @@ from pikanid.mismatch.judge.same_law import integer_laws, merged_twins, signatur
 
 NO_ENTRY = "holds a law of no catalogue: others may do the same"
 
+
 def settle(evidence: Evidence) -> Answer:
     """Choose what is given."""
     tried = evidence.tried
