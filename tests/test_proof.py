@@ -36,10 +36,11 @@ def test_what_acts_in_no_other_recording_is_proved_by_a_motion_without_it(
     assert still.verdict == "unconfirmed" and "could not have refuted a" in still.doubt
     weak = answered([hypothesis(1090.0), hypothesis(1000.0, a)], inert=inert)
     assert weak.verdict == "unconfirmed" and "a does not act in any other" in weak.doubt
-    # another effect, that lasts, would take up most of it, and does not act there either
-    for b, acting in ((B, inert), (B, (*inert, "b"))):
-        most = answered([*fits, hypothesis(1300.0, b)], inert=acting)
-        assert ("a lasting effect would take up most" in most.doubt) is ("b" not in acting)
+    # another effect, that lasts, would take up most of it, or does not act there, or cannot be run
+    rivals = [*fits, hypothesis(1300.0, B)]
+    assert "a lasting effect would take up most" in answered(rivals, inert=inert).doubt
+    assert not answered(rivals, inert=(*inert, "b")).doubt
+    assert not answered(rivals, inert=inert, stiff=("b",)).doubt
 
 
 def test_what_proves_an_effect_grows_with_the_certainty_that_is_asked() -> None:

@@ -75,10 +75,11 @@ def hypothesis(chi2: float, *effects: Candidate, spread: float = 0.0) -> Hypothe
 def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
              refused: tuple[str, ...] = (), unseen: tuple[str, ...] = (),
              contradicted: tuple[str, ...] = (), inert: tuple[str, ...] = (),
-             misfit: dict[str, float] | None = None, motion: float = 1e4) -> Answer:
+             misfit: dict[str, float] | None = None, motion: float = 1e4,
+             stiff: tuple[str, ...] = ()) -> Answer:
     """The answer with these held-out evidences (0 unless given) and misfits (1), some effects
     refuted there, some not to be seen or not acting, some contradicted by all recordings together,
-    and with so much motion there.
+    with so much motion there, where some cannot be run.
     """
     fits = [replace(h, minimum=replace(h.minimum, r=h.minimum.r * np.sqrt(
         rounded(h.minimum.chi2) / h.minimum.chi2))) for h in fits]
@@ -88,7 +89,9 @@ def answered(fits: list[Hypothesis], deviance: dict[str, float] | None = None,
         p = 1e-6 if h.key & set(where) else 0.5
         return cast(Detection, SimpleNamespace(p_value=p))
 
-    def predicted(h: Hypothesis) -> HeldOut:
+    def predicted(h: Hypothesis) -> HeldOut | None:
+        if h.key & set(stiff):
+            return None
         name = "+".join(sorted(h.key))
         value = rounded((deviance or {}).get(name, 0.0))
         rest = np.array([10.0 * (one in h.key) * (one not in unseen) for one in keys])

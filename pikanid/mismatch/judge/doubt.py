@@ -236,10 +236,12 @@ def no_size(effect: Candidate, h: Hypothesis, overdispersion: float, settings: S
 
 
 def _lasts(h: Hypothesis, rest: frozenset[str], evidence: Evidence) -> bool:
-    """Whether a hypothesis is a rest and effects that act in held-out recordings as well."""
+    """Whether a hypothesis is a rest and effects that act in held-out recordings as well; it is
+    none where it cannot be run there.
+    """
     seen = evidence.predict(h)
-    return rest < h.key and not any(e.absent or (seen is not None and idle(e, seen))
-                                    for e in h.effects if e.key not in rest)
+    return seen is not None and rest < h.key and not any(
+        e.absent or idle(e, seen) for e in h.effects if e.key not in rest)
 
 
 def _once(effect: Candidate, seen: HeldOut) -> bool:
