@@ -10,7 +10,7 @@ import pytest
 
 import pikanid as pk
 from pikanid.mismatch.data.whitened import Records
-from pikanid.mismatch.report.advice import PROVE, STRENGTHEN, advice, explore
+from pikanid.mismatch.report.advice import PROVE, REPEAT, STRENGTHEN, advice, explore
 from pikanid.mismatch.report.findings import Explanation
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
@@ -82,6 +82,9 @@ def test_other_verdicts_have_sentences_of_their_own(records: Records) -> None:
     assert explore(True, RATE) in advice("unconfirmed", (FRICTION,), records, RATE, True)
     assert explore(False, 0.0) in advice("partial", (FRICTION,), records, 0.0, True, driven=False)
     assert advice("unconfirmed", (FRICTION,), records, RATE, False) == PROVE
+    once = cast(Explanation, SimpleNamespace(
+        title="a push", effects=(SimpleNamespace(ids=("disturbance",), once=True),)))
+    assert advice("unconfirmed", (once,), records, RATE, True, weak=True) == REPEAT
     idle = advice("unconfirmed", (FRICTION,), records, RATE, True, weak=True, idle=["a wall"])
     assert "a wall acts there as well" in idle
     assert advice("unconfirmed", (FRICTION,), records, RATE, True, weak=True) == STRENGTHEN

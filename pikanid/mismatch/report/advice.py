@@ -21,6 +21,8 @@ from pikanid.model.parts import Input
 ALIKE = 1.0  # numerical: difference in chi-squared, up to which hypotheses fit alike
 PROVE = ("Record the system once more, driven differently and over another range of amplitudes, "
          "and give that recording as held-out: it decides what is confirmed.")
+REPEAT = ("Record the same again, under the same conditions: what has happened once is not there "
+          "then, what lasts is.")
 STRENGTHEN = ("Record the same again for several times as long, with a larger swing or with less "
               "noise: what an effect gains in chi-squared grows with the time, and with the square "
               "of its size over the noise.")
@@ -69,6 +71,8 @@ def advice(verdict: Verdict, given: Sequence[Explanation], records: Records, rat
     if verdict == "partial":
         what = "be sure of more" if all_explained else "learn what is left"
         return f"To {what}, record {explore(driven, rate)}."
+    if given and weak and any(e.once for e in given[0].effects):
+        return REPEAT
     if given and weak and idle:
         return ("Give a held-out recording in which the motion and the input are as large as in "
                 f"this one, so that {listed(idle)} acts there as well: it decides what is "
