@@ -157,7 +157,9 @@ def _slice(job: tuple[str, int, int, int]) -> tuple[str, Tally, int]:
     """The tally of a slice, also where an input ends the process itself."""
     name, seed, start, stop = job
     total, memory = Tally(), 0
-    context = multiprocessing.get_context("fork")
+    # forked from a process that holds these libraries and nothing of its caller's
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__])
     while start < stop:
         ours, theirs = context.Pipe(duplex=False)
         worker = context.Process(target=_work, args=(name, seed, start, stop, theirs))

@@ -313,5 +313,7 @@ def test_limits_are_out_of_reach_in_any_unit() -> None:
                                       {"u": "V"})
     for c in candidates(sites(counts, (recording,))):
         assert all(p.bounds[0] <= p.value <= p.bounds[1] for p in c.parameters), c.key
+        if {"sensor_saturation", "wall_impact"} & {*c.ids}:
+            assert c.parameters[0].value > 1e9, c.key
         if c.fits:
             c.applied(counts)

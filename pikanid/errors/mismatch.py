@@ -140,10 +140,10 @@ def louder_than_read(p_value: str) -> str:
 
 
 def may_be_noise(correlations: Sequence[float]) -> str:
-    told = listed(f"{rho:.2f}" for rho in correlations)
-    told = f", with a correlation of {told} between neighbours" if correlations else ""
-    return (f"it may be noise alone{told}, which a quiet stretch or the same recorded again would "
-            "tell")
+    found = listed(f"{rho:.2f}" for rho in correlations)
+    colour = f", with a correlation of {found} between neighbours" if correlations else ""
+    return (f"it may be noise alone{colour}, which a quiet stretch or the same recorded again "
+            "would tell")
 
 
 def after_the_inputs() -> str:

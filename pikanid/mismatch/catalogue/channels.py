@@ -10,7 +10,7 @@ import numpy as np
 from pikanid.formula import units
 from pikanid.mismatch.catalogue.begun import begun
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel, TangentDirection, View
-from pikanid.mismatch.catalogue.site import Site, may_be_under_way
+from pikanid.mismatch.catalogue.site import Site, may_be_under_way, out_of_reach
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 from pikanid.problem.held import PIECES
@@ -68,7 +68,8 @@ def sensor_nonlinearity(site: Site) -> list[Candidate]:
 
 def sensor_saturation(site: Site) -> list[Candidate]:
     """The sensor clips, on both sides alike or on one."""
-    limit = Parameter(site.name("limit"), 1e6, site.output.unit, (1e-9, INF))
+    limit = Parameter(site.name("limit"), out_of_reach(site.half_range), site.output.unit,
+                      (1e-9, INF))
     o = site.output.name
     found = []
     for side, words in SIDES.items():
@@ -206,7 +207,7 @@ def input_limits(site: Site) -> list[Candidate]:
         width = Parameter(site.name("u_dead", site.variant(u)), 0.0, unit, (0.0, INF))
         for side, words in SIDES.items():
             lowest = _lowest_limit(*site.ranges[u], side)
-            limit = Parameter(site.name("u_max", site.variant(u)), max(1e6, 10 * lowest), unit,
+            limit = Parameter(site.name("u_max", site.variant(u)), out_of_reach(lowest), unit,
                               (lowest, INF))
 
             def clipped(view: View, u: str = u, p: Parameter = limit, side: str = side

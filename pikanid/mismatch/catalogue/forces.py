@@ -10,7 +10,7 @@ import sympy as sp
 
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, Powers, TangentDirection, View
-from pikanid.mismatch.catalogue.site import Site
+from pikanid.mismatch.catalogue.site import Site, out_of_reach
 from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
@@ -141,7 +141,7 @@ def wall_impact(site: Site) -> list[Candidate]:
     walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.half_range, np.array([0.03, 0.1, 0.3])
 
     # what is touched about the rest is no wall but a spring that differs between the sides
-    w = Parameter(site.name("wall"), max(1e6, 10 * site.half_range), site.unit,
+    w = Parameter(site.name("wall"), out_of_reach(site.half_range), site.unit,
                   (NEAREST * site.half_range, INF))
     k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
 

@@ -224,7 +224,7 @@ def _rounded(clipped: Candidate) -> Candidate:
     """
     site, o, old = clipped.site, clipped.site.output.name, clipped.parameters[0]
     unit = _unit(clipped, o)
-    limit = Parameter(site.name("limit_soft"), 1e6, unit, old.bounds)
+    limit = Parameter(site.name("limit_soft"), old.value, unit, old.bounds)
     if not clipped.variant:
         return _curve(clipped, o, "sensor_rounded", f"{limit.name}*tanh({o}/{limit.name})",
                       (limit,), lambda values, states: [

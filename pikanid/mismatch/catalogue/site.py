@@ -183,6 +183,15 @@ class Site:
                          self.taken)
 
 
+def out_of_reach(reach: float) -> float:
+    """A limit that nothing meets, in whatever unit.
+
+    >>> out_of_reach(0.3), out_of_reach(1e9)
+    (1000000.0, 10000000000.0)
+    """
+    return max(1e6, 10 * reach)
+
+
 def estimates_a_start(model: Model) -> bool:
     """Whether some initial value is estimated."""
     return any(q.name in model.parameter_names and model.parameter(q.name).free

@@ -18,8 +18,9 @@ class Answer:
     """Verdict, hypotheses given (most probable first) and the closest ones not given.
 
     `twins` lists, for a hypothesis given, the effects that stand for each other in it; `reasons`
-    why others are not given, and `doubt` what keeps the first one from being confirmed.  `rivals`
-    are laws outside the catalogue that explain all as well, but are not likely enough to be given.
+    why others are not given, and `doubt` what keeps the first one from being confirmed or, where
+    nothing explains what is missing, that it may be noise.  `rivals` are laws outside the catalogue
+    that explain all as well, but are not likely enough to be given.
     `part` is what is surely there although something is left, `closest` what comes closest where
     nothing is, and `channels` are those in which something is, whatever it is.
     """
