@@ -83,5 +83,5 @@ def from_tapes(model: Model, method: Method = "explicit") -> Any:
     """Stands for `compiled`: tapes for all but the slosh pendulum, which many tests share."""
     structure = Structure(model)
     if method == "explicit" and can_run(model) and structure != Structure(systems.sloshing()):
-        return translated.Machine(tape(structure), (), False)
+        return translated.Machine(tape(structure), (), False, method)
     return compiler.compiled(model, method)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.report.advice import PROVE, REPEAT, STRENGTHEN, advice, explore
 from pikanid.mismatch.report.findings import Explanation
 from pikanid.mismatch.settings.settings import DEFAULTS

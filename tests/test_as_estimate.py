@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.as_estimate import as_estimate
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pikanid as pk
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.judge.beginning import begun
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import pikanid as pk
 from pikanid.mismatch.data.covered import covered
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 

@@ -13,7 +13,7 @@ import pikanid as pk
 import pikanid.mismatch.diagnose as module
 from pikanid.estimate import Estimate
 from pikanid.mismatch.beyond.region import Interval
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.judge.answer import Answer, Verdict
 from pikanid.mismatch.report.advice import advice
 from pikanid.mismatch.report.diagnosis import Diagnosis

@@ -18,7 +18,7 @@ from pikanid.mismatch.beyond.patch import FreeCurve
 from pikanid.mismatch.catalogue.channels import sensor_nonlinearity
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.settings.settings import DEFAULTS

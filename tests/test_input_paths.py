@@ -14,7 +14,8 @@ import pikanid as pk
 from pikanid import errors
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model.parts import Hold, Parameter

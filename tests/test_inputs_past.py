@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from pikanid.mismatch.data.outliers import without_lone, without_outliers
 from pikanid.mismatch.data.preparation import with_refined_noise
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model, systems
 from pikanid.noise.level import NoiseModel

@@ -15,7 +15,8 @@ from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.noise_level import refined
 from pikanid.mismatch.data.outliers import without_outliers
 from pikanid.mismatch.data.preparation import averaged, oversampling
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.residual_tests import (
     detect,
     frequency_bands,

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid.mismatch.data.noise_level import first_level, refined
 from pikanid.mismatch.data.preparation import prepared, set_aside
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise import level as noise
 from pikanid.noise.floor import repeated, rounding_noise, rounding_step

@@ -14,7 +14,7 @@ from pikanid.mismatch.catalogue.friction import coulomb_friction
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.noise_level import bridged, refined
 from pikanid.mismatch.data.outliers import lone, without_lone, without_outliers
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel

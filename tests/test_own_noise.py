@@ -8,7 +8,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.data.noise_level import louder
 from pikanid.mismatch.data.own_noise import with_own_noise
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 from pikanid.recording import Channel

@@ -11,7 +11,7 @@ import pikanid as pk
 from pikanid.formula.expressions import symbol
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.judge.prediction import HeldOut, held_out
 from pikanid.mismatch.report.findings import OutputError, Proof

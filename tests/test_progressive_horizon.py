@@ -8,7 +8,8 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.catalogue.forces import wall_impact
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.extended import extended
 from pikanid.mismatch.fitting.progressive_horizon import progressive_horizon, rough
 from pikanid.mismatch.settings.settings import DEFAULTS

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -12,7 +14,10 @@ from pikanid.mismatch.detect.propagation import (
     add_forces,
     add_outputs,
     step_matrices,
+    stiff_matrices,
 )
+
+Method = Callable[[np.ndarray, np.ndarray, int], tuple[np.ndarray, np.ndarray]]
 
 T = np.linspace(0.0, 4.0, 401)
 
@@ -29,16 +34,20 @@ def by_dop853(force: object, start: np.ndarray) -> np.ndarray:
     return np.asarray(done.y.T)
 
 
-def steps(parts: int = 1) -> tuple[np.ndarray, np.ndarray]:
+METHODS = [step_matrices, stiff_matrices]
+
+
+def steps(parts: int = 1, method: Method = step_matrices) -> tuple[np.ndarray, np.ndarray]:
     h = np.diff(T)
     A = np.stack([np.array([matrix(t) for t in T[:-1] + share * h]) for share in (0.0, 0.5, 1.0)])
-    return step_matrices(A, h, parts)
+    return method(A, h, parts)
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("parts", "error"), [(1, 2e-4), (4, 1e-6)])
-def test_forces_in_every_equation_and_beginnings_are_carried_along(parts: int, error: float
-                                                                   ) -> None:
-    M, B = steps(parts)
+def test_forces_in_every_equation_and_beginnings_are_carried_along(
+        parts: int, error: float, method: Method) -> None:
+    M, B = steps(parts, method)
     rng = np.random.default_rng(3)
     start = np.zeros((TOGETHER, 3))
     start[:4] = rng.standard_normal((4, 3))
@@ -60,10 +69,11 @@ def test_forces_in_every_equation_and_beginnings_are_carried_along(parts: int, e
     assert not y[4:].any()
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("parts", [1, 4])
-def test_constant_matrix_gives_the_exponential(parts: int) -> None:
+def test_constant_matrix_gives_the_exponential(parts: int, method: Method) -> None:
     a = np.array([[0.0, 1.0], [-4.0, -0.3]])
-    M, _ = step_matrices(np.broadcast_to(a, (3, 200, 2, 2)).copy(), np.full(200, 0.02), parts)
+    M, _ = method(np.broadcast_to(a, (3, 200, 2, 2)).copy(), np.full(200, 0.02), parts)
     whole = np.linalg.multi_dot(M[::-1])
     assert whole == pytest.approx(expm(4.0 * a), abs=1e-6 / parts**4)
 
@@ -74,6 +84,16 @@ def test_a_system_that_forgets_at_once_stays_stable_in_parts() -> None:
     add_forces(B, np.full((1, 51), 300.0), np.array([0]), np.array([0]), G)
     add_outputs(M, G, np.zeros((TOGETHER, 1)), np.ones((51, 1, 1)), y)
     assert y[0, 0, -1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_stiff_state_follows_the_others() -> None:
+    rate = 1e6  # x' = rate*(y - x), y' = -x: x is y, and both decay
+    a = np.array([[-rate, rate], [-1.0, 0.0]])
+    M, _ = stiff_matrices(np.broadcast_to(a, (3, 50, 2, 2)).copy(), np.full(50, 0.02), 1)
+    end = np.linalg.multi_dot(M[::-1]) @ [0.0, 1.0]
+    assert end == pytest.approx(expm(a) @ [0.0, 1.0], rel=1e-5)
+    M, _ = step_matrices(np.broadcast_to(a, (3, 50, 2, 2)).copy(), np.full(50, 0.02), 64)
+    assert not np.abs(M).max() < 1e6  # by the classical method it runs away
 
 
 def test_what_is_seen_already_stays() -> None:

@@ -10,7 +10,7 @@ import pytest
 import pikanid as pk
 from pikanid.mismatch.data.left_out import LeftOut
 from pikanid.mismatch.data.put_back import put_back
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel
 

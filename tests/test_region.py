@@ -13,7 +13,7 @@ from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.answer import Answer

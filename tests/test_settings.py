@@ -20,7 +20,8 @@ from typer.testing import CliRunner
 import pikanid as pk
 from pikanid import errors
 from pikanid.cli import app
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.report.locate import smallest
 from pikanid.mismatch.search.search import Search

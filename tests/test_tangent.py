@@ -7,7 +7,8 @@ import numpy as np
 import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.tangent import Directions, directions
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.noise.level import NoiseModel

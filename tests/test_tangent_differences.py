@@ -14,7 +14,8 @@ from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.design.response import Watched
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.settings.settings import DEFAULTS

@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pikanid as pk
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.data.stretches import as_one
-from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.model import Model, systems
 from pikanid.problem.problem import Problem

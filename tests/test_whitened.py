@@ -12,7 +12,8 @@ import pikanid as pk
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.preparation import prepared
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.prediction import HeldOut, held_out

@@ -17,7 +17,8 @@ from pikanid.mismatch.data.outliers import without_lone
 from pikanid.mismatch.data.own_noise import with_own_noise
 from pikanid.mismatch.data.preparation import with_refined_noise
 from pikanid.mismatch.data.put_back import put_back
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.as_estimate import as_estimate

@@ -27,6 +27,7 @@ import numpy as np
 from numba import njit
 
 from pikanid.storage.jit import cached_jit
+from pikanid.simulation.sdirk_table import NODES, SDIRK
 from pikanid.simulation.support import (
     Seen, log_abs, positive_power, power_slope, sgn, solve_small, spline_basis, work_dtype)
 

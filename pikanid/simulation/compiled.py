@@ -90,7 +90,7 @@ def _name(model: Model, method: Method) -> str:
     kernels = sorted(k for k in (_HERE / "kernels").glob("*.py") if not k.name.startswith("tape"))
     generators = (_HERE / f"{n}.py" for n in (
         "compiled", "codegen", "smooth_step", "spline_lines", "printing", "constants", "lowering",
-        "support", "layout"))
+        "support", "layout", "sdirk_table"))
     return named(
         "model", method, model.state_names, model.input_names, model.parameter_names,
         [to_text(e) for e in model.equations.values()],

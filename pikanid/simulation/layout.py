@@ -18,6 +18,34 @@ class Seen(NamedTuple):
     inside: np.ndarray
 
 
+class Stages(NamedTuple):
+    """Scratch for a step of a tape: slopes kx (stages, n) and kS (stages, n, A), and the states x
+    (n,) and S (n, A) of a stage.
+    """
+
+    kx: np.ndarray
+    kS: np.ndarray
+    x: np.ndarray
+    S: np.ndarray
+
+
+class Newton(NamedTuple):
+    """As `Stages`, for an implicit step: where a stage starts (n,), derivatives dx (registers, n)
+    by the states, `slide` (switches, n) of signs by them, and the linear equations of a stage.
+    """
+
+    kx: np.ndarray
+    kS: np.ndarray
+    x: np.ndarray
+    S: np.ndarray
+    start: np.ndarray
+    dx: np.ndarray
+    matrix: np.ndarray
+    change: np.ndarray
+    right: np.ndarray
+    slide: np.ndarray
+
+
 def work_dtype(n: int, m: int, P: int, q: int, k: int, stages: int, constants: int, rows: int,
                width: int) -> np.dtype:
     """One record of scratch for n states, m inputs, P parameters, q outputs and k switches.

@@ -24,7 +24,8 @@ from pikanid.storage.cache import kept, named, processor, sources
 
 FUNCTIONS = ("values_prelude", "tangents_prelude", "put", "put_tangents", "step", "step_tangents",
              "values_f", "tangents_f", "look_h", "values_h_rate", "look_g", "values_g",
-             "tangents_g", "values_g_rate", "tangents_g_rate", "signs_g_rate")
+             "tangents_g", "values_g_rate", "tangents_g_rate", "signs_g_rate", "states_f",
+             "states_g_rate")
 # that take the place of others where no derivatives are asked for
 _WITHOUT = {"put_tangents": "put", "step_tangents": "step", "look_h": "look_h_only"}
 _NOTHING = "nothing"
@@ -34,7 +35,7 @@ _lock = threading.Lock()
 @dataclass(frozen=True)
 class Native:
     """Addresses of `FUNCTIONS`: `values_*` of groups, derivatives by the estimated parameters
-    (`tangents_*`) and by signs, all of (registers, derivatives); and what is around them
+    (`tangents_*`), by signs and by states, all of (registers, derivatives); and what is around them
     (`native_step`).  In `plain` they are those of runs without derivatives.  `code` keeps them
     alive.
     """
@@ -45,14 +46,16 @@ class Native:
 
 
 @functools.lru_cache(maxsize=512)
-def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> Native:
+def native(tape: Tape, active: tuple[int, ...], moving_inputs: bool, implicit: bool = False
+           ) -> Native:
     """What integrators of a tape call, for derivatives by the `active` parameters and initial
     states.
 
-    `moving_inputs`: the inputs move with the parameters, too, as where delays are estimated.
+    `moving_inputs`: the inputs move with the parameters, too, as where delays are estimated;
+    `implicit`: the integrator asks for derivatives by the states.
     """
-    engine = _linked(tape, ("integrated", active, moving_inputs),
-                     lambda: _text(tape, active, moving_inputs))
+    engine = _linked(tape, ("integrated", active, moving_inputs, implicit),
+                     lambda: _text(tape, active, moving_inputs, implicit))
     plain = (_NOTHING if name.startswith("tangents") else _WITHOUT.get(name, name)
              for name in FUNCTIONS)
     return Native(_addresses(engine, FUNCTIONS), _addresses(engine, tuple(plain)), engine)
@@ -98,17 +101,17 @@ def _addresses(engine: Any, names: Sequence[str]) -> np.ndarray:
     return np.array(found)
 
 
-def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:
+def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool, implicit: bool) -> str:
     """All functions that an integrator of this tape may call; the others do `nothing`."""
     lanes, moving, K = len(active), moving_inputs and len(active) > 0, tape.sizes[4]
     live, signed = _live(tape, active, moving), reached(tape, set(_signs(tape)))
-    groups = ["prelude", "h", *(["f", "g", "g_rate"] if K else ["f"] if moving else [])]
+    groups = ["prelude", "h", *(["f", "g", "g_rate"] if K else ["f"] if moving or implicit else [])]
     parts = [DECLARED, TABLES, Writer(_NOTHING).text(),
              *(text for group in groups for text in _of_group(tape, group, live, lanes)),
              step("step", tape, 0, live, False), look("look_h_only", tape, 0, False, "values_h")]
-    if K or moving:  # a smooth model is looked at before an input that moves, and nowhere else
+    if K or moving or implicit:  # else a smooth model is not looked at
         parts.append(look("put", tape, 0, False))
-    if K and lanes:
+    if (K or implicit) and lanes:
         parts.append(look("put_tangents", tape, lanes, moving))
     if moving:
         parts.append(_values(tape, "h_rate"))
@@ -118,6 +121,11 @@ def _text(tape: Tape, active: tuple[int, ...], moving_inputs: bool) -> str:
     if K:
         parts += [look("look_g", tape, 0, False, "values_g"),
                   _tangents(tape, "g_rate", "signs_g_rate", signed, K)]
+    if implicit:
+        n = tape.sizes[0]
+        by_states = reached(tape, {*range(1, 1 + n), *_signs(tape)})
+        parts += [_tangents(tape, group, f"states_{group}", by_states, n)
+                  for group in (["f", "g_rate"] if K else ["f"])]
     return "\n".join(_with_helpers(parts))
 
 

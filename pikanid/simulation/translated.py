@@ -1,7 +1,8 @@
 """`Translated`: a simulator that runs a model from its tape, without compiling the model.
 
-Two kernels, one for models whose right-hand side jumps and one for all others, are compiled once
-and serve every model; its formulas become machine code in a few milliseconds.
+Three kernels, one for models whose right-hand side jumps, one for all others and an implicit one
+for all, are compiled once and serve every model; its formulas become machine code in a few
+milliseconds.
 """
 
 from __future__ import annotations
@@ -23,15 +24,24 @@ from pikanid.simulation.tape import GROUPS, Tape, can_run, tape
 
 _NAMES = [name.upper() for name in FUNCTIONS]
 _HEADER = f'''"""Integrators of tapes; generated from the kernels."""
+import math
+
 import numpy as np
+from numba import njit
 
 from pikanid.storage.jit import cached_jit
+from pikanid.simulation.layout import Newton, Stages
 from pikanid.simulation.native_call import call_look, call_native, call_step
+from pikanid.simulation.sdirk_table import NODES, SDIRK
 from pikanid.simulation.support import solve_small
 
 
 def called(function):
     return cached_jit(error_model="numpy", _nrt=False)(function)
+
+
+def inlined(function):
+    return njit(error_model="numpy", inline="always", _nrt=False)(function)
 
 
 {", ".join(name.upper() for name in GROUPS)} = range({len(GROUPS)})
@@ -69,12 +79,12 @@ class Translated(Simulator):
 
     def module(self, method: Method) -> Any:
         """The integrator, bound to the model's tape."""
-        if method != "explicit" or not can_run(self.acting):
+        if not can_run(self.acting):
             return super().module(method)
         if method not in self._kept:
             delayed = not self._undelayed and bool(self._delayed_by[list(self.estimated)].any())
             self._kept[method] = machine(
-                tape(Structure(self.acting), self.located), self.estimated, delayed)
+                tape(Structure(self.acting), self.located), self.estimated, delayed, method)
         return self._kept[method]
 
 
@@ -82,9 +92,11 @@ class Machine:
     """What `Simulator` asks of a compiled module: `integrate`; each thread has its own registers.
     """
 
-    def __init__(self, program: Tape, estimated: tuple[int, ...], delayed: bool):
+    def __init__(self, program: Tape, estimated: tuple[int, ...], delayed: bool, method: Method):
         self.program, self.estimated, self.delayed = program, estimated, delayed
-        self.kernel = _kernel(program.sizes[4] > 0)
+        self.implicit = method == "implicit"
+        self.kernel = _kernel("implicit" if self.implicit else
+                              "hybrid" if program.sizes[4] else "smooth")
         self.own = threading.local()
 
     def integrate(self, T: np.ndarray, pieces: np.ndarray, U: np.ndarray, V: np.ndarray,
@@ -104,24 +116,24 @@ class Machine:
         key = (active, delayed)
         if key not in kept:
             wanted = (active, delayed) if active else (self.estimated, self.delayed)
-            code = native(self.program, *wanted)
+            code = native(self.program, *wanted, self.implicit)
             kept[key] = bound(
                 self.program, active, code.addresses if active else code.plain), code
         return kept[key][0]
 
 
 @functools.lru_cache(maxsize=512)
-def machine(program: Tape, estimated: tuple[int, ...], delayed: bool) -> Machine:
+def machine(program: Tape, estimated: tuple[int, ...], delayed: bool, method: Method) -> Machine:
     """The one machine of a tape, for the parameters whose sensitivities will be asked for."""
-    return Machine(program, estimated, delayed)
+    return Machine(program, estimated, delayed, method)
+
+
+_KERNELS = {"smooth": ("tape", "tape_smooth"),
+            "hybrid": ("tape", "tape_signs", "tape_rk4", "tape_hybrid"),
+            "implicit": ("tape", "tape_signs", "tape_sdirk", "tape_hybrid")}
 
 
 @functools.cache
-def _kernel(hybrid: bool) -> ModuleType:
-    kind = "hybrid" if hybrid else "smooth"
-    return generated(f"tape_{kind}", _source(kind))
-
-
-def _source(kind: str) -> str:
-    parts = ["tape", *(["tape_signs"] if kind == "hybrid" else []), f"tape_{kind}"]
-    return "\n\n".join([_HEADER.rstrip("\n") + "\n", *map(kernel_text, parts)])
+def _kernel(kind: str) -> ModuleType:
+    return generated(f"tape_{kind}", "\n\n".join(
+        [_HEADER.rstrip("\n") + "\n", *map(kernel_text, _KERNELS[kind])]))

@@ -31,7 +31,8 @@ from pikanid.approximators.bspline import uniform_knots
 from pikanid.mismatch.beyond.penalised import Penalised, critical_value
 from pikanid.mismatch.catalogue.candidate import Candidate, TangentDirection
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import condensed
 from pikanid.mismatch.detect.tangent import SIGNS, Tangent
 from pikanid.mismatch.fitting.hypothesis import Hypothesis

@@ -20,7 +20,8 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.beyond.force_shape import Edge, ForceShape
 from pikanid.mismatch.catalogue.candidate import Candidate, Channel
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.prediction import HeldOut

@@ -18,7 +18,8 @@ from pikanid.mismatch.catalogue.output_curve import output_curves
 from pikanid.mismatch.catalogue.output_drift import output_drifts
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.catalogue.sites import coordinates, span_of
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.model import Effect, EffectForm, Model
 from pikanid.model.binding import Surroundings, bound
 from pikanid.recording import Recording

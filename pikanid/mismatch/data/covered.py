@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.model import Model
 from pikanid.problem.evaluated import delays
 from pikanid.problem.late import sample_delays

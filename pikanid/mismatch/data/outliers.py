@@ -14,8 +14,8 @@ from scipy.stats import binom
 
 from pikanid import errors
 from pikanid.mismatch.data.left_out import LeftOut
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.data.stretches import as_one
-from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.noise.level import high_band_sigma

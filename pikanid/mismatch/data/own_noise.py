@@ -10,7 +10,7 @@ import numpy as np
 
 from pikanid.mismatch.data.noise_level import louder
 from pikanid.mismatch.data.outliers import from_inputs
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.noise.level import NoiseModel
 
 Residual = tuple[int, str, np.ndarray, np.ndarray]  # recording, output, times, values

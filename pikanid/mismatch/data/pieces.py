@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pikanid.mismatch.data.preparation import with_sigma
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.model import Model
 from pikanid.problem.problem import Problem
 from pikanid.strategies.cuts import NODE, free_start, in_segments

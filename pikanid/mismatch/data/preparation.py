@@ -12,8 +12,8 @@ from pikanid.estimate import Estimate
 from pikanid.estimate.data import Fit
 from pikanid.mismatch.data.noise_level import first_level, refined
 from pikanid.mismatch.data.outliers import from_inputs, without_lone, without_outliers
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.data.stretches import as_one
-from pikanid.mismatch.data.whitened import Records
 from pikanid.mismatch.settings.budget import Budget
 from pikanid.mismatch.settings.noise import NoiseSettings
 from pikanid.mismatch.settings.settings import Settings

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from pikanid.mismatch.data.left_out import LeftOut
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.model import Model
 
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from pikanid import errors
-from pikanid.mismatch.data.left_out import LeftOut
-from pikanid.mismatch.settings.settings import Settings
+from pikanid.mismatch.data.records import Records
 from pikanid.model import Model
-from pikanid.noise.level import NoiseModel
 from pikanid.problem.problem import Problem
-from pikanid.recording import Recording
+from pikanid.simulation.compiled import Method
 from pikanid.simulation.simulator import Response, Steps
 from pikanid.simulation.translated import Translated
 
@@ -23,87 +20,9 @@ SHARE = 0.05  # numerical: of the noise that a simulation may err by, 1/400 of i
 OF_MISFIT = 0.2  # numerical: of the root of χ² per row, that a simulation may err more by
 TOO_ROUGH = 20  # numerical: times the error that steps are chosen for: beyond, they are none
 SHARP = 8  # numerical: steps a sample from which on stopping at corners is cheaper than finer steps
+STIFF = 4  # numerical: implicit steps a sample, at most, where the explicit method fails
+IMPLICIT = 10  # numerical: explicit steps that one of those takes the time of
 FINEST, COARSEST = 64, 16  # numerical: steps a sample, at most; of a motion that misses grossly
-
-
-@dataclass(frozen=True)
-class Records:
-    """Recordings as they are judged: without outliers, each output with its noise level, by which
-    settings, and what the nominal model's parameters were given as, which tells their sizes.
-    Of segments of longer recordings `cut_from` says which; empty, each is a recording of its own.
-    `left_out` holds the outliers.
-    """
-
-    recordings: tuple[Recording, ...]
-    levels: tuple[dict[str, NoiseModel], ...]
-    settings: Settings
-    guess: Mapping[str, float] = field(default_factory=dict)
-    cut_from: tuple[int, ...] = ()
-    left_out: tuple[LeftOut, ...] = ()
-
-    @property
-    def owners(self) -> tuple[int, ...]:
-        """The longer recording that each one is a segment of."""
-        return self.cut_from or tuple(range(len(self.recordings)))
-
-    @property
-    def stretches(self) -> list[list[int]]:
-        """Numbers of the recordings that are segments of the same one; most are alone."""
-        return [[r for r, own in enumerate(self.owners) if own == owner]
-                for owner in dict.fromkeys(self.owners)]
-
-    @property
-    def spread(self) -> float:
-        """Relative standard error of the noise's power, where it is known least."""
-        return max(level.spread for found in self.levels for level in found.values())
-
-    @property
-    def allowed(self) -> float:
-        """The same as tests of a residual allow for it: no more than what a fit has left."""
-        return max(min(level.spread, level.excess)
-                   for found in self.levels for level in found.values())
-
-    def sigma(self, output: str) -> float:
-        """σ of an output's noise; of several recordings the root mean square of their samples."""
-        counts = [np.isfinite(r[output].values).sum() for r in self.recordings]
-        squares = [found[output].sigma ** 2 for found in self.levels]
-        return float(np.sqrt(np.average(squares, weights=counts)))
-
-    def beginning(self, rows: int) -> Records:
-        """The same with about so many rows in all, each recording cut alike, from its start; not
-        before each output has changed: a rig may rest at first.
-        """
-        times = [np.sort(np.concatenate([r[o].time[np.isfinite(r[o].values)] for o in found]))
-                 for r, found in zip(self.recordings, self.levels, strict=True)]
-        share = rows / max(sum(map(len, times)), 1)
-        if share >= 1:
-            return self
-        cut = []
-        for r, found, t in zip(self.recordings, self.levels, times, strict=True):
-            moved = (min(r[o].changes_at, r.stop) for o in found)
-            cut.append(_cut(r, max(float(t[int(share * (len(t) - 1))]), *moved)))
-        return replace(self, recordings=tuple(cut))
-
-    def beside(self, later: Records) -> Records:
-        """With other recordings after these."""
-        first = max(self.owners) + 1
-        return replace(self, recordings=self.recordings + later.recordings,
-                       levels=self.levels + later.levels,
-                       cut_from=(*self.owners, *(first + own for own in later.owners)))
-
-    def with_levels(self, levels: dict[str, NoiseModel]) -> Records:
-        """The same with one noise level of each output for all recordings."""
-        return replace(self, levels=tuple(levels for _ in self.recordings))
-
-
-def _cut(recording: Recording, stop: float) -> Recording:
-    short = []
-    for name in recording.names:
-        c = recording[name]
-        n = max(int(np.searchsorted(c.time, stop, "right")), 2)
-        sigma = c.sigma if c.sigma is None or np.ndim(c.sigma) == 0 else np.asarray(c.sigma)[:n]
-        short.append(replace(c, time=c.time[:n], values=c.values[:n], sigma=sigma))
-    return recording.with_channels(*short)
 
 
 def allowance(misfit: float) -> float:
@@ -149,23 +68,13 @@ class Whitened:
         Where a misfit of many times the noise is left anyway (`misfit`, χ² per row), a fifth of
         that share of the misfit is allowed instead.
         """
-        found = []
         self.weighed = []
+        allowed = share * allowance(misfit)
         finest = FINEST if misfit < self.settings.fits.gross else COARSEST
-        for r, simulator in enumerate(self.simulators):
-            allowed = share * allowance(misfit)
-            steps = self._steps(r, theta, allowed, SHARP if simulator.corners else finest)
-            self._weigh(steps, share)
-            if simulator.corners and (steps is None or steps.error > allowed):
-                self.simulators[r] = Translated(
-                    simulator.model, simulator.experiment, located=True,
-                    estimated=simulator.estimated)
-                steps = self._steps(r, theta, allowed, finest)
-                if steps is None:  # a motion at rest on a corner meets it without end
-                    self.simulators[r] = simulator
-                    steps = self._steps(r, theta, allowed, finest)
-                self._weigh(steps, share)
-            if steps is None or steps.error > TOO_ROUGH * allowed:
+        found = []
+        for r in range(len(self.simulators)):
+            steps = self._steps(r, theta, share, allowed, finest)
+            if steps is None:
                 return False
             found.append(steps)
         self.steps = found
@@ -192,17 +101,31 @@ class Whitened:
         self.simulators = [s for other in others for s in other.simulators]
         self.steps = [s for other in others for s in other.steps]
 
-    def _weigh(self, steps: Steps | None, usual: float) -> None:
-        if steps is not None:
-            self.weighed.append((steps.error, usual))
+    def _steps(self, r: int, theta: np.ndarray, share: float, allowed: float, finest: int
+               ) -> Steps | None:
+        """Those of one recording, by whichever way does; None where none comes near."""
+        def tried(most: int, method: Method = "explicit") -> Steps | None:
+            try:
+                steps = self.simulators[r].choose_steps(
+                    self.problem.parameters(theta, r), allowed, method,
+                    finest=self._spacing(r) / most, scale=self.sigma[r])
+            except errors.SimulationFailed:
+                return None
+            self.weighed.append((steps.error, share))
+            return steps
 
-    def _steps(self, r: int, theta: np.ndarray, allowed: float, finest: int) -> Steps | None:
-        try:
-            return self.simulators[r].choose_steps(
-                self.problem.parameters(theta, r), allowed, "explicit",
-                finest=self._spacing(r) / finest, scale=self.sigma[r])
-        except errors.SimulationFailed:
-            return None
+        simulator = self.simulators[r]
+        steps = tried(SHARP if simulator.corners else finest)
+        if simulator.corners and (steps is None or steps.error > allowed):
+            self.simulators[r] = Translated(simulator.model, simulator.experiment, located=True,
+                                            estimated=simulator.estimated)
+            steps = tried(finest)
+            if steps is None:  # a motion at rest on a corner meets it without end
+                self.simulators[r] = simulator
+                steps = tried(finest)
+        if steps is None or steps.error > TOO_ROUGH * allowed:
+            steps = tried(STIFF, "implicit")
+        return steps if steps is not None and steps.error <= TOO_ROUGH * allowed else None
 
     def _spacing(self, r: int) -> float:
         samples = self.problem.experiments[r].samples[0]
@@ -232,8 +155,9 @@ class Whitened:
     def cost(self) -> float:
         """Of a simulation with derivatives: states times steps."""
         spans = [e.samples[0].t[-1] - e.samples[0].t[0] for e in self.problem.experiments]
-        steps = [max(span / s.longest, len(e.samples[0].t)) for span, s, e in zip(
-            spans, self.steps, self.problem.experiments, strict=True)]
+        steps = [max(span / s.longest, len(e.samples[0].t))
+                 * (IMPLICIT if s.method == "implicit" else 1)
+                 for span, s, e in zip(spans, self.steps, self.problem.experiments, strict=True)]
         return float(len(self.problem.model.states) * sum(steps))
 
     def residual(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -114,7 +114,7 @@ class Watched:
 
     def _chosen_steps(self, p: Array) -> Steps:
         finest = float(np.median(np.diff(self.samples[0].t))) / COARSE
-        steps = self.simulator.choose_steps(p, SHARE, "explicit", finest=finest, scale=self.spread)
+        steps = self.simulator.choose_steps(p, SHARE, finest=finest, scale=self.spread)
         if steps.error > TOO_ROUGH * SHARE:
             raise errors.SimulationFailed(errors.too_rough_to_plan(self.model.name, self.name))
         return steps

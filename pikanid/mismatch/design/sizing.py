@@ -9,7 +9,8 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.design.response import SHARE, Sigma
 from pikanid.mismatch.fitting.descent import start_from
 from pikanid.mismatch.fitting.fit import fitted

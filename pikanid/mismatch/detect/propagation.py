@@ -1,13 +1,15 @@
 """Small deviations carried along a motion, X' = A(t) X + F(t), for many forces F that share A.
 
-One step of the classical Runge-Kutta method is linear in X and F: its matrices are found once, and
-serve every force.  Imported where it is used: numba takes its time.
+One step of a Runge-Kutta method is linear in X and F: its matrices are found once, and serve every
+force.  Imported where it is used: numba takes its time.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from pikanid.simulation.sdirk_table import NODES, SDIRK
+from pikanid.simulation.support import solve_small
 from pikanid.storage.jit import cached_jit
 
 TOGETHER = 8  # numerical: motions side by side, to hide how long one step takes
@@ -16,7 +18,7 @@ TOGETHER = 8  # numerical: motions side by side, to hide how long one step takes
 @cached_jit()
 def step_matrices(A: np.ndarray, h: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
     """(M (L-1, n, n), B (3, n, n, L-1)): a step takes X to M X + B[0] F_left + B[1] F_middle
-    + B[2] F_right.
+    + B[2] F_right, by the classical method.
 
     Args:
         A: (3, L-1, n, n) at the left end, the middle and the right end of each step; a parabola
@@ -64,6 +66,54 @@ def step_matrices(A: np.ndarray, h: np.ndarray, parts: int) -> tuple[np.ndarray,
                 for j in range(m):
                     x[i, j] += size / 6 * total[i, j]
                     probe[i, j] = x[i, j]
+        for i in range(n):
+            for j in range(n):
+                M[k, i, j] = x[i, j]
+                for place in range(3):
+                    B[place, i, j, k] = x[i, (place + 1) * n + j]
+    return M, B
+
+
+@cached_jit(error_model="numpy")
+def stiff_matrices(A: np.ndarray, h: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """As `step_matrices`, by the L-stable method: for motions that forget within a step."""
+    steps, n = A.shape[1:3]
+    m, stages = 4 * n, len(NODES)
+    M, B = np.empty((steps, n, n)), np.empty((3, n, n, steps))
+    a, matrix, x = np.empty((n, n)), np.empty((n, n)), np.empty((n, m))
+    K, weights = np.empty((stages, n, m)), np.empty(3)
+    for k in range(steps):
+        size = h[k] / parts
+        for i in range(n):
+            for j in range(m):
+                x[i, j] = 1.0 if i == j else 0.0
+        for part in range(parts):
+            for stage in range(stages):
+                s = (part + NODES[stage]) / parts
+                weights[0] = (1 - s) * (1 - 2 * s)
+                weights[1] = 4 * s * (1 - s)
+                weights[2] = s * (2 * s - 1)
+                for i in range(n):
+                    for j in range(n):
+                        a[i, j] = (weights[0] * A[0, k, i, j] + weights[1] * A[1, k, i, j]
+                                   + weights[2] * A[2, k, i, j])
+                        matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * size * a[i, j]
+                slope = K[stage]
+                for i in range(n):
+                    for j in range(m):
+                        slope[i, j] = weights[j // n - 1] if j >= n and j % n == i else 0.0
+                for q in range(n):
+                    for j in range(m):
+                        reached = x[q, j]
+                        for before in range(stage):
+                            reached += size * SDIRK[stage, before] * K[before, q, j]
+                        for i in range(n):
+                            slope[i, j] += a[i, q] * reached
+                solve_small(matrix, slope)
+            for stage in range(stages):
+                for i in range(n):
+                    for j in range(m):
+                        x[i, j] += size * SDIRK[stages - 1, stage] * K[stage, i, j]
         for i in range(n):
             for j in range(n):
                 M[k, i, j] = x[i, j]

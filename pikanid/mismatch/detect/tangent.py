@@ -8,6 +8,7 @@ solved along the fitted motion.  One pass over a recording serves every entry of
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -34,7 +35,8 @@ SMALL, MOVED = 1e-3, 1e-4  # numerical: least size of an input, and share moved 
 SIGNS = 96  # numerical: signs integrated at once
 CELLS = 400_000  # numerical: signs times steps at once, to keep memory small
 STABLE = 1.5  # numerical: rate times step that the Runge-Kutta method follows well enough
-MOST_PARTS = 64  # numerical: of a step: stiffer motions are not followed
+MOST_PARTS = 64  # numerical: of a step of that method: stiffer motions are followed implicitly
+STIFF_PARTS = 4  # numerical: of a step then
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,12 @@ class Tangent:
         field = VectorField(self.model)
         self.fx, self.fp = field.rhs_jacobians(self.t, self.x, self.u, p)
         self.hx, _ = field.output_jacobians(self.t, self.x, self.u, p)
+        # over dozens of periods small errors of phase would look like damping, so that states that
+        # forget within a step need shorter ones
+        every = max(len(self.t) // 50, 1)
+        few = np.diff(self.t)[::every, None, None] * self.fx[:-1:every]
+        rate = np.abs(np.linalg.eigvals(np.where(np.isfinite(few), few, 0.0)))
+        self.parts = max(math.ceil(float(rate.max(initial=0.0)) / STABLE), 1)
         self.thirds = self._thirds(field, grid.V)
         seen = grid.seen
         counts = np.diff(seen.first)
@@ -138,7 +146,9 @@ class Tangent:
         left, right = self.u[:-1], self.u[:-1] + slopes[:-1] * h
         f0 = field.rhs(t[:-1], x[:-1], left, self.p)
         f1 = field.rhs(t[1:], x[1:], right, self.p)
-        middle = 0.5 * (x[:-1] + x[1:]) + h / 8 * (f0 - f1)
+        # a stiff state is not where its rates at both ends point to
+        bend = h / 8 * (f0 - f1) if self.parts <= MOST_PARTS else 0.0
+        middle = 0.5 * (x[:-1] + x[1:]) + bend
         places = [(t[:-1], x[:-1], left), (0.5 * (t[:-1] + t[1:]), middle, 0.5 * (left + right)),
                   (t[1:], x[1:], right)]
         return [(field.rhs_jacobians(at, state, u, self.p)[0], self._by_input(field, at, state, u))
@@ -225,20 +235,15 @@ class Tangent:
 
     @functools.cached_property
     def steps(self) -> tuple[np.ndarray, np.ndarray]:
-        """`propagation.step_matrices` along the motion, by the classical Runge-Kutta method: over
-        dozens of periods small errors of phase would look like damping.
-        """
-        from pikanid.mismatch.detect.propagation import step_matrices
+        """`propagation.step_matrices` along the motion."""
+        from pikanid.mismatch.detect.propagation import step_matrices, stiff_matrices
 
         h = np.diff(self.t)
         A = np.stack([fx for fx, _ in self.thirds])
         A = np.where(np.isfinite(A), A, 0.0)  # beyond all numbers nothing follows of a motion
-        every = max(len(h) // 50, 1)
-        few = h[::every, None, None] * A[0, ::every]
-        fastest = float(np.abs(np.linalg.eigvals(few)).max(initial=0.0))
-        # states that forget within a step need shorter ones
-        parts = min(max(int(np.ceil(fastest / STABLE)), 1), MOST_PARTS)
-        return step_matrices(A, h, parts)
+        if self.parts > MOST_PARTS:
+            return stiff_matrices(A, h, STIFF_PARTS)
+        return step_matrices(A, h, self.parts)
 
     def _input_steps(self, name: str) -> np.ndarray:
         """(3, n, L-1) what an input of 1 at the left end, the middle and the right end of each step

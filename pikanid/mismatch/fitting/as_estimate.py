@@ -20,15 +20,19 @@ from pikanid.storage.version import __version__
 def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
     """The estimate of the extended model, with the hypothesis' covariance: along what the recording
     does not tell, standard errors end where parameters leave the order of magnitude of the guess.
+    Errors below what a number can hold are of derivatives that ran away in a stiff state, and are
+    not known.
     """
-    whitened = h.whitened
+    whitened, covariance = h.whitened, h.covariance.copy()
+    absurd = np.diag(covariance) < np.square(np.finfo(float).eps * h.minimum.theta)
+    covariance[absurd] = covariance[:, absurd] = np.nan
     problem = whitened.problem
     fits, trajectories = [], []
     for r, response in enumerate(whitened.responses(h.minimum.theta, states=True)):
         trajectories.append(Trajectory(response.t, response.states))
         experiment, row = problem.experiments[r], 0
         own = problem.columns(r)[1]
-        spread = propagated(response.sensitivity, h.covariance[np.ix_(own, own)])
+        spread = propagated(response.sensitivity, covariance[np.ix_(own, own)])
         for s in experiment.samples:
             output = problem.model.outputs[s.output]
             sigma = whitened.records.levels[r][output.name].spreads(s.sigma, len(s.t))
@@ -41,7 +45,7 @@ def as_estimate(h: Hypothesis, like: Estimate) -> Estimate:
                      whitened.settings.adequacy)
     return Estimate(
         model=problem.model, strategy="nls", free=problem.free, theta=h.minimum.theta,
-        covariance=h.covariance, fits=tuple(fits), trajectories=tuple(trajectories),
+        covariance=covariance, fits=tuple(fits), trajectories=tuple(trajectories),
         cost=total_cost(fits), adequacy=adequacy, converged=h.minimum.converged,
         settings={**like.settings, "effects": sorted(h.key)}, version=__version__)
 

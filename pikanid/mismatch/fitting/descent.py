@@ -72,8 +72,7 @@ def descended(whitened: Whitened, starts: Sequence[Start | Mapping[str, float]],
     coarse = best.chi2
     finer = closest.ask(lambda chi2: misfit(chi2) > gross and coarse < closer * chi2)
     if finer or (not best.converged and not beyond(coarse)):
-        if not closest.choose_steps(whitened, best.theta,
-                                    lambda chi2: min(coarse / rows, misfit(chi2))):
+        if not _finer(whitened, best, closest, lambda chi2: min(coarse / rows, misfit(chi2))):
             return None
         best = lowest(whitened, best.theta, limit, give_up)
     return renewed(whitened, best, closest, limit, beyond)
@@ -96,7 +95,7 @@ def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: i
         if closest.ask(partial(_fine, worst, left)):
             break
         before, simulators = whitened.steps, list(whitened.simulators)
-        if not closest.choose_steps(whitened, best.theta, left):
+        if not _finer(whitened, best, closest, left):
             return None
         if all(new is old for new, old in zip(whitened.simulators, simulators, strict=True)) and \
                 all(new.longest >= old.longest for new, old in zip(
@@ -104,6 +103,16 @@ def renewed(whitened: Whitened, best: Minimum | None, closest: Closest, limit: i
             break
         best = lowest(whitened, best.theta, limit, impatient(beyond, whitened.settings))
     return best
+
+
+def _finer(whitened: Whitened, best: Minimum, closest: Closest, left: Callable[[float], float]
+           ) -> bool:
+    """Whether steps are found for a misfit of χ² per row, or else for what the fit leaves itself:
+    that one is not closer than it seems.
+    """
+    own = best.chi2 / max(whitened.rows, 1)
+    return any(closest.choose_steps(whitened, best.theta, misfit)
+               for misfit in (left, lambda _: own))
 
 
 def impatient(beyond: Callable[[float], bool], settings: Settings

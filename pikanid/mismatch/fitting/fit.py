@@ -8,7 +8,8 @@ from functools import partial
 
 from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.descent import (
     Start,

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.fitting.decisions import below
 from pikanid.mismatch.fitting.descent import (
     place,

@@ -15,7 +15,7 @@ import numpy as np
 
 from pikanid.formula.expressions import TIME
 from pikanid.mismatch.data.noise_level import GRID, likeliest
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.detect.remainder import condensed
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.noise import NoiseSettings

@@ -7,7 +7,8 @@ import numpy as np
 from pikanid.formula.expressions import TIME, symbol
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.model import Model
 from pikanid.problem.problem import Problem
 

@@ -10,7 +10,8 @@ from typing import cast
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.whitened import Records, Whitened
+from pikanid.mismatch.data.records import Records
+from pikanid.mismatch.data.whitened import Whitened
 from pikanid.mismatch.detect.remainder import residual_tests
 from pikanid.mismatch.detect.residual_tests import Detection
 from pikanid.mismatch.fitting.extended import extended

@@ -9,7 +9,7 @@ import numpy as np
 from pikanid import errors
 from pikanid.errors.wording import listed
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.design.next_experiment import NextExperiment, next_experiment
 from pikanid.mismatch.design.profiles import profiles
 from pikanid.mismatch.design.ranges import ranges_of

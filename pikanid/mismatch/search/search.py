@@ -10,7 +10,7 @@ import numpy as np
 
 from pikanid import errors
 from pikanid.mismatch.catalogue.candidate import Candidate
-from pikanid.mismatch.data.whitened import Records
+from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below, in_order
 from pikanid.mismatch.fitting.descent import Start

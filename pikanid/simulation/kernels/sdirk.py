@@ -1,12 +1,4 @@
-STAGES = 5  # definition: of the method below
-# Hairer & Wanner, Solving Ordinary Differential Equations II, 2nd ed., Table 6.5: order 4, L-stable
-SDIRK = np.array([
-    [1 / 4, 0.0, 0.0, 0.0, 0.0],
-    [1 / 2, 1 / 4, 0.0, 0.0, 0.0],
-    [17 / 50, -1 / 25, 1 / 4, 0.0, 0.0],
-    [371 / 1360, -137 / 2720, 15 / 544, 1 / 4, 0.0],
-    [25 / 24, -49 / 48, 125 / 16, -85 / 12, 1 / 4]])  # definition: its coefficients
-NODES = np.array([1 / 4, 3 / 4, 11 / 20, 1 / 2, 1.0])  # definition: its times
+STAGES = 5  # definition: of the method
 
 
 @called

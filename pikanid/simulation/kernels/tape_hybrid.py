@@ -1,42 +1,4 @@
 @called
-def take_step(b, t, h, x, S, u, v, gap, dtau, mode, slopes_on, kx, kS, xs, Ss, xn, Sn):
-    """One Runge-Kutta step of length h in the present modes; `gap` after the stop of u, v."""
-    n, A = b.sizes[0], S.shape[1]
-    r, d, out, code = b.r, b.d, b.out, b.code
-    if fixed(mode):
-        put_signs(b, mode, slopes_on)
-        call_step(code[STEP_TANGENTS if slopes_on else STEP], r, d, t, gap, x, S, u, v, dtau, h,
-                  xn, Sn)
-        return
-    # signs that are held at zero change from stage to stage
-    for stage in range(4):
-        c = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
-        for i in range(n):
-            xs[i] = x[i] if stage == 0 else x[i] + c * kx[stage - 1, i]
-        if slopes_on:
-            for i in range(n):
-                for a in range(A):
-                    Ss[i, a] = S[i, a] if stage == 0 else S[i, a] + c * kS[stage - 1, i, a]
-        call_look(code[PUT_TANGENTS if slopes_on else PUT], r, d, t + c, gap + c, xs, Ss, u, v,
-                  dtau)
-        put_signs(b, mode, slopes_on)
-        call_native(code[VALUES_F], r, d)
-        if slopes_on:
-            call_native(code[TANGENTS_F], r, d)
-        for i in range(n):
-            kx[stage, i] = r[out[F, i]]
-            if slopes_on:
-                for a in range(A):
-                    kS[stage, i, a] = d[out[F, i], a]
-    for i in range(n):
-        xn[i] = x[i] + h / 6.0 * (kx[0, i] + 2.0 * kx[1, i] + 2.0 * kx[2, i] + kx[3, i])
-        if slopes_on:
-            for a in range(A):
-                Sn[i, a] = S[i, a] + h / 6.0 * (
-                    kS[0, i, a] + 2.0 * kS[1, i, a] + 2.0 * kS[2, i, a] + kS[3, i, a])
-
-
-@called
 def margin(b, t, x, S, u, v, gap, dtau, mode):
     """How far the modes are from their ends (>= 0 while they hold), and which is the closest."""
     first = 1 + b.sizes[0] + b.sizes[1] + b.sizes[2]
@@ -70,7 +32,7 @@ def next_share(a, at_a, b, at_b, c, at_c):
 
 
 @called
-def cross(b, stop, part, x, S, u, v, done, dtau, mode, end, which, kx, kS, xs, Ss, xn, Sn):
+def cross(b, stop, part, x, S, u, v, done, dtau, mode, end, which, w, xn, Sn):
     """The step, of at most `part` after `done`, to where the first mode ends; and which that is.
 
     `end` and `which` are the margin behind the whole step, below zero.
@@ -87,7 +49,7 @@ def cross(b, stop, part, x, S, u, v, done, dtau, mode, end, which, kx, kS, xs, S
             break
         middle = latest + min(max(share, least), 1.0 - least) * (other - latest)
         take_step(b, stop + done, middle, x, S, u, v, done, dtau, mode, b.flag[0],
-                  kx, kS, xs, Ss, xn, Sn)
+                  w, xn, Sn)
         room, k = margin(b, stop + done + middle, xn, S, u, v, done + middle, dtau, mode)
         third, at_third = latest, at_latest
         if (room < 0.0) != (at_latest < 0.0):
@@ -99,7 +61,7 @@ def cross(b, stop, part, x, S, u, v, done, dtau, mode, end, which, kx, kS, xs, S
             low = middle
         share = next_share(latest, at_latest, other, at_other, third, at_third)
     take_step(b, stop + done, high, x, S, u, v, done, dtau, mode, b.flag[1],
-              kx, kS, xs, Ss, xn, Sn)
+              w, xn, Sn)
     return high, which
 
 
@@ -129,11 +91,11 @@ def switch_one_by_one(b, t, gap, x, S, u_old, v_old, u, v, dtau, mode, before, h
 
 @called
 def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, output, row, inside,
-             X, Y, J, x, S, xs, Ss, xn, Sn, kx, kS, before, mode, held, rates):
-    """The classical Runge-Kutta method, stopping where the right-hand side jumps; see `run`."""
+             X, Y, J, x, S, w, xn, Sn, before, mode, held, rates):
+    """Step after step, stopping where the right-hand side jumps; see `run` for the arguments."""
     n, A, L, K = b.sizes[0], S.shape[1], len(T), b.sizes[4]
     r, d, out, code = b.r, b.d, b.out, b.code
-    sign, all_events = 1 + n + b.sizes[1] + b.sizes[2], 0
+    all_events = 0
     prepare(b, p)
     for q in range(L):
         u, v = U[q], V[q]
@@ -168,13 +130,7 @@ def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, ou
             while done < goal:
                 part = goal - done
                 if fixed(mode):
-                    # as below, without calls that hand over the whole tape
-                    for k in range(K):
-                        r[sign + k] = mode[k]
-                        for a in range(A):
-                            d[sign + k, a] = 0.0
-                    call_step(code[STEP_TANGENTS], r, d, T[q] + done, done, x, S, u, v, dtau_in,
-                              part, xn, Sn)
+                    fixed_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, mode, w, xn, Sn)
                     call_look(code[LOOK_G], r, d, T[q] + goal, goal, xn, S, u, v, dtau_in)
                     end, which = np.inf, -1
                     for k in range(K):
@@ -183,12 +139,12 @@ def run_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, ou
                             end, which = room, k
                 else:
                     take_step(b, T[q] + done, part, x, S, u, v, done, dtau_in, mode, b.flag[1],
-                              kx, kS, xs, Ss, xn, Sn)
+                              w, xn, Sn)
                     end, which = margin(b, T[q] + goal, xn, S, u, v, goal, dtau_in, mode)
                 crossing = end < -1e-13
                 if crossing:
                     part, which = cross(b, T[q], part, x, S, u, v, done, dtau_in, mode, end, which,
-                                        kx, kS, xs, Ss, xn, Sn)
+                                        w, xn, Sn)
                 for i in range(n):
                     x[i] = xn[i]
                     if not abs(x[i]) < 1e120:
@@ -214,6 +170,5 @@ def integrate_tape(b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, x0, S0
     n, x, S = b.sizes[0], x0.copy(), S0.T.copy()
     return run_tape(
         b, T, pieces, U, V, jumps, dtau_in, dtau_out, delayed, p, first, output, row, inside,
-        X, Y, J, x, S, x.copy(), S.copy(), x.copy(), S.copy(), np.empty((4, n)),
-        np.empty((4, *S.shape)), np.empty(n), np.ones(b.sizes[4]), np.empty(b.sizes[1]),
-        np.empty(b.sizes[1]))
+        X, Y, J, x, S, stages(b, x, S), x.copy(), S.copy(), np.empty(n), np.ones(b.sizes[4]),
+        np.empty(b.sizes[1]), np.empty(b.sizes[1]))
