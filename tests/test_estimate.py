@@ -199,8 +199,8 @@ def test_files_cut_or_changed_anywhere(estimate: Estimate, tmp_path: Path) -> No
 @pytest.mark.parametrize(("value", "std", "expected"), [
     (0.0450123, 0.0000099, "0.0450123 ± 0.0000099"), (12.3456, 0.5, "12.35 ± 0.50"),
     (1234.5, 20.0, "1234 ± 20"), (3.0, 0.0, "3"), (3.0, float("nan"), "3"),
-    (3.0, float("inf"), "3"), (1e-9, 1e-11, "1.000000e-09 ± 1.0e-11"),
-    (2.5e8, 1e5, "2.500000e+08 ± 1.0e+05"), (-0.5, 0.01, "-0.500 ± 0.010"),
+    (3.0, float("inf"), "3"), (1e-9, 1e-11, "1.000e-09 ± 1.0e-11"),
+    (2.5e8, 1e5, "2.5000e+08 ± 1.0e+05"), (-0.5, 0.01, "-0.500 ± 0.010"),
     (0.0, 0.1, "0.00 ± 0.10")])
 def test_rounding_shows_two_digits_of_the_error(value: float, std: float, expected: str) -> None:
     assert rounded(value, std) == expected

@@ -10,12 +10,15 @@ def rounded(value: float, std: float) -> str:
 
     >>> rounded(0.0450123, 0.0000099)
     '0.0450123 ± 0.0000099'
+    >>> rounded(5.1571e-7, 2.4e-8)
+    '5.16e-07 ± 2.4e-08'
     """
     if not np.isfinite(std) or std <= 0:
         return f"{value:.6g}"
     digits = int(np.clip(1 - np.floor(np.log10(std)), 0, 12))
     if abs(value) >= 1e6 or 0 < abs(value) < 1e-5 or digits > 10:
-        return f"{value:.6e} ± {std:.1e}"
+        apart = np.floor(np.log10(abs(value))) - np.floor(np.log10(std)) if value else 0
+        return f"{value:.{int(np.clip(apart + 1, 0, 6))}e} ± {std:.1e}"
     return f"{value:.{digits}f} ± {std:.{digits}f}"
 
 

@@ -49,7 +49,7 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
     if entry.ids == ("hysteresis",) and entry.channel == "dynamics" and entry.site.rate:
         return [_yielding(entry)]
     if entry.ids == ("initial_state",):
-        return [swinging_force(entry)]
+        return [swinging_force(entry.site, entry.key)]
     if entry.ids == ("input_gain",):
         return [_bent(entry, entry.variant or entry.site.inputs[0], n) for n in BENT]
     if entry.ids == ("sensor_gain",) and entry.site.rate:

@@ -97,7 +97,7 @@ def stiff_matrices(A: np.ndarray, h: np.ndarray, parts: int) -> tuple[np.ndarray
                     for j in range(n):
                         a[i, j] = (weights[0] * A[0, k, i, j] + weights[1] * A[1, k, i, j]
                                    + weights[2] * A[2, k, i, j])
-                        matrix[i, j] = (1.0 if i == j else 0.0) - 0.25 * size * a[i, j]
+                        matrix[i, j] = (1.0 if i == j else 0.0) - SDIRK[0, 0] * size * a[i, j]
                 slope = K[stage]
                 for i in range(n):
                     for j in range(m):

@@ -214,10 +214,10 @@ class Search:
         self._fit_all([*jobs], again=True, always=True, settled=settled)
         return {h.fit for h in self.fits.values()} != before
 
-    def offer(self, formulas: Sequence[Candidate]) -> None:
-        """Fit laws that no catalogue holds, each alone."""
-        self.candidates += tuple(formulas)
-        self._fit_all([((candidate,), [self.base().point]) for candidate in formulas])
+    def offer(self, jobs: Sequence[Job]) -> None:
+        """Fit laws that no catalogue holds."""
+        self.candidates += tuple(law for laws, _ in jobs for law in laws)
+        self._fit_all(jobs, always=True)
 
     def carried_over(self, records: Records) -> Search:
         """The same search with other noise levels; the best hypotheses are refitted to them."""
