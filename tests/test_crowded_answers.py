@@ -13,7 +13,7 @@ from pikanid.mismatch.settings.settings import DEFAULTS
 WEAK = hypothesis(1100.0)
 MOST = DEFAULTS.verdict.crowd
 NAMES = [effect(f"e{k}") for k in range(MOST + 1)]
-FITS = [hypothesis(1000.0 + 0.1 * k, e) for k, e in enumerate(NAMES)]
+FITS = [hypothesis(1000.0 + 0.5 * k, e) for k, e in enumerate(NAMES)]
 
 
 def test_a_weak_set_of_many_is_not_confirmed() -> None:
@@ -25,7 +25,7 @@ def test_a_weak_set_of_many_is_not_confirmed() -> None:
     assert answered([BASE, *FITS]).verdict == "set"
     # of those that are one law under several names, one counts
     twins = [replace(e, twin="scale") for e in NAMES[-2:]]
-    assert answered([WEAK, *FITS[:-2], *(hypothesis(1001.0, e) for e in twins)]).verdict == "set"
+    assert answered([WEAK, *FITS[:-2], *(hypothesis(1002.0, e) for e in twins)]).verdict == "set"
     # nor does what adds to one of them
     more = hypothesis(989.0, NAMES[0], effect("more"))
     assert answered([WEAK, *FITS[:-1], more]).verdict == "set"
@@ -34,7 +34,7 @@ def test_a_weak_set_of_many_is_not_confirmed() -> None:
 def test_a_law_outside_the_catalogue_counts_against_a_set() -> None:
     """Beside what is weak, and beside many, though not beside one or two that are strong."""
     for base, known in itertools.product((BASE, WEAK), (FITS[:1], FITS[:-1])):
-        given = answered([base, *known, hypothesis(1000.0, GUARD)])
+        given = answered([base, *known, hypothesis(1000.25, GUARD)])
         assert (given.verdict == "set") == (base is BASE and len(known) == 1)
         assert {GUARD.key} in [h.key for h in given.given]
 

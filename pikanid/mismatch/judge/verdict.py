@@ -159,8 +159,9 @@ class _Choice:
         if doubt and not outside and (sure := self.sure_by_itself(known, adequate)):
             known += [sure] if all(h is not sure for h in known) else []
             doubt = ""
-        merged, twins = merged_twins(known, tried, asks)
+        merged, twins = merged_twins(known, tried, asks, self.same)
         # laws outside the catalogue that would do as well are for the reader to know
+        outside = [h for h in outside if not any(self.same(o, h) for o in known)]
         lowest = min(map(evidence.total, known))
         open_to, more = merged_twins(
             [h for h in outside if below(evidence.total(h), lowest + self.within)], tried, asks)
@@ -170,10 +171,23 @@ class _Choice:
         verdict: Verdict = ("unconfirmed" if doubt or not proves
                             else "named" if len(merged) == 1 else "set")
         told = set(map(signature, merged))
-        others = [h for h in tried if signature(h) not in told][:5]
+        others = [h for h in tried if signature(h) not in told
+                  and not any(h in known and self.same(o, h) for o in merged)][:5]
         return Answer(verdict, evidence.most_probable_first(merged), tuple(others), twins,
                       {**self.spare, **self.reasons}, doubt,
                       tuple(h for h in outside if not any(h is o for o in merged)))
+
+    def same(self, one: Hypothesis, other: Hypothesis) -> bool:
+        """Whether two hypotheses that differ in one effect are the same motion in all recordings:
+        one law in two names, as a dead zone that is never entered and an offset.
+        """
+        if len(signature(one) ^ signature(other)) != 2 or len(one.key ^ other.key) != 2:
+            return False
+        close = self.evidence.settings.verdict.same
+        if not below(abs(one.minimum.chi2 - other.minimum.chi2), close):
+            return False
+        a, b = self.evidence.predict(one), self.evidence.predict(other)
+        return a is None or b is None or below(abs(a.deviance - b.deviance), close)
 
     def sure_by_itself(self, known: Sequence[Hypothesis], adequate: Sequence[Hypothesis]
                        ) -> Hypothesis | None:

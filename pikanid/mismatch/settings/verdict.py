@@ -22,6 +22,8 @@ class VerdictSettings:
         besides: The same of an explanation that holds one more effect than another: that there is
             more needs some evidence, that it may be something else needs none.
         behind: Times `indistinct`, and a hypothesis can still be what predicts best.
+        same: [χ²] in the train and in the held-out recordings: where both differ by less, two
+            hypotheses are one motion, and one law in two names.
         same_law: [criterion]: what differs by less may be the same law, written in another way.
         decoy_handicap: [criterion] that each law outside the catalogue is handicapped by: prior
             odds of e² to 1 that a law is one that has a name.
@@ -68,6 +70,7 @@ class VerdictSettings:
     unlikely: Rate = 0.01
     besides: Rate = 0.05
     behind: Factor = 2.0
+    same: Amount = 0.1
     same_law: Amount = 1.0
     decoy_handicap: Amount = 4.0
     unforeseen: Rate = 0.005
