@@ -37,7 +37,7 @@ NOISES = (0.005, 0.05)  # shares of an output's range
 WORKERS = 2
 # One for each rig, noise and round, and never looked at before
 SEEDS = {(name, noise, part): 670_000 + 100_000 * part + 10 * k + i
-         for part in range(1, 13) for k, name in enumerate(RIGS)
+         for part in range(1, 14) for k, name in enumerate(RIGS)
          for i, noise in enumerate(NOISES)}
 MAKERS = ("formula", "model", "recording", "validation")  # rooms: what makes the sets
 COUNTED = ("right", "wrong", "wrong_but_knowable", "false_alarm", "missed", "surely_in_part",
@@ -128,6 +128,15 @@ force, and something else" of a force that is local in a state, which has a part
 followed (limits that held-out recordings do not meet, rivals that cannot be run there) the two
 pushes of cart_pole_upright at 5 % that stayed `unconfirmed` are sure; the answers of before are
 reported.
+
+Eight sets of round 13 were answered blindly by one code, those of dc_motor not at all.  Of its
+seven wrong answers three lie within 0.4 sigma of what hides (two pairs, told as either member, and
+a loss with a limit as dry friction); two say a family of a law that is local in a state, or in the
+product of a state and an input; one leaves out a delay beside a push 60 times as loud, one takes a
+parameter that switches for a store.  With what followed (entries that are one motion are one
+answer; a force that swings is looked for where nothing else explains a recording) a set that had
+been too long and an answer that had not been sure are right, and a hidden periodic force has its
+formula; the answers of before are reported.
 
 Of rounds 1 to 3, the code after round 4 has answered all sets of cascaded_tanks, dc_motor and
 thermal_rc again but three (cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at
