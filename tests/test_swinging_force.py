@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import pikanid as pk
 from pikanid.mismatch.catalogue.candidate import View
 from pikanid.mismatch.catalogue.sites import sites
-from pikanid.mismatch.catalogue.swinging_force import swinging_on_its_own
+from pikanid.mismatch.catalogue.swinging_force import swinging_on_their_own
 from pikanid.model import Model
 
 RATE, DT = 1.234, 0.05
@@ -40,6 +40,7 @@ def driven(which: int, law: str) -> pk.Recording:
         more = {"swings": 0.15 * np.sin(RATE * s + which),
                 "pumps": -1.5 * np.sin(RATE * s) * y[0],
                 "scales": 0.2 * np.sin(0.8 * s) * by,
+                "fades": 0.3 * np.exp(-s / 25) * np.sin(1.5 * s),
                 "quickens": 0.15 * np.sin((0.8 + 0.01 * s) * s)}[law]
         return [y[1], -9 * y[0] - 0.25 * y[1] + by + more]
     x = solve_ivp(f, (0, t[-1]), [0.1, 0.0], "DOP853", t, rtol=1e-8, atol=1e-10, max_step=DT).y[0]
@@ -61,7 +62,22 @@ def test_it_is_named_with_its_frequency() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["pumps", "scales", "quickens"])
+@pytest.mark.parametrize(("law", "p", "size", "rate"), [
+    ("pumps", "w2", 1.5 / 9, RATE), ("scales", "g", 0.2, 0.8)])
+def test_a_parameter_that_swings_is_told_from_a_force(law: str, p: str, size: float, rate: float
+                                                      ) -> None:
+    dx = pk.diagnose(oscillator(), driven(0, law), driven(1, law))
+    assert dx.verdict == "named"
+    effect, = dx.hypotheses[0].effects
+    assert effect.ids[0].startswith(f"symbolic:{p} -> {p}*(1 + ")
+    found = effect.parameters[f"{p}_swing_rate"]
+    assert abs(found.value - rate) < 4 * found.std < 0.01 * rate
+    sizes = [effect.parameters[f"{p}_swing_{part}"].value for part in "ab"]
+    assert np.hypot(*sizes) == pytest.approx(size, rel=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["quickens", "fades"])
 def test_what_swings_otherwise_is_not_called_that(law: str) -> None:
     dx = pk.diagnose(oscillator(), driven(0, law), driven(1, law))
     assert dx.mismatch and dx.verdict not in ("named", "set")
@@ -69,8 +85,8 @@ def test_what_swings_otherwise_is_not_called_that(law: str) -> None:
 
 def test_the_frequency_of_an_input_is_left_to_what_follows_it() -> None:
     t = np.arange(0, 90, DT)
-    site = sites(oscillator(), (pk.Recording.from_arrays(t, {"u": t, "x": t}),))[0]
-    law = swinging_on_its_own(site)
+    found = sites(oscillator(), (pk.Recording.from_arrays(t, {"u": t, "x": t}),))
+    law, *_ = swinging_on_their_own(found)
 
     def rates(u: np.ndarray) -> np.ndarray:
         view = View(t, {"x": t, "v": t}, {"x": t, "v": t}, {"u": u}, {}, {"x": t}, {"x": t}, {})

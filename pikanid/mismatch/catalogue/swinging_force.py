@@ -1,13 +1,18 @@
-"""A force that goes on swinging: what a rig does that was pushed once, where it is pushed on."""
+"""A force that goes on swinging: what a rig does that was pushed once, where it is pushed on; and a
+parameter that does, which may be taken for one.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pikanid.mismatch.catalogue.candidate import SYMBOLIC, Candidate, TangentDirection, View
+from pikanid.mismatch.catalogue.forces import changing
 from pikanid.mismatch.catalogue.site import Site
+from pikanid.model import Model
 from pikanid.model.parts import Parameter
 
 FASTEST = 3.0  # numerical: times the natural frequency, up to which it is looked for
@@ -20,36 +25,63 @@ def swinging_force(site: Site, next_to: str) -> Candidate:
     """a sin ωt + b cos ωt, in place of another initial state: near a resonance it rings as that
     does, and does not decay.
     """
-    a, b = (Parameter(site.name(name), 0.0, site.force_unit, scope="recording")
-            for name in ("swing_a", "swing_b"))
+    def push(m: Model, text: str) -> Model:
+        return site.pushed(m, text)
+
+    return replace(_swinging(site, "swing", "a force that swings", site.force_unit, "{}", push,
+                             lambda view: np.ones_like(view.t)),
+                   ids=("swinging_force",), next_to=next_to)
+
+
+def swinging_on_their_own(sites: Sequence[Site]) -> list[Candidate]:
+    """The same in nothing's place, in each equation, as formulas that were read: what waves, wind
+    and shafts that turn do; and beside them each parameter that may swing instead.
+    """
+    laws = [swinging_force(site, "") for site in sites]
+    held = {p: site for site in reversed(sites) for p in site.free_in_force}
+    laws += [_swinging_parameter(site, p) for p, site in held.items()]
+    return [replace(law, ids=(SYMBOLIC + law.expression,), known=True,
+                    directions=law.signs or law.directions, signs=None) for law in laws]
+
+
+def _swinging_parameter(site: Site, p: str) -> Candidate:
+    """p (1 + a sin ωt + b cos ωt) in all equations that hold it."""
+    def change(m: Model, text: str) -> Model:
+        return changing(m, p, text)
+
+    law = _swinging(site, f"{p}_swing", f"a swing of {p}", "1", f"{p}*(1 + {{}})", change,
+                    lambda view: view.by_parameter[site.v, p])
+    return replace(law, expression=f"{p} -> {law.expression}")
+
+
+def _swinging(site: Site, key: str, name: str, unit: str, written: str,
+              extend: Callable[[Model, str], Model], lever: Callable[[View], np.ndarray]
+              ) -> Candidate:
+    """What swings: `written` around a sin ωt + b cos ωt, put into a model by `extend`, whose push
+    along a motion is `lever`.
+    """
+    a, b = (Parameter(site.name(f"{key}_{part}"), 0.0, unit, scope="recording") for part in "ab")
     first, last = site.span
     turn = 2 * np.pi / (last - first)
     fastest = np.pi / site.interval
     natural = FASTEST * site.rate  # of what hardly turns in a recording none shows
     high = min(natural if natural > turn else TURNS * turn, fastest)
-    w = Parameter(site.name("swing_rate"), min(site.rate or turn, fastest), "rad/s",
+    w = Parameter(site.name(f"{key}_rate"), min(site.rate or turn, fastest), "rad/s",
                   (0.0, fastest))
-    text = f"{a.name}*sin({w.name}*t) + {b.name}*cos({w.name}*t)"
+    text = written.format(f"{a.name}*sin({w.name}*t) + {b.name}*cos({w.name}*t)")
 
     def signs(view: View) -> list[TangentDirection]:
         # two swings can be told apart that differ by half a turn in a recording
         rates = [rate for rate in np.arange(turn, high, max(0.5 * turn, (high - turn) / MOST))
                  if not _driven(view, rate)]
-        return [TangentDirection({size.name: 1.0, w.name: float(rate)}, force=wave(rate * view.t))
+        by = lever(view)
+        return [TangentDirection({size.name: 1.0, w.name: float(rate)},
+                                 force=by * wave(rate * view.t))
                 for rate in rates for size, wave in ((a, np.sin), (b, np.cos))]
 
-    return Candidate(("swinging_force",), "a force that swings", text, "dynamics", site, (a, b, w),
-                     lambda m: site.pushed(m, text), lambda view: [], families=("drive",),
-                     per_recording=True, known=False, next_to=next_to, signs=signs)
-
-
-def swinging_on_its_own(site: Site) -> Candidate:
-    """The same in nothing's place, as a formula that was read: what waves, wind and shafts that
-    turn do.
-    """
-    law = swinging_force(site, "")
-    return replace(law, ids=(SYMBOLIC + law.expression,), known=True,
-                   directions=law.signs or law.directions, signs=None)
+    return Candidate(("swinging_parameter",), name, text, "dynamics", site,
+                     (a, b, w), lambda m: extend(m, text), lambda view: [], families=("drive",),
+                     per_recording=True, known=False, signs=signs)
 
 
 def _driven(view: View, rate: float) -> bool:

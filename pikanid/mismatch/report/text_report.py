@@ -38,7 +38,8 @@ def lines_of(dx: DiagnosisData) -> list[str]:
     for h in dx.hypotheses:
         lines.append(f"What: {h.title}{dx.odds(h)}")
         for e in h.effects:
-            left = f"{e.equation}' += " if e.ids[0].startswith(SYMBOLIC) else ""
+            added = e.ids[0].startswith(SYMBOLIC) and " -> " not in e.expression
+            left = f"{e.equation}' += " if added else ""
             lines.append(f"  {left}{e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
                 lines.append(f"    {name} = {with_unit(rounded(v.value, v.std), v.unit)}")

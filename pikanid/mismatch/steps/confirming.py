@@ -8,7 +8,7 @@ from pikanid.mismatch.beyond.force_shape import ForceShape
 from pikanid.mismatch.beyond.formulas import symbolic_candidates
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.site import Site
-from pikanid.mismatch.catalogue.swinging_force import swinging_on_its_own
+from pikanid.mismatch.catalogue.swinging_force import swinging_on_their_own
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.mismatch.judge.answer import Answer
 from pikanid.mismatch.judge.laws_outside import with_formulas
@@ -40,10 +40,11 @@ def confirmed(case: Case, ranked: Sequence[Hypothesis]) -> Answer:
 
 def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site) -> Answer:
     """The answer, once formulas read from the shape of the force have been offered as well, and
-    forces that swing.
+    forces and parameters that swing.
     """
-    search, swinging = case.search, [swinging_on_its_own(s) for s in case.sites]
+    search = case.search
     base = search.base()
+    swinging = swinging_on_their_own(case.sites)
     search.offer([
         *(((law,), [base.point]) for law in symbolic_candidates(
             shape, site, case.candidates, case.settings)),
