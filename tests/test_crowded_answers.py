@@ -31,6 +31,22 @@ def test_a_weak_set_of_many_is_not_confirmed() -> None:
     assert answered([WEAK, *FITS[:-1], more]).verdict == "set"
 
 
+def test_laws_that_are_one_motion_in_all_recordings_count_as_one() -> None:
+    """As a dead zone that is never entered, an offset of the input and a constant force; a law
+    outside the catalogue is then the same in other words.
+    """
+    one = [hypothesis(1000.0 + 0.01 * k, e) for k, e in enumerate(NAMES)]
+    given = answered([WEAK, *one, hypothesis(1000.05, GUARD)])
+    assert given.verdict == "set"
+    assert {h.key for h in given.given} == {frozenset({e.key}) for e in NAMES}
+    # what differs in the held-out recording alone is another law
+    for k in range(len(NAMES)):
+        apart = answered([WEAK, *one], {NAMES[j].key: 0.5 * j for j in range(k + 1)})
+        assert (apart.verdict == "set") is (k < MOST)
+    other = answered([WEAK, *one, hypothesis(1000.05, GUARD)], {"outside": 1.0})
+    assert other.verdict == "unconfirmed" and "nobody has listed" in other.doubt
+
+
 def test_a_law_outside_the_catalogue_counts_against_a_set() -> None:
     """Beside what is weak, and beside many, though not beside one or two that are strong."""
     for base, known in itertools.product((BASE, WEAK), (FITS[:1], FITS[:-1])):

@@ -63,18 +63,3 @@ def test_a_loop_whose_width_may_be_nothing_is_dry_friction_of_its_place(
     # by itself it keeps its name, whatever is not known of it
     [alone], _ = merged_twins([loop], [loop, COULOMB], DEFAULTS.verdict)
     assert alone is loop
-
-
-def test_the_same_motion_in_other_words_is_one_law_of_several_names() -> None:
-    offset, zone, other = (fit(law(name)) for name in ("offset", "dead_zone", "drift"))
-
-    def same(one: Hypothesis, two: Hypothesis) -> bool:
-        return {one.effects[0].key, two.effects[0].key} == {"offset", "dead_zone"}
-
-    given, twins = merged_twins([zone, other, offset], [], DEFAULTS.verdict, same)
-    assert names(given) == ["dead_zone", "drift"]
-    assert twins[zone.key]["dead_zone"].ids == ("dead_zone", "offset")
-    assert twins[zone.key]["dead_zone"].words == ("dead_zone", "offset")
-    assert twins[other.key]["drift"].ids == ("drift",)
-    assert names(merged_twins([zone, other, offset], [], DEFAULTS.verdict)[0]) == [
-        "dead_zone", "drift", "offset"]

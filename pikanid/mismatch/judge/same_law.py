@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from pikanid.mismatch.catalogue.candidate import Candidate
@@ -94,26 +94,19 @@ def _group(e: Candidate) -> str:
     return e.ids[0] + e.site.suffix if e.refines else e.key
 
 
-def never(one: Hypothesis, other: Hypothesis) -> bool:
-    """Hypotheses that nothing says are the same."""
-    return False
-
-
-def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: VerdictSettings,
-                 same: Callable[[Hypothesis, Hypothesis], bool] = never
+def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: VerdictSettings
                  ) -> tuple[list[Hypothesis], dict[frozenset[str], dict[str, Names]]]:
     """Hypotheses that differ in twins only become one; what stands for what is noted.
 
     A law of whole exponent has the power law as a twin where the recording leaves the exponent
     open, and an effect that has another one as its limit that where it is narrow, or may be
-    nothing.  An entry in two shapes is one, and so are hypotheses that are the `same` motion.
+    nothing.  An entry in two shapes is one.
     """
     first: dict[frozenset[str], Hypothesis] = {}
     twins: dict[frozenset[str], dict[str, Names]] = {}
     absorbed = set()
     for h in known:
-        leader = first.get(signature(h)) or next((o for o in first.values() if same(o, h)), h)
-        first.setdefault(signature(leader), leader)
+        leader = first.setdefault(signature(h), h)
         table = twins.setdefault(
             leader.key, {e.key: Names(e.names, (e.name,)) for e in leader.effects})
         for e in leader.effects:
@@ -122,10 +115,6 @@ def merged_twins(known: list[Hypothesis], tried: Sequence[Hypothesis], asks: Ver
                     # another shape or side of an entry goes by its name
                     new = e.alike and not {*o.names} <= {*table[e.key].ids}
                     table[e.key] = table[e.key].and_also(o.names, *([o.name] if new else []))
-        if signature(h) != signature(leader):
-            (e,), (o,) = ([e for e in one.effects if _group(e) not in signature(other)]
-                          for one, other in ((leader, h), (h, leader)))
-            table[e.key] = table[e.key].and_also(o.names, o.name)
         for e in h.effects:
             if leader is h and isinstance(e.exponent, int | float) and (
                     wider := _power_law(h, e, tried)) and _open_exponent(

@@ -159,7 +159,7 @@ class _Choice:
         if doubt and not outside and (sure := self.sure_by_itself(known, adequate)):
             known += [sure] if all(h is not sure for h in known) else []
             doubt = ""
-        merged, twins = merged_twins(known, tried, asks, self.same)
+        merged, twins = merged_twins(known, tried, asks)
         # laws outside the catalogue that would do as well are for the reader to know
         outside = [h for h in outside if not any(self.same(o, h) for o in known)]
         lowest = min(map(evidence.total, known))
@@ -171,15 +171,14 @@ class _Choice:
         verdict: Verdict = ("unconfirmed" if doubt or not proves
                             else "named" if len(merged) == 1 else "set")
         told = set(map(signature, merged))
-        others = [h for h in tried if signature(h) not in told
-                  and not any(h in known and self.same(o, h) for o in merged)][:5]
+        others = [h for h in tried if signature(h) not in told][:5]
         return Answer(verdict, evidence.most_probable_first(merged), tuple(others), twins,
                       {**self.spare, **self.reasons}, doubt,
                       tuple(h for h in outside if not any(h is o for o in merged)))
 
     def same(self, one: Hypothesis, other: Hypothesis) -> bool:
         """Whether two hypotheses that differ in one effect are the same motion in all recordings:
-        one law in two names, as a dead zone that is never entered and an offset.
+        one law in two forms, as a dead zone that is never entered and an offset.
         """
         if len(signature(one) ^ signature(other)) != 2 or len(one.key ^ other.key) != 2:
             return False
@@ -221,9 +220,12 @@ class _Choice:
         if any(not h.known and len(h.effects) < len(best.effects) for h in near):
             return "fewer laws, one of them in no catalogue, explain the recording as well"
         laws = [h for h in merged if not h.next_form]  # a name's next form is of one kind with it
-        apart = sum(not any(o.key < h.key for o in laws) for h in laws)
+        apart: list[Hypothesis] = []
+        for h in laws:
+            if not any(o.key < h.key for o in laws) and not any(self.same(o, h) for o in apart):
+                apart.append(h)
         weak = below(evidence.gained(best, evidence.nominal), asks.minor_strong)
-        if (apart > asks.crowd) + any(not h.known for h in laws) + weak > 1:
+        if (len(apart) > asks.crowd) + any(not h.known for h in laws) + weak > 1:
             return "where all of these would do, a law that nobody has listed may"
         return ""
 

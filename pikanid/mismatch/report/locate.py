@@ -117,9 +117,8 @@ def _channels(answer: Answer, candidates: Sequence[Candidate]) -> tuple[Channel,
     Of an answer that is not confirmed: the one that all effects of all its hypotheses share.
     """
     def of(e: Candidate, names: Sequence[str]) -> frozenset[Channel]:
-        others = ({c.channel for c in candidates if name in c.ids}
-                  for name in names if name not in e.ids)
-        return acts_in(e).union(*(own for own in others if e.channel not in own))
+        others = {c.channel for c in candidates for i in c.ids if i in names and i not in e.ids}
+        return acts_in(e) if e.channel in others else acts_in(e) | others
 
     def of_families(*families: str) -> frozenset[Channel]:
         return frozenset(c.channel for c in candidates if {*families} & {*c.families})

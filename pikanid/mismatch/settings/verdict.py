@@ -23,7 +23,7 @@ class VerdictSettings:
             more needs some evidence, that it may be something else needs none.
         behind: Times `indistinct`, and a hypothesis can still be what predicts best.
         same: [χ²] in the train and in the held-out recordings: where both differ by less, two
-            hypotheses are one motion, and one law in two names.
+            hypotheses are one motion, and count as one law.
         same_law: [criterion]: what differs by less may be the same law, written in another way.
         decoy_handicap: [criterion] that each law outside the catalogue is handicapped by: prior
             odds of e² to 1 that a law is one that has a name.
