@@ -43,10 +43,14 @@ def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site)
     forces and parameters that swing.
     """
     search = case.search
-    base = search.base()
+    search.offer([((law,), [search.base().point]) for law in symbolic_candidates(
+        shape, site, case.candidates, case.settings)])
     swinging = swinging_on_their_own(case.sites)
-    search.offer([
-        *(((law,), [base.point]) for law in symbolic_candidates(
-            shape, site, case.candidates, case.settings)),
-        *(((law,), starts) for law, starts in Screen(base, swinging).singles(len(swinging)))])
+    search.offer([((law,), starts) for law, starts in Screen(
+        search.base(), swinging).singles(len(swinging))])
+    # one with a size and a phase in every recording takes up a part of anything
+    partly = {law.key for law in swinging if not (
+        (h := search.fits.get(frozenset({law.key}))) and case.adequate(h))}
+    search.fits = {key: h for key, h in search.fits.items() if not key & partly}
+    search.candidates = tuple(c for c in search.candidates if c.key not in partly)
     return with_formulas(answer, case.evidence(search.ranked()))
