@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import pikanid as pk
+from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import View
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.catalogue.swinging_force import swinging_on_their_own
+from pikanid.mismatch.steps import confirming
 from pikanid.model import Model
 
 RATE, DT = 1.234, 0.05
@@ -95,3 +101,30 @@ def test_the_frequency_of_an_input_is_left_to_what_follows_it() -> None:
     free, alone = rates(np.random.default_rng(1).standard_normal(len(t))), rates(np.sin(RATE * t))
     assert np.abs(free - RATE).min() < 0.02
     assert 0.02 < np.abs(alone - RATE).min() < 0.2 and len(alone) > 0.9 * len(free)
+
+
+@pytest.mark.parametrize("all_of_it", [True, False])
+def test_it_stays_where_it_explains_all(all_of_it: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a size and a phase in every recording it takes up a part of anything: no rival then."""
+    law, drag = (SimpleNamespace(key=key) for key in ("swing", "drag"))
+    nominal, fit = (SimpleNamespace(key=frozenset(k), point={}) for k in ([], ["swing"]))
+    search = SimpleNamespace(
+        fits={nominal.key: nominal}, candidates=(drag,), base=lambda: nominal, ranked=list)
+
+    def offer(jobs: Sequence[tuple[tuple[SimpleNamespace], list[object]]]) -> None:
+        for (one,), _ in jobs:
+            search.candidates += (one,)
+            search.fits[frozenset({one.key})] = fit
+
+    search.offer = offer
+    case = SimpleNamespace(search=search, candidates=(drag,), sites=(), settings=None,
+                           adequate=lambda h: all_of_it, evidence=lambda ranked: ranked)
+    monkeypatch.setattr(confirming, "symbolic_candidates", lambda *_: [])
+    monkeypatch.setattr(confirming, "swinging_on_their_own", lambda sites: [law])
+    monkeypatch.setattr(confirming, "Screen", lambda base, laws: SimpleNamespace(
+        singles=lambda count: [(law, [{}])]))
+    monkeypatch.setattr(confirming, "with_formulas", lambda answer, evidence: answer)
+    nothing: Any = None
+    confirming.with_laws_outside(cast(Case, case), nothing, nothing, nothing)
+    assert (fit.key in search.fits) is all_of_it and nominal.key in search.fits
+    assert search.candidates == ((drag, law) if all_of_it else (drag,))
