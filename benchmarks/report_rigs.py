@@ -133,10 +133,10 @@ Eight sets of round 13 were answered blindly by one code, those of dc_motor not 
 seven wrong answers three lie within 0.4 sigma of what hides (two pairs, told as either member, and
 a loss with a limit as dry friction); two say a family of a law that is local in a state, or in the
 product of a state and an input; one leaves out a delay beside a push 60 times as loud, one takes a
-parameter that switches for a store.  With what followed (entries that are one motion are one
-answer; a force that swings is looked for where nothing else explains a recording) a set that had
-been too long and an answer that had not been sure are right, and a hidden periodic force has its
-formula; the answers of before are reported.
+parameter that switches for a store.  With what followed (entries that are one motion count as one;
+what swings is looked for where nothing else explains a recording) an answer that had not been sure
+is right, and hidden periodic forces and a pumped parameter have their formulas; the answers of
+before are reported.
 
 Of rounds 1 to 3, the code after round 4 has answered all sets of cascaded_tanks, dc_motor and
 thermal_rc again but three (cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at

@@ -48,6 +48,7 @@ FORMULAS = {
     "one_way_gain": r"Abs\(\w+\)",
     "local_force": r"exp\(",
     "periodic_force": r"sin\([^)]*\bt\b",
+    "pumped_parameter": r"-> \w+\*\(1 \+ \w+\*sin\(",
     "product_of_states": r"\w+\*\w+\*\w+",
     "bilinear_input": r"\w+\*\w+\*\w+",
     "bounded_loss": r"/\(\w+ \+ [Aa]bs\(\w+\)\)",
