@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import binomtest
 
 from pikanid import errors
+from pikanid.validation.concealed.outcome import read
 from pikanid.validation.concealed.score import Share, judge, reliability, tally, wilson
 
 TWINS = {"input_delay": ["sensor_delay"], "sensor_delay": ["input_delay"]}
@@ -288,3 +289,11 @@ def test_tally_counts_strong_effects_beside_a_remainder_only() -> None:
 def test_a_remainder_that_is_none_is_one_sentence(changed: dict) -> None:
     with pytest.raises(errors.BadSetting, match="truth file"):
         judge({**ONE, **changed}, answer())
+
+
+@pytest.mark.parametrize(("formula", "law"), [
+    ("swing_a*sin(swing_rate*t) + swing_b*cos(swing_rate*t)", "periodic_force"),
+    ("k3 -> k3*(1 + k3_swing_a*sin(k3_swing_rate*t) + k3_swing_b*cos(k3_swing_rate*t))",
+     "pumped_parameter")])
+def test_a_force_that_swings_is_no_parameter_that_does(formula: str, law: str) -> None:
+    assert {"periodic_force", "pumped_parameter"} & read({f"symbolic:{formula}"}) == {law}

@@ -47,7 +47,7 @@ FORMULAS = {
     "quadratic_input": r"u_\w\*\*2",
     "one_way_gain": r"Abs\(\w+\)",
     "local_force": r"exp\(",
-    "periodic_force": r"sin\([^)]*\bt\b",
+    "periodic_force": r"^(?!.*->).*sin\([^)]*\bt\b",
     "pumped_parameter": r"-> \w+\*\(1 \+ \w+\*sin\(",
     "product_of_states": r"\w+\*\w+\*\w+",
     "bilinear_input": r"\w+\*\w+\*\w+",
