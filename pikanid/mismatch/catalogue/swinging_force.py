@@ -40,8 +40,8 @@ def swinging_on_their_own(sites: Sequence[Site]) -> list[Candidate]:
     laws = [swinging_force(site, "") for site in sites]
     held = {p: site for site in reversed(sites) for p in site.free_in_force}
     laws += [_swinging_parameter(site, p) for p, site in held.items()]
-    return [replace(law, ids=(SYMBOLIC + law.expression,), known=True,
-                    directions=law.signs or law.directions, signs=None) for law in laws]
+    return [replace(law, ids=(SYMBOLIC + law.expression,), known=True, directions=_undriven(law),
+                    signs=None) for law in laws]
 
 
 def _swinging_parameter(site: Site, p: str) -> Candidate:
@@ -72,8 +72,7 @@ def _swinging(site: Site, key: str, name: str, unit: str, written: str,
 
     def signs(view: View) -> list[TangentDirection]:
         # two swings can be told apart that differ by half a turn in a recording
-        rates = [rate for rate in np.arange(turn, high, max(0.5 * turn, (high - turn) / MOST))
-                 if not _driven(view, rate)]
+        rates = np.arange(turn, high, max(0.5 * turn, (high - turn) / MOST))
         by = lever(view)
         return [TangentDirection({size.name: 1.0, w.name: float(rate)},
                                  force=by * wave(rate * view.t))
@@ -84,12 +83,24 @@ def _swinging(site: Site, key: str, name: str, unit: str, written: str,
                      per_recording=True, known=False, signs=signs)
 
 
-def _driven(view: View, rate: float) -> bool:
-    """Whether an input swings at this frequency itself: anything may follow it then."""
-    waves = np.column_stack([np.ones(len(view.t)), np.sin(rate * view.t), np.cos(rate * view.t)])
-    for u in view.u.values():
-        apart = u - np.mean(u)
-        left = u - waves @ np.linalg.lstsq(waves, u)[0]
-        if np.sum(left**2) < (1 - LINE) * np.sum(apart**2):
-            return True
-    return False
+def _undriven(law: Candidate) -> Callable[[View], list[TangentDirection]]:
+    """The signs of a law that swings, but at frequencies at which an input does, too: anything may
+    follow that.
+    """
+    shown, rate = law.signs, law.parameters[-1].name
+
+    def directions(view: View) -> list[TangentDirection]:
+        signs = shown(view) if shown else ()
+        apart = [u - np.mean(u) for u in view.u.values()]
+        driven = {w for w in {sign.start[rate] for sign in signs}
+                  if any(_is_line(u, w * view.t) for u in apart)}
+        return [sign for sign in signs if sign.start[rate] not in driven]
+
+    return directions
+
+
+def _is_line(u: np.ndarray, phase: np.ndarray) -> bool:
+    """Whether most of an input (L,) about its mean swings with this phase (L,)."""
+    waves = np.column_stack([np.ones_like(phase), np.sin(phase), np.cos(phase)])
+    seen = waves.T @ u
+    return bool(seen @ np.linalg.lstsq(waves.T @ waves, seen)[0] > LINE * (u @ u))

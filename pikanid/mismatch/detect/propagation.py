@@ -10,9 +10,20 @@ import numpy as np
 
 from pikanid.simulation.sdirk_table import NODES, SDIRK
 from pikanid.simulation.support import solve_small
-from pikanid.storage.jit import cached_jit
+from pikanid.storage.jit import cached_jit, inner_jit
 
 TOGETHER = 8  # numerical: motions side by side, to hide how long one step takes
+
+
+@inner_jit()
+def keep(x: np.ndarray, k: int, M: np.ndarray, B: np.ndarray) -> None:
+    """What the k-th step makes of X, and of F at three places, from the columns of x (n, 4 n)."""
+    n = len(x)
+    for i in range(n):
+        for j in range(n):
+            M[k, i, j] = x[i, j]
+            for place in range(3):
+                B[place, i, j, k] = x[i, (place + 1) * n + j]
 
 
 @cached_jit()
@@ -66,11 +77,7 @@ def step_matrices(A: np.ndarray, h: np.ndarray, parts: int) -> tuple[np.ndarray,
                 for j in range(m):
                     x[i, j] += size / 6 * total[i, j]
                     probe[i, j] = x[i, j]
-        for i in range(n):
-            for j in range(n):
-                M[k, i, j] = x[i, j]
-                for place in range(3):
-                    B[place, i, j, k] = x[i, (place + 1) * n + j]
+        keep(x, k, M, B)
     return M, B
 
 
@@ -114,11 +121,7 @@ def stiff_matrices(A: np.ndarray, h: np.ndarray, parts: int) -> tuple[np.ndarray
                 for i in range(n):
                     for j in range(m):
                         x[i, j] += size * SDIRK[stages - 1, stage] * K[stage, i, j]
-        for i in range(n):
-            for j in range(n):
-                M[k, i, j] = x[i, j]
-                for place in range(3):
-                    B[place, i, j, k] = x[i, (place + 1) * n + j]
+        keep(x, k, M, B)
     return M, B
 
 

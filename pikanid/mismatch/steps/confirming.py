@@ -46,8 +46,9 @@ def with_laws_outside(case: Case, answer: Answer, shape: ForceShape, site: Site)
     search.offer([((law,), [search.base().point]) for law in symbolic_candidates(
         shape, site, case.candidates, case.settings)])
     swinging = swinging_on_their_own(case.sites)
-    search.offer([((law,), starts) for law, starts in Screen(
-        search.base(), swinging).singles(len(swinging))])
+    # one after the other: hundreds of signs of each are as much as a memory should hold
+    search.offer([((one,), starts) for law in swinging
+                  for one, starts in Screen(search.base(), [law]).singles(1)])
     # one with a size and a phase in every recording takes up a part of anything
     partly = {law.key for law in swinging if not (
         (h := search.fits.get(frozenset({law.key}))) and case.adequate(h))}
