@@ -198,7 +198,8 @@ def test_without_a_rest_friction_has_no_next_form() -> None:
     run = Recording.from_arrays(t, {"u": np.sin(t), "x": np.cos(t)}, units={"u": "m/s^2", "x": "m"})
     assert not [c for c in candidates(sites(model, (run,)))
                 if c.next_to and c.channel == "dynamics"
-                and c.ids[0] not in ("stiffening_wall", "saturating_loss", "swinging_force")]
+                and c.ids[0] not in ("stiffening_wall", "saturating_loss", "swinging_force",
+                                     "regional_force")]
 
 
 def test_the_next_form_stands_beside_several_names_that_it_explains_no_better_than() -> None:

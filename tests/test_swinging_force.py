@@ -16,9 +16,9 @@ from pikanid.mismatch.catalogue.candidate import View
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.diagnose import diagnose
+from pikanid.mismatch.search.in_its_place import in_its_place
 from pikanid.mismatch.search.neighbours import with_other_form
 from pikanid.mismatch.search.screen import Screen
-from pikanid.mismatch.search.swings import swings
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import Model
@@ -145,4 +145,4 @@ def test_where_nothing_tells_how_it_swings_no_fit_begins() -> None:
     [start] = [c for c in case.candidates if c.key == "initial_state"]
     [law] = [c for c in case.candidates if c.key == "swinging_force"]
     silent = replace(law, directions=lambda view: [])
-    assert swings(search._fit([start], [{}]), start, silent) == []
+    assert in_its_place(search._fit([start], [{}]), start, silent) == []

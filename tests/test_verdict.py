@@ -151,27 +151,27 @@ def test_each_of_several_effects_has_to_help_on_the_held_out_recording() -> None
 
 
 def test_a_weak_effect_is_not_named() -> None:
-    weak = [hypothesis(1030.0), hypothesis(1000.0, A)]
+    weak = [hypothesis(1080.0), hypothesis(1000.0, A)]
     given = answered(weak, {"": 5.0})
     assert given.verdict == "unconfirmed" and "weak" in given.doubt
     # both recordings count, and every effect
     assert answered(weak, {"": 20.0}).verdict == "named"
-    pair = [BASE, hypothesis(1000.0, A), hypothesis(1900.0, B), hypothesis(960.0, A, B)]
+    pair = [BASE, hypothesis(1000.0, A), hypothesis(1900.0, B), hypothesis(910.0, A, B)]
     assert answered(pair, {"": 99.0, "a": 4.0, "b": 99.0}).verdict == "unconfirmed"
     assert answered(pair, {"": 99.0, "a": 20.0, "b": 99.0}).verdict == "named"
     # more of each of two than of one
-    assert answered([hypothesis(1041.0), hypothesis(1000.0, A)]).verdict == "named"
+    assert answered([hypothesis(1091.0), hypothesis(1000.0, A)]).verdict == "named"
     assert answered(pair, {"": 99.0, "a": 1.0, "b": 99.0}).verdict == "unconfirmed"
 
 
 def test_more_is_asked_where_the_noise_is_little_known() -> None:
     def fits(spread: float) -> list[Hypothesis]:
-        return [hypothesis(1080.0), hypothesis(1000.0, A, spread=spread)]
+        return [hypothesis(1180.0), hypothesis(1000.0, A, spread=spread)]
 
     assert answered(fits(0.1)).verdict == "named"
-    assert "91 are asked" in answered(fits(0.5)).doubt
+    assert "204 are asked" in answered(fits(0.5)).doubt
     # known by its order only, no more: some gain is always enough
-    strong = [hypothesis(1130.0), hypothesis(1000.0, A, spread=3.0)]
+    strong = [hypothesis(1295.0), hypothesis(1000.0, A, spread=3.0)]
     assert answered(strong).verdict == "named"
 
 
@@ -215,7 +215,7 @@ def test_exact_ties_fall_the_same_way_whatever_the_rounding() -> None:
     equal = [BASE, hypothesis(1000.0, B), hypothesis(1000.0, A)]
     given = answered(equal)
     assert given.verdict == "set" and [h.key for h in given.given] == [{"a"}, {"b"}]
-    strong = [hypothesis(1040.0), hypothesis(1000.0, A)]
+    strong = [hypothesis(1090.0), hypothesis(1000.0, A)]
     assert answered(strong).verdict == "named"
     more = DEFAULTS.verdict.needless
     nearly = [BASE, hypothesis(1000.0, A), hypothesis(1000.0 - 14.0 + more, A, B)]

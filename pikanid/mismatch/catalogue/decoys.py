@@ -184,16 +184,17 @@ def _pushing(site: Site, text: str, *fixed: Parameter) -> Callable[[Model], Mode
 
 
 def velocity_coupled_drive(site: Site) -> list[Candidate]:
-    """κ u v: the drive acts according to the speed, or to the state."""
+    """κ u v: the drive acts according to the speed, or to the state; that of another equation, too.
+    """
     found = []
-    for u in site.inputs:
-        drive = site.model.input(u).unit
-        k = Parameter(site.name("k_uv", site.variant(u)), 0.0, units.product(
+    for u in site.model.input_names:
+        drive, own = site.model.input(u).unit, site.variant(u) if u in site.inputs else u
+        k = Parameter(site.name("k_uv", own), 0.0, units.product(
             (site.force_unit, 1), (drive, -1), (site.speed_unit, -1)) if drive else "")
         found.append(term(
             site, "velocity_coupled_drive",
             f"a drive that depends on {'speed' if site.q else site.v}", f"{k.name}*{u}*{site.v}", k,
-            _product(u, site.v), one_sided=False, variant=site.variant(u), known=False))
+            _product(u, site.v), one_sided=False, variant=own, known=False))
     return found
 
 

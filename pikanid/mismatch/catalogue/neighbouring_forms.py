@@ -7,8 +7,9 @@ state, that of a free exponent with a loss that saturates; an elastic wall with 
 rises with the square, as that of a cable that tightens;
 a boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially; a
 steady drift with a parameter that settles; a loop of hysteresis with a spring that gives way
-without a memory; another initial state with a force that goes on swinging; a scale error of input
-or sensor with curves that bend as well, and a cubic one with other powers.
+without a memory; another initial state with a force that goes on swinging; a constant force with
+one in a region of a state; a scale error of input or sensor with curves that bend as well, and a
+cubic one with other powers.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 from pikanid.formula import units
 from pikanid.mismatch.catalogue.candidate import Begin, Candidate, Family, Powers
 from pikanid.mismatch.catalogue.forces import INF, changing, wall_force
+from pikanid.mismatch.catalogue.regional_force import regional_forces
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.mismatch.catalogue.swinging_force import swinging_force
 from pikanid.model import Model
@@ -50,6 +52,8 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
         return [_yielding(entry)]
     if entry.ids == ("initial_state",):
         return [swinging_force(entry.site, entry.key)]
+    if entry.ids == ("static_bias",):
+        return regional_forces(entry)
     if entry.ids == ("input_gain",):
         return [_bent(entry, entry.variant or entry.site.inputs[0], n) for n in BENT]
     if entry.ids == ("sensor_gain",) and entry.site.rate:

@@ -175,7 +175,7 @@ def _elsewhere(kind: Kind, kinds: Iterable[Kind]) -> bool:
 def _with_a_size(one: Present | Doubtful, h: Hypothesis, overdispersion: float,
                  settings: Settings) -> Present | Doubtful:
     """The same; not sure where the remainder leaves open whether there is any of it."""
-    if isinstance(one, Doubtful) or one.instead is not None:
+    if isinstance(one, Doubtful):
         return one
     why = no_size(one.effect, h, overdispersion, settings)
     return Doubtful(one.kind, one.effect, why) if why else one

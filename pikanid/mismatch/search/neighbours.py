@@ -12,8 +12,8 @@ from pikanid.mismatch.catalogue.candidate import CURVES, Candidate
 from pikanid.mismatch.detect.tangent import directions
 from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
+from pikanid.mismatch.search.in_its_place import in_its_place
 from pikanid.mismatch.search.screen import Screen, as_strong
-from pikanid.mismatch.search.swings import swings
 
 WIDER = (0.3, 1.0, 3.0)  # numerical: of the last parameter of a wider law, where fits of it begin
 LIKE = 0.5  # numerical: share of what a law does, from which on an open shape is tried
@@ -131,7 +131,7 @@ def with_next_sign(h: Hypothesis, candidates: Sequence[Candidate],
             for other, starts in Screen(without, near).singles(len(near)):
                 yield (*_rest(h, effect), other), starts
         for other in near:
-            yield (*_rest(h, effect), other), swings(h, effect, other)
+            yield (*_rest(h, effect), other), in_its_place(h, effect, other)
 
 
 def with_open_shape(h: Hypothesis, candidates: Sequence[Candidate],

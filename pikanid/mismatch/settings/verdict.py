@@ -39,8 +39,9 @@ class VerdictSettings:
         part: Share of the nominal held-out misfit, a quarter of its square, that a part may leave.
         alike: Ratio of held-out misfits below which two hypotheses predict alike.
         strong: [χ² in all recordings] that one effect must gain, and each of two, of three, of
-            four: 4.5 standard deviations in each of two recordings; several together can take up
-            most of anything.
+            four: 6.7 standard deviations in each of two recordings.  A law that is in no catalogue
+            lies at some angle to the next one that is, and what is weaker shows no such angle but
+            a wide one; several together can take up most of anything.
         minor: Share of what an explanation gains below which an effect of it is minor: a tenth
             of the misfit's size, as what nobody has modelled often is.
         minor_strong: [χ² in all recordings] that a minor effect must gain, and one that happens
@@ -79,7 +80,7 @@ class VerdictSettings:
     worth: Share = 0.05
     part: Share = 0.5
     alike: Factor = 1.1
-    strong: tuple[Amount, Amount, Amount, Amount] = (40.0, 45.0, 90.0, 135.0)
+    strong: tuple[Amount, Amount, Amount, Amount] = (90.0, 95.0, 95.0, 135.0)
     minor: Share = 0.01
     minor_strong: Amount = 200.0
     shown: Amount = 12.0

@@ -26,6 +26,7 @@ from pikanid.mismatch.search.neighbours import (
     with_bent_scales,
     with_curves,
     with_next_form,
+    with_next_sign,
     with_relatives,
     with_sums,
     with_walls,
@@ -166,7 +167,8 @@ def _compared(search: Search, lead: Hypothesis) -> bool:
     """
     found = search.refine([
         *(job for e in lead.effects for job in with_relatives(lead, e, search.candidates)),
-        *with_next_form(lead, search.candidates), *with_walls(lead, search.candidates),
+        *with_next_form(lead, search.candidates),
+        *with_next_sign(lead, search.candidates, search.fits), *with_walls(lead, search.candidates),
         *with_sums(lead, search.candidates), *with_curves(lead, search.candidates),
         *with_bent_scales(lead, search.candidates), *with_wider(lead, search.candidates),
         *_without_each_family(lead, search.settings.part.dry)], lead.key)
