@@ -113,7 +113,8 @@ def test_a_law_is_compared_with_what_contains_it_beside_all_the_rest(case: Case)
     """From an exponent and a size: from nothing no step leads to an exponent."""
     jobs: list[Any] = []
     search: Any = SimpleNamespace(settings=DEFAULTS, candidates=case.candidates,
-                                  budget_exhausted=True, refine=lambda found, _: jobs.extend(found))
+                                  budget_exhausted=True, fits={},
+                                  refine=lambda found, _: jobs.extend(found))
     surely._compared(search, hypothesis(case, "quadratic_drag", "static_bias"))
     starts = [start for effects, found in jobs for start in found
               if keys(effects) == {"power_drag", "static_bias"}]
