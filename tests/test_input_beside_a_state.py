@@ -45,6 +45,8 @@ def test_every_input_may_act_so_in_every_equation() -> None:
     assert {c.site.v for c in found.values()} == {"a", "h"} and len(found) == 2
     assert len({p.name for c in found.values() for p in c.parameters}) == 2
     assert all(not c.known for c in found.values())
+    assert {c.name for c in found.values()} == {"a drive that depends on a",
+                                                "u acting in proportion to h"}
 
 
 def test_it_explains_all_and_is_found_where_it_acts() -> None:

@@ -188,13 +188,15 @@ def velocity_coupled_drive(site: Site) -> list[Candidate]:
     """
     found = []
     for u in site.model.input_names:
-        drive, own = site.model.input(u).unit, site.variant(u) if u in site.inputs else u
+        drives, drive = u in site.inputs, site.model.input(u).unit
+        own = site.variant(u) if drives else u
+        name = (f"a drive that depends on {'speed' if site.q else site.v}" if drives else
+                f"{u} acting in proportion to {site.v}")
         k = Parameter(site.name("k_uv", own), 0.0, units.product(
             (site.force_unit, 1), (drive, -1), (site.speed_unit, -1)) if drive else "")
         found.append(term(
-            site, "velocity_coupled_drive",
-            f"a drive that depends on {'speed' if site.q else site.v}", f"{k.name}*{u}*{site.v}", k,
-            _product(u, site.v), one_sided=False, variant=own, known=False))
+            site, "velocity_coupled_drive", name, f"{k.name}*{u}*{site.v}", k, _product(u, site.v),
+            one_sided=False, variant=own, known=False))
     return found
 
 
