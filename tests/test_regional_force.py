@@ -90,9 +90,9 @@ def test_what_it_would_show_is_what_it_does() -> None:
 
 def test_no_place_of_a_coordinate_without_a_rest_is_special() -> None:
     """And on a spring one is."""
-    def regions(spring: str) -> set[str]:
+    def regions(spring: str, start: float = 0.1) -> set[str]:
         model = Model.from_dict({
-            "name": "cart", "states": {"x": {"unit": "m"}, "v": {"unit": "m/s"}},
+            "name": "cart", "states": {"x": {"unit": "m", "initial": start}, "v": {"unit": "m/s"}},
             "parameters": {"b": {"unit": "1/s", "guess": 1.0}},
             "inputs": {"u": {"unit": "m/s^2"}},
             "equations": {"x": "v", "v": f"u - b*v {spring}"},
@@ -100,10 +100,14 @@ def test_no_place_of_a_coordinate_without_a_rest_is_special() -> None:
         t = np.arange(100) * 0.01
         run = Recording.from_arrays(
             t, {"u": np.sin(t), "x": np.cos(t)}, units={"u": "m/s^2", "x": "m"})
-        return {c.variant for c in candidates(sites(model, (run,))) if c.ids == ("regional_force",)}
+        found = [c for c in candidates(sites(model, (run,))) if c.ids == ("regional_force",)]
+        assert all(c.next_to == "static_bias" for c in found)
+        return {c.variant for c in found}
 
     assert regions("") == {"v"}
     assert regions("- 2.0*x") == {"x", "v"}
+    # one that starts where a constant force would hold it has that entry in two variants
+    assert regions("- 2.0*x", 0.0) == {"x", "v"}
 
 
 @pytest.mark.slow

@@ -52,7 +52,7 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
         return [_yielding(entry)]
     if entry.ids == ("initial_state",):
         return [swinging_force(entry.site, entry.key)]
-    if entry.ids == ("static_bias",):
+    if entry.ids == ("static_bias",) and not entry.variant:
         return regional_forces(entry)
     if entry.ids == ("input_gain",):
         return [_bent(entry, entry.variant or entry.site.inputs[0], n) for n in BENT]
