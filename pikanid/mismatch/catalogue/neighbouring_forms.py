@@ -4,12 +4,12 @@ A name claims a form.  Where the form next to it explains a recording about as w
 has not shown which of them acts; where it explains far more, the entry is not what acts.  So
 compared are: every power law of the catalogue with those of one power more and one less in each
 state, that of a free exponent with a loss that saturates; an elastic wall with one whose force
-rises with the square, as that of a cable that tightens;
-a boundary layer, whose memory has a power's tail, with a fluid whose memory fades exponentially; a
-steady drift with a parameter that settles; a loop of hysteresis with a spring that gives way
-without a memory; another initial state with a force that goes on swinging; a constant force with
-one in a region of a state; a scale error of input or sensor with curves that bend as well, and a
-cubic one with other powers.
+rises with the square, as that of a cable that tightens; a boundary layer, whose memory has a
+power's tail, with a fluid whose memory fades exponentially; a steady drift with a parameter that
+settles; a loop of hysteresis with a spring that gives way without a memory; another initial state
+with a force that goes on swinging; a constant force with one in a region of a state; a linear
+coupling with one in the product of both states; a scale error of input or sensor with curves that
+bend as well, and a cubic one with other powers.
 """
 
 from __future__ import annotations
@@ -54,6 +54,8 @@ def neighbouring_forms(entry: Candidate) -> list[Candidate]:
         return [swinging_force(entry.site, entry.key)]
     if entry.ids == ("static_bias",) and not entry.variant:
         return regional_forces(entry)
+    if entry.ids == ("coupled_state",):
+        return [_in_product(entry)]
     if entry.ids == ("input_gain",):
         return [_bent(entry, entry.variant or entry.site.inputs[0], n) for n in BENT]
     if entry.ids == ("sensor_gain",) and entry.site.rate:
@@ -197,6 +199,23 @@ def _settling(drift: Candidate) -> Candidate:
 
     made = _decoy(drift, "settling_parameter", f"{p} -> {text}", (a, tau), starts, drift.families)
     return replace(made, static=False, extend=lambda m: changing(m, p, text))
+
+
+def _in_product(linear: Candidate) -> Candidate:
+    """k y v, in place of k y: what comes of one state acts on what is there of the other, as in
+    kinetics (C. M. Guldberg and P. Waage, Les Mondes 12, 1864).
+    """
+    site, y, size = linear.site, linear.variant, linear.parameters[0]
+    k = Parameter(site.name("k_with", y), 0.0, units.product(
+        (size.unit or "1", 1), (site.speed_unit, -1)))
+
+    def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
+        both = states[y] * states[site.v]
+        return [{k.name: values[size.name] * float(both @ states[y]) / max(float(both @ both),
+                                                                          1e-300)}]
+
+    return _decoy(linear, "coupling_in_product", f"{k.name}*{y}*{site.v}", (k,), starts,
+                  linear.families)
 
 
 def _bent(scale: Candidate, channel: str, n: int) -> Candidate:

@@ -17,7 +17,8 @@ from pikanid.mismatch.search.screen import Screen, as_strong
 
 WIDER = (0.3, 1.0, 3.0)  # numerical: of the last parameter of a wider law, where fits of it begin
 LIKE = 0.5  # numerical: share of what a law does, from which on an open shape is tried
-Job = tuple[Sequence[Candidate], Sequence[Start | Mapping[str, float]]]
+Starts = Sequence[Start | Mapping[str, float]]
+Job = tuple[Sequence[Candidate], Starts]
 
 
 def without_one(h: Hypothesis) -> Iterator[Job]:
@@ -43,6 +44,19 @@ def afresh(h: Hypothesis, guess: Mapping[str, float]) -> Iterator[Job]:
         if len(effect.parameters) > 2:
             for _, starts in Screen(h, [effect]).singles(1):
                 yield h.effects, starts
+
+
+def with_events(h: Hypothesis, candidates: Sequence[Candidate],
+                fits: Mapping[frozenset[str], Hypothesis]) -> Iterator[Job]:
+    """With what happens once beside a hypothesis, and in the place of each of its effects, however
+    much is left there: a push that is as loud as all the rest is beside nothing but that.
+    """
+    for key in (h.key, *(h.key - {e.key} for e in h.effects)):
+        about = fits.get(key)
+        if about is not None and about.effects and about.far:
+            events = [c for c in candidates if c.absent and c.fits and c.suits(about.effects)]
+            for event, starts in Screen(about, events).singles(1):
+                yield (*about.effects, event), starts
 
 
 def from_its_place(h: Hypothesis, rivals: Iterable[Hypothesis], base: Hypothesis) -> Iterator[Job]:

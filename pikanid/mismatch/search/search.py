@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -13,13 +13,12 @@ from pikanid.mismatch.catalogue.candidate import Candidate
 from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.closest import Closest
 from pikanid.mismatch.fitting.decisions import below, in_order
-from pikanid.mismatch.fitting.descent import Start
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.fitting.hypothesis import Hypothesis, near_guess
 from pikanid.mismatch.fitting.parallel import ordered_parallel_map
 from pikanid.mismatch.fitting.progressive_horizon import hits, lost
 from pikanid.mismatch.search import leaders, neighbours, places
-from pikanid.mismatch.search.neighbours import Job
+from pikanid.mismatch.search.neighbours import Job, Starts
 from pikanid.mismatch.search.overdispersion import overdispersion
 from pikanid.mismatch.search.screen import Screen, drag, entry, fixed, kept, law, nothing
 from pikanid.mismatch.settings.settings import Settings
@@ -27,7 +26,6 @@ from pikanid.mismatch.settings.thresholds import price
 from pikanid.model import Model
 
 Adequate = Callable[[Hypothesis], bool]
-Starts = Sequence[Start | Mapping[str, float]]
 
 
 @dataclass
@@ -94,8 +92,7 @@ class Search:
             if self.base() is base:
                 break  # else effects had led out of a minimum that only the nominal model was in
         # where what is missing has led the nominal model away, effects show about the guess
-        about = near_guess(self.nominal, self.records)
-        for other in places.other_places(self.base(), about):
+        for other in places.other_places(self.base(), near_guess(self.nominal, self.records)):
             self._fit_all([((c,), starts) for c, starts in Screen(other, every).singles(
                 budget.singles)], again=True, always=True, reach=self.base().minimum.chi2)
         self.spent = 0.0  # every effect has had its turn: effort is what combinations cost
@@ -130,6 +127,9 @@ class Search:
                 break
             self._simplify()  # what led out of a dead end may have done its part
         self._simplify()
+        if not adequate(best := self.ranked()[0]):
+            self._fit_all([*neighbours.with_events(best, self.candidates, self.fits)], again=True)
+            self._simplify()
         if not (best := self.ranked()[0]).known:
             self._exchange(best, anyway=True)
         if not (self.ranked()[0].known and adequate(self.ranked()[0])):

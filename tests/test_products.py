@@ -1,4 +1,4 @@
-"""An input acts in proportion to a state that it does not drive; a rig that SciPy simulates."""
+"""Products of an input, or of another state, and a state; rigs that SciPy simulates."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from pikanid.mismatch.catalogue.catalogue import candidates
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.diagnose import diagnose
+from pikanid.mismatch.search import neighbours
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.model import Model
@@ -58,6 +59,34 @@ def test_it_explains_all_and_is_found_where_it_acts() -> None:
     size = law.parameters[0].name
     assert fit.minimum.chi2 < 1.15 * fit.whitened.rows < search.base().minimum.chi2 - 100
     assert abs(fit.values[size] - PRODUCT) < 4 * fit.std[size] < abs(PRODUCT)
+
+
+def test_a_linear_coupling_is_compared_with_one_in_proportion_to_both_states() -> None:
+    """Two substances are fed, and one takes up the other."""
+    model = Model.from_dict({
+        "name": "two substances", "states": {"a": {"unit": "mol"}, "h": {"unit": "mol"}},
+        "parameters": {"p": {"unit": "1/s", "guess": 0.12}, "q": {"unit": "1/s", "guess": 0.07}},
+        "inputs": {"u": {"unit": "mol/s"}}, "equations": {"a": "u - p*a", "h": "u - q*h"},
+        "outputs": {n: {"unit": "mol", "expression": n} for n in "ah"}})
+    rng, u = np.random.default_rng(2), np.repeat(np.random.default_rng(1).uniform(0, 0.4, 12), 50)
+    x = [np.zeros(2)]
+    for held in u[:-1]:
+        x.append(solve_ivp(lambda s, x, by=held: [
+            by - 0.1 * x[0], by - 0.08 * x[1] - 0.02 * x[0] * x[1]],
+            (0, 1), x[-1], "LSODA", rtol=1e-9, atol=1e-11).y[:, -1])
+    a, h = np.array(x).T + NOISE * rng.standard_normal((2, 600))
+    run = Recording.from_arrays(np.arange(600.0), {"u": u, "a": a, "h": h},
+                                units={"u": "mol/s", "a": "mol", "h": "mol"})
+    case = open_case(model, (run,), None, None, lambda text: None, DEFAULTS)
+    search = case.begin_search()
+    [linear] = [c for c in case.candidates if c.ids == ("coupled_state",) and c.site.v == "h"]
+    begun = search._fit([linear], [{}])
+    [job] = neighbours.with_next_form(begun, case.candidates)
+    product = search._fit(*job)
+    assert [e.next_to for e in product.effects] == [linear.key] and not product.known
+    assert product.minimum.chi2 < 1.15 * product.whitened.rows < begun.minimum.chi2 - 1000
+    size = product.effects[0].parameters[0].name
+    assert abs(product.values[size] + 0.02) < 4 * product.std[size] < 0.002
 
 
 @pytest.mark.slow
