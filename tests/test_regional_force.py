@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,8 +14,10 @@ from pikanid.formula.expressions import symbol
 from pikanid.mismatch.case import Case
 from pikanid.mismatch.catalogue.candidate import View
 from pikanid.mismatch.catalogue.catalogue import candidates
+from pikanid.mismatch.catalogue.regional_force import is_everywhere
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.diagnose import diagnose
+from pikanid.mismatch.judge.kinds import families_of
 from pikanid.mismatch.search.in_its_place import in_its_place
 from pikanid.mismatch.search.neighbours import with_other_form
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -86,6 +88,19 @@ def test_what_it_would_show_is_what_it_does() -> None:
               for x in w[20:23]]
         assert sign.force[20:23] == pytest.approx(at)
     assert not law.signs(cast(View, SimpleNamespace(x={"w": np.full(50, 2.0)})))
+
+
+@pytest.mark.parametrize(("at", "wide", "everywhere"), [
+    (1.0, 2.9, False), (1.0, 3.1, True), (-4.9, 1.0, False), (-5.1, 1.0, True), (5.1, 1.0, True)])
+def test_where_the_motion_does_not_leave_its_region_it_is_constant(
+        at: float, wide: float, everywhere: bool) -> None:
+    [law] = [c for c in candidates(sites(axis(), (turned(1),))) if c.ids == ("regional_force",)]
+    values = {"k_region_w": 1.0, "h_region_w": at, "w_region_w": wide}
+    motion = {"w": np.linspace(-5.0, 5.0, 50)}
+    h: Any = SimpleNamespace(values=values, blurred=frozenset(), minimum=SimpleNamespace(theta=0),
+                             whitened=SimpleNamespace(motion=lambda theta: motion))
+    assert is_everywhere(law, values, motion) == everywhere
+    assert families_of(law, h, 0.3) == (("constant force",) if everywhere else ())
 
 
 def test_no_place_of_a_coordinate_without_a_rest_is_special() -> None:

@@ -4,7 +4,7 @@ constant force does, and leaves the rest alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,8 @@ from pikanid.mismatch.catalogue.forces import INF
 from pikanid.mismatch.catalogue.site import Site
 from pikanid.model.parts import Parameter
 
+REGIONAL = "regional_force"
+WIDEST = 0.3  # definition: of a state's range, half of a region in it: then its ends are at rest
 CENTRES = np.linspace(0.1, 0.9, 9)  # numerical: of a state's range, where a region may lie
 WIDTHS = (0.08, 0.2)  # numerical: of that range, how wide it may be
 NARROWEST = 1e-9  # numerical: of a state's unit, so that a width is never nothing
@@ -25,6 +27,16 @@ def regional_forces(entry: Candidate) -> list[Candidate]:
     """
     site = entry.site
     return [_regional(entry, s) for s in site.moving if s != site.q or site.placed]
+
+
+def is_everywhere(law: Candidate, values: Mapping[str, float], motion: Mapping[str, np.ndarray]
+                  ) -> bool:
+    """Whether its region is as wide as a motion (L,), or has its middle outside of that: there the
+    law is a constant force, with a slope at most.
+    """
+    _, at, wide = (values[p.name] for p in law.parameters)
+    low, high = float(motion[law.variant].min()), float(motion[law.variant].max())
+    return not low < at < high or wide > WIDEST * (high - low)
 
 
 def _regional(entry: Candidate, s: str) -> Candidate:
@@ -45,7 +57,7 @@ def _regional(entry: Candidate, s: str) -> Candidate:
                 for at in (low + (high - low) * CENTRES).tolist()
                 for wide in ((high - low) * np.array(WIDTHS)).tolist()]
 
-    return replace(entry, ids=("regional_force",), name=f"a force in a region of {s}",
+    return replace(entry, ids=(REGIONAL,), name=f"a force in a region of {s}",
                    expression=text, parameters=(k, h, w), variant=s, twin="", families=(),
                    extend=lambda m: site.pushed(m, text), directions=lambda view: [], known=False,
                    form="", next_to=entry.key, signs=signs)

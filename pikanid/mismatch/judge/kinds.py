@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from pikanid.mismatch.catalogue.candidate import Candidate, Family
+from pikanid.mismatch.catalogue.regional_force import REGIONAL, is_everywhere
 from pikanid.mismatch.fitting.hypothesis import Hypothesis
 from pikanid.model.parts import Parameter
 
@@ -25,9 +26,14 @@ class Kind(NamedTuple):
 
 
 def families_of(effect: Candidate, h: Hypothesis, dry: float) -> tuple[Family, ...]:
-    """Of an effect as it was fitted: dry friction is what hardly rises with speed."""
+    """Of an effect as it was fitted: dry friction is what hardly rises with speed, and a force in a
+    region that the motion does not leave is constant.
+    """
     if effect.key in h.blurred:
         return ("drag",)
+    if effect.ids == (REGIONAL,) and is_everywhere(effect, h.values, h.whitened.motion(
+            h.minimum.theta)):
+        return ("constant force",)
     if isinstance(effect.exponent, Parameter) and h.values[effect.exponent.name] <= dry:
         return ("dry friction",)
     return effect.families
