@@ -32,8 +32,9 @@ LIMITS = {
     "actuator_lag": 0.06,
     # six states stand for the half-derivative over two decades
     "boundary_layer": 0.05,
-    # an input's jump inside a step counts for half of it
-    "velocity_coupled_drive": 0.045, "parameter_drift": 0.035, "input_hold": 0.03,
+    # an input's jump inside a step counts for half of it: in proportion to the step, most where it
+    # acts at once on what is seen
+    "velocity_coupled_drive": 0.06, "parameter_drift": 0.035, "input_hold": 0.03,
     "rate_limited_input": 0.065,
     # where a motion turns round inside a step
     "stribeck_friction": 0.035, "one_way_friction": 0.03,
