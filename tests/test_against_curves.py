@@ -134,7 +134,8 @@ def sure_of(family: str, instead: str = "") -> Any:
 @pytest.mark.parametrize(("families", "tried"), [
     (("restoring force", ""), ["v", "u"]), (("restoring force", "gain"), ["v"]),
     (("gain", "dry friction"), ["q"]), (("dry friction", "restoring force"), ["u"]),
-    (("mode", "constant force"), ["q", "v", "u"]), (("mode", "timing"), ["q", "v", "u"])])
+    # an input that acts elsewhere has a mean as well
+    (("mode", "constant force"), ["q", "v", "u", "w"]), (("mode", "timing"), ["q", "v", "u"])])
 def test_no_curve_stands_for_either_of_two_families(
         monkeypatch: pytest.MonkeyPatch, families: tuple[str, str], tried: list[str]) -> None:
     """Of what one of them depends on it would be that one; those for a constant force are zero at
@@ -148,7 +149,8 @@ def test_no_curve_stands_for_either_of_two_families(
             name * zero_at_zero))
     monkeypatch.setattr(curves, "with_and_instead", lambda *args: (None, None))
     h: Any = SimpleNamespace(effects=(), minimum=SimpleNamespace(chi2=1.0))
-    case: Any = SimpleNamespace(model=MODEL, search=SimpleNamespace(workers=1))
+    case: Any = SimpleNamespace(model=SimpleNamespace(input_names=("u", "w")),
+                                search=SimpleNamespace(workers=1))
     assert all(kappa == np.inf for _, kappa in curves._in_its_place(
         case, h, sure_of(*families), [], 1.0, []))
     assert asked == tried

@@ -197,8 +197,9 @@ def _in_its_place(case: Case, h: Hypothesis, p: Present, rest: Sequence[Candidat
     nominal, site, near = case.model, p.effect.site, h.minimum.chi2
     families = {k.family for k in p.kinds}
     states = [s for s in site.moving if s not in _arguments(p)]
-    # a curve of a channel has a slope
-    inputs = [] if families & {"gain", "input curve"} else site.inputs
+    # a curve of a channel has a slope; of an input anywhere it has a mean, as a constant force has
+    inputs = () if families & {"gain", "input curve"} else (
+        nominal.input_names if "constant force" in families else site.inputs)
 
     def times_as_much(instead: Hypothesis | None, both: Hypothesis | None = None) -> float:
         left = own_left if both is None else max(
