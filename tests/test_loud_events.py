@@ -70,3 +70,10 @@ def test_where_little_is_left_it_is_one_of_all_that_may_be_there(opened: Case) -
         {"tau_a": LAG, "peak": -1.0, "t_peak": 90.0, "width": 19.0}])
     assert not pair.far
     assert not [*neighbours.with_events(pair, opened.candidates, {pair.key: pair})]
+
+
+def test_what_has_happened_is_not_added_once_more(opened: Case) -> None:
+    search = opened.begin_search()
+    [event] = [c for c in opened.candidates if c.key == "disturbance"]
+    late = search._fit([event], [{"peak": 1.0, "t_peak": 20.0, "width": 2.0}])
+    assert late.far and not [*neighbours.with_events(late, opened.candidates, search.fits)]

@@ -29,9 +29,13 @@ def without_one(h: Hypothesis) -> Iterator[Job]:
 
 def beside(h: Hypothesis, candidates: Sequence[Candidate]) -> list[Candidate]:
     """What may be added to a hypothesis."""
+    return [c for c in _suiting(h, candidates) if not (c.absent and h.far)]
+
+
+def _suiting(h: Hypothesis, candidates: Sequence[Candidate]) -> list[Candidate]:
     groups = {e.alike for e in h.effects if e.alike}
     return [c for c in candidates if c.fits and c.suits(h.effects) and c.key not in h.key
-            and c.alike not in groups and not (c.absent and h.far)]
+            and c.alike not in groups]
 
 
 def afresh(h: Hypothesis, guess: Mapping[str, float]) -> Iterator[Job]:
@@ -54,7 +58,7 @@ def with_events(h: Hypothesis, candidates: Sequence[Candidate],
     for key in (h.key, *(h.key - {e.key} for e in h.effects)):
         about = fits.get(key)
         if about is not None and about.effects and about.far:
-            events = [c for c in candidates if c.absent and c.fits and c.suits(about.effects)]
+            events = [c for c in _suiting(about, candidates) if c.absent]
             for event, starts in Screen(about, events).singles(1):
                 yield (*about.effects, event), starts
 
