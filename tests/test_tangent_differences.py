@@ -32,10 +32,11 @@ LIMITS = {
     "actuator_lag": 0.06,
     # six states stand for the half-derivative over two decades
     "boundary_layer": 0.05,
-    # an input's jump inside a step counts for half of it: in proportion to the step, most where it
-    # acts at once on what is seen
-    "velocity_coupled_drive": 0.06, "parameter_drift": 0.035, "input_hold": 0.03,
+    # an input's jump inside a step counts for half of it
+    "velocity_coupled_drive": 0.045, "parameter_drift": 0.035, "input_hold": 0.03,
     "rate_limited_input": 0.065,
+    # the same at once on what is seen, of a state that the input does not drive: 3.2 % at STEP / 2
+    "velocity_coupled_drive[u": 0.07,
     # where a motion turns round inside a step
     "stribeck_friction": 0.035, "one_way_friction": 0.03,
 }
@@ -170,7 +171,7 @@ def refuted(rig: Rig, wanted: Callable[[Candidate], bool]) -> dict[str, float]:
     found = worst(rig, wanted)
     assert found
     return {key: error for key, error in found.items()
-            if not error < LIMITS.get(ids[key], USUAL)}
+            if not error < LIMITS.get(key.partition("]")[0], LIMITS.get(ids[key], USUAL))}
 
 
 def two() -> Rig:
