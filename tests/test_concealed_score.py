@@ -12,6 +12,8 @@ from pikanid import errors
 from pikanid.validation.concealed.outcome import read
 from pikanid.validation.concealed.score import Share, judge, reliability, tally, wilson
 
+PUMPED = "symbolic:l_theta -> l_theta*(1 + a*sin(rate*t) + b*cos(rate*t))"
+SWINGING = "symbolic:swing_a*sin(swing_rate*t) + swing_b*cos(swing_rate*t)"
 TWINS = {"input_delay": ["sensor_delay"], "sensor_delay": ["input_delay"]}
 
 
@@ -81,6 +83,12 @@ FRICTION, PAIR = case("coulomb_friction"), case("coulomb_friction", "input_delay
     (case("even_stiffness", kind="outside"), answer(["cubic_stiffness"], ["symbolic:theta**2"]),
      "formula", ""),
     (case("wobbling_length", kind="outside"), answer(["symbolic:theta**2"]), "wrong", "other"),
+    (case("wobbling_length", kind="outside"), answer([PUMPED]), "formula", ""),
+    (case("parametric_excitation", kind="outside"), answer([PUMPED]), "formula", ""),
+    (case("warming_damping", kind="outside"), answer([PUMPED]), "wrong", "other"),
+    (case("background_vibration", kind="outside"), answer([PUMPED]), "wrong", "other"),
+    (case("background_vibration", kind="outside"), answer([SWINGING]), "formula", ""),
+    (case("wobbling_length", kind="outside"), answer([SWINGING]), "wrong", "other"),
     (case("even_stiffness", kind="outside"), answer(verdict="unnamed"), "silent", ""),
     (case(), answer(), "right", ""),
     (case(), answer(["coulomb_friction"]), "wrong", "nothing"),

@@ -14,9 +14,10 @@ from pikanid.mismatch.judge import explanations
 from pikanid.mismatch.judge.explanations import Weighed
 from pikanid.mismatch.judge.kinds import Kind
 from pikanid.mismatch.judge.partial import Doubtful, Instead, Part, Present, _one_of_two
+from pikanid.mismatch.report import part as reported_as
 from pikanid.mismatch.search.neighbours import with_bent_scales
 from pikanid.mismatch.settings.settings import DEFAULTS
-from pikanid.mismatch.steps import surely
+from pikanid.mismatch.steps import remaining, surely
 
 __all__ = ["case"]  # the fixture
 SPRING, GAIN = effect("cubic_stiffness", "restoring force"), effect("input_gain", "gain")
@@ -65,6 +66,22 @@ def test_a_family_that_is_sure_by_itself_stands_for_no_other() -> None:
     both = of_two(Kind("dry friction", "v"), weighed((COULOMB, DRAG), 1.0, 0.995),
                   weighed((DRAG,), 2.0, 0.005), weighed((), 50.0, 0.0))
     assert isinstance(both, Doubtful)
+
+
+def test_one_family_in_either_of_two_equations_says_which() -> None:
+    there, here = (effect("cubic_stiffness", "restoring force") for _ in range(2))
+    there.site.v = "w"
+    found = of_two(Kind("restoring force", "v"), weighed((here,), 1.0, 0.6),
+                   weighed((there,), 1.2, 0.399), weighed((DRAG,), 30.0, 0.001))
+    assert isinstance(found, Present) and found.instead is not None
+    places = remaining._places(found)
+    assert places == ("v", "w")
+    said = reported_as.Present("restoring force", (), "cubic stiffness", "-k*q**3", {}, 0.6, 1.0,
+                               30.0, 1.2, 0.9, {}, {}, "restoring force", places)
+    assert said.title == "a restoring force in v' or in w'"
+    other = of_two(Kind("gain"), weighed((GAIN,), 1.0, 0.6), weighed((SPRING,), 1.2, 0.399),
+                   weighed((DRAG,), 30.0, 0.001))
+    assert isinstance(other, Present) and remaining._places(other) == ()
 
 
 def test_what_holds_neither_of_two_families_is_fitted_beside_the_rest(

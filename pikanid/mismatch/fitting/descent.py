@@ -152,9 +152,11 @@ def basin_hopping(whitened: Whitened, best: Minimum, effect: Candidate, limit: i
         lower = min((m for m in found if m is not None), key=lambda m: m.chi2, default=best)
         if lower.chi2 > best.chi2 - settings.fits.lower_hill:
             break
-        best = lower
+        left, best = best.chi2 - whitened.rows, lower
         if not best.converged:
             best = lowest(whitened, best.theta, limit) or best
+        if best.chi2 > whitened.rows + (1 - settings.fits.hop_again) * left > whitened.rows:
+            break  # it crawls along a valley far above an explanation
     return best
 
 

@@ -57,6 +57,7 @@ class Present:
             explanations that are not ruled out have them.
         or_family: Another family, where one of both is surely there, and which one is not sure;
             else empty.
+        places: States in whose equations the two act, where they are one family.
     """
 
     family: str
@@ -72,10 +73,14 @@ class Present:
     parameters: Mapping[str, Value]
     std_with_remainder: Mapping[str, float]
     or_family: str = ""
+    places: tuple[str, ...] = ()
 
     @property
     def title(self) -> str:
         """The name where it is sure, otherwise the family, or both of two."""
+        if self.places:
+            equations = " or in ".join(f"{v}'" for v in self.places)
+            return f"{in_words(self.family)} in {equations}"
         if self.or_family:
             return f"either {in_words(self.family)} or {in_words(self.or_family)}"
         return self.name if self.ids else in_words(self.family)

@@ -156,7 +156,7 @@ class Search:
         parts = [h for h in self.ranked() if h.key <= self.ranked()[0].key]
         for h in (*parts, *self._contenders()):
             for job in neighbours.with_other_form(h, self.candidates, self.fits):
-                self._fit_all([job], again=not job[0][-1].known, always=True)
+                self._fit_all([job], again=not job[0][-1].known, always=True, settled=h.key)
         return self.ranked()
 
     def _contenders(self, wide: float = 1.0, anyway: bool = False) -> Iterator[Hypothesis]:

@@ -28,6 +28,8 @@ class FitSettings:
         slow: Share of χ² left by one iteration from which on a fit far away is given up.
         other_order: [χ²] that another way to put the same effects together has to matter.
         lower_hill: [χ²] by which a minimum beyond a hill has to be lower.
+        hop_again: Share of what is left beyond the noise that a minimum beyond a hill has to
+            explain before more hills are looked for.
         rows_a_parameter: Rows a parameter that make a beginning worth a fit.
     """
 
@@ -43,6 +45,7 @@ class FitSettings:
     slow: Share = 0.7
     other_order: Amount = 1.0
     lower_hill: Amount = 1.0
+    hop_again: Share = 0.1
     rows_a_parameter: Count = 10
 
 

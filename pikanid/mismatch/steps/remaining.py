@@ -27,8 +27,15 @@ def present(answer: Answer, time: str) -> tuple[Present, ...]:
             p.family, p.names, _name(p), p.effect.expression, p.alternatives, p.probability,
             p.probability_family, _finite(p.dominance), _finite(p.dominance_within), p.share,
             values, {n: v.std for n, v in wider.items()},
-            p.instead.kind.family if p.instead else ""))
+            p.instead.kind.family if p.instead else "", _places(p)))
     return tuple(found)
+
+
+def _places(p: Sure) -> tuple[str, ...]:
+    """Where one family acts of which the equation is not sure."""
+    if p.instead is None or p.instead.kind.family != p.family:
+        return ()
+    return p.kind.place, p.instead.kind.place
 
 
 def _name(p: Sure) -> str:
