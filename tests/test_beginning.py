@@ -52,3 +52,15 @@ def test_guesses_that_are_closer_stay() -> None:
     spoilt = run.with_channels(replace(run["prey"], values=wrong))
     model = prey().with_values(prey_0=40.0, predators_0=8.0)
     assert begun(model, records(spoilt)) == model
+
+
+@pytest.mark.parametrize("shown", ["1000/T", "clip(1000/T, 0, 9)", "max(1000/T, 0)"])
+def test_outputs_that_have_no_value_at_zero_begin_at_their_guesses(shown: str) -> None:
+    """A thermistor's resistance has none at zero kelvin, nor has a limit of it."""
+    oven = pk.Model.from_dict({
+        "name": "oven", "states": {"T": {"initial": "free", "guess": 300.0}},
+        "inputs": {"T_m": {}}, "parameters": {"tau": {"unit": "s", "guess": 20.0}},
+        "equations": {"T": "(T_m - T)/tau"}, "outputs": {"R": {"expression": shown}}})
+    drive = pk.Recording.from_arrays(np.arange(50.0), {"T_m": np.full(50, 330.0)})
+    run = pk.simulate(oven.with_values(T_0=320.0), drive, sigma=0.01, seed=0)
+    assert begun(oven, Records((run,), ({"R": LEVEL},), DEFAULTS)) == oven

@@ -18,9 +18,11 @@ class clip(sp.Function):
 
     @classmethod
     def eval(cls, x: sp.Expr, lo: sp.Expr, hi: sp.Expr) -> sp.Expr | None:
-        if x.is_number and lo.is_number and hi.is_number:
-            return sp.Min(sp.Max(x, lo), hi)
-        return None
+        if not (x.is_number and lo.is_number and hi.is_number):
+            return None
+        if not (x.is_comparable and lo.is_comparable and hi.is_comparable):
+            return sp.nan  # as of 1/T at zero kelvin, or of a root of what is negative
+        return sp.Min(sp.Max(x, lo), hi)
 
     def _eval_derivative(self, s: sp.Symbol) -> sp.Expr:
         x, lo, hi = self.args

@@ -31,11 +31,16 @@ def own_beginning(problem: Problem, theta: np.ndarray, sites: tuple[Site, ...]) 
         for site in sites:
             h = model.output(site.output.name).expression.subs(
                 {TIME: experiment.t0, **{symbol(n): v for n, v in values.items()}})
+            states = [symbol(n) for n in model.state_names]
             slope = h.diff(symbol(site.moving[0]))
             samples = [s for s in experiment.samples
                        if model.outputs[s.output].name == site.output.name]
-            shift = h.subs({symbol(n): 0 for n in model.state_names})
-            if not (slope.is_number and shift.is_number) or slope == 0 or not samples or not inside:
+            # what bends need have no value at zero, as 1/T
+            if slope == 0 or not samples or not inside or not all(
+                    h.diff(s).is_number for s in states):
+                continue
+            shift = h.subs({s: 0 for s in states})
+            if not shift.is_number:
                 continue
             t, y = samples[0].t, samples[0].y
             count = max(5, int(np.searchsorted(t, t[0] + SHARE / site.rate)) if site.rate else 5)
