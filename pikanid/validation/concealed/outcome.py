@@ -26,6 +26,8 @@ INCLUDED = {"stribeck_friction": "coulomb_friction", "smooth_friction": "coulomb
             "fading_memory": "hidden_storage"}
 # Entries that a truth holds beside more: liquid has a second planar mode, which stays linear.
 HELD = {"potential_flow": "second_mode"}
+# Of a force that swings by itself, and of no parameter that does.
+SWINGS = r"^(?!.*->).*sin\([^)]*\bt\b"
 # What the formula of a law that is in no catalogue must hold; who writes another one is wrong.
 FORMULAS = {
     "stribeck_friction": r"exp\(.*sign\(\w+_dot\)",
@@ -47,11 +49,11 @@ FORMULAS = {
     "quadratic_input": r"u_\w\*\*2",
     "one_way_gain": r"Abs\(\w+\)",
     "local_force": r"exp\(",
-    "periodic_force": r"^(?!.*->).*sin\([^)]*\bt\b",
-    "background_vibration": r"^(?!.*->).*sin\([^)]*\bt\b",
+    "periodic_force": SWINGS,
+    "background_vibration": SWINGS,
     "pumped_parameter": r"-> \w+\*\(1 \+ \w+\*sin\(",
-    "wobbling_length": r"l_theta\*\(1 \+ \w+\*sin\(",
-    "parametric_excitation": r"(l_theta|g)\*\(1 \+ \w+\*sin\(",
+    "wobbling_length": r"-> l_theta\*\(1 \+ \w+\*sin\(",
+    "parametric_excitation": r"-> (l_theta|g)\*\(1 \+ \w+\*sin\(",
     "product_of_states": r"\w+\*\w+\*\w+",
     "bilinear_input": r"\w+\*\w+\*\w+",
     "bounded_loss": r"/\(\w+ \+ [Aa]bs\(\w+\)\)",
