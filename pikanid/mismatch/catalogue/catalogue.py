@@ -69,6 +69,7 @@ DECOYS: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (decoys.dissipating_wall, ("restoring force",)),
     (decoys.rigid_stop, ("restoring force",)),
     (decoys.velocity_coupled_drive, ("input curve",)),
+    (decoys.position_coupled_drive, ("input curve",)),
     (decoys.soft_saturation, ("input curve",)),
     (decoys.wobble, ("slow change",)),
     (decoys.rate_limit, ("timing",)),

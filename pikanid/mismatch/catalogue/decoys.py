@@ -188,16 +188,28 @@ def velocity_coupled_drive(site: Site) -> list[Candidate]:
     """
     found = []
     for u in site.model.input_names:
-        drives, drive = u in site.inputs, site.model.input(u).unit
-        own = site.variant(u) if drives else u
-        name = (f"a drive that depends on {'speed' if site.q else site.v}" if drives else
+        name = (f"a drive that depends on {'speed' if site.q else site.v}" if u in site.inputs else
                 f"{u} acting in proportion to {site.v}")
-        k = Parameter(site.name("k_uv", own), 0.0, units.product(
-            (site.force_unit, 1), (drive, -1), (site.speed_unit, -1)) if drive else "")
-        found.append(term(
-            site, "velocity_coupled_drive", name, f"{k.name}*{u}*{site.v}", k, _product(u, site.v),
-            one_sided=False, variant=own, known=False))
+        found.append(_in_proportion(site, u, site.v, "velocity_coupled_drive", name, "k_uv"))
     return found
+
+
+def position_coupled_drive(site: Site) -> list[Candidate]:
+    """κ u q: the drive acts according to the place, as a coil does, or a rotor near the ground."""
+    return [_in_proportion(site, u, site.q, "position_coupled_drive",
+                           "a drive that depends on the place", "k_uq")
+            for u in (site.inputs if site.q else ())]
+
+
+def _in_proportion(site: Site, u: str, x: str, entry: str, name: str, size: str) -> Candidate:
+    """κ u x."""
+    own = site.variant(u) if u in site.inputs else u
+    drive = site.model.input(u).unit
+    k = Parameter(site.name(size, own), 0.0, units.product(
+        (site.force_unit, 1), (drive, -1), (site.unit if x == site.q else site.speed_unit, -1)
+    ) if drive else "")
+    return term(site, entry, name, f"{k.name}*{u}*{x}", k, _product(u, x), one_sided=False,
+                variant=own, known=False)
 
 
 def soft_saturation(site: Site) -> list[Candidate]:

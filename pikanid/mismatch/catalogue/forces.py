@@ -138,24 +138,27 @@ def wall_impact(site: Site) -> list[Candidate]:
         return []
     # a contact shorter than from one sample to the next looks the same, however short
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
-    walls, stiffnesses = np.geomspace(1.1, 0.2, 14) * site.half_range, np.array([0.03, 0.1, 0.3])
-
-    # what is touched about the rest is no wall but a spring that differs between the sides
-    w = Parameter(site.name("wall"), out_of_reach(site.half_range), site.unit,
-                  (NEAREST * site.half_range, INF))
+    stiffnesses, near = np.array([0.03, 0.1, 0.3]), NEAREST * site.half_range
     k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
+    about = site.visited[0] < 0 < site.visited[1]
 
     def one(variant: str, name: str = "impact on a wall") -> Candidate:
         sides = SIDES[variant]
+        # what is touched about the rest is no wall but a spring that differs between the sides, and
+        # what is never left one that does not
+        least = min(side * end for side in sides for end in site.visited)
+        lowest, centre = (near, 0.0) if about else (least + near, least + site.half_range)
+        w = Parameter(site.name("wall"), out_of_reach(site.half_range), site.unit, (lowest, INF))
+        walls = centre + np.geomspace(1.1, 0.2, 14) * site.half_range
         text = wall_force(site, w.name, k.name, variant)
 
         def directions(view: View) -> list[TangentDirection]:
-            tops = [float((side * view.x[site.q]).max(initial=0.0)) for side in sides]
+            top = min(float((side * view.x[site.q]).max()) for side in sides) - centre
             return [TangentDirection(
-                {k.name: 1e4, w.name: share * min(tops)}, one_sided=True, scales=False,
-                force=np.sum([-side * np.maximum(side * view.x[site.q] - share * min(tops), 0.0)
+                {k.name: 1e4, w.name: centre + share * top}, one_sided=True, scales=False,
+                force=np.sum([-side * np.maximum(side * view.x[site.q] - centre - share * top, 0.0)
                               for side in sides], axis=0))
-                for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5)] if min(tops) else []
+                for share in (1.03, 0.97, 0.9, 0.8, 0.65, 0.5)] if top > 0 else []
 
         return Candidate(("wall_impact",), name, text, "dynamics", site, (w, k),
                          lambda m: site.pushed(m, text), directions, variant, static=True,
@@ -165,7 +168,7 @@ def wall_impact(site: Site) -> list[Candidate]:
                          levels=tuple({w.name: float(at), k.name: float(share * stiffest)}
                                       for at in walls for share in stiffnesses))
 
-    return [one(""), one(SIDE), one(BOTH, "impact on walls on both sides")]
+    return [one(""), one(SIDE), *([one(BOTH, "impact on walls on both sides")] if about else [])]
 
 
 def wall_force(site: Site, distance: str, stiffness: str, variant: str, power: int = 1) -> str:

@@ -39,6 +39,7 @@ class Site:
         half_range: Half the range of the output there, in its unit; of a coordinate that no output
             shows half its own, along the nominal motion.
         interval: Between its samples, as a rule [s].
+        visited: Lowest and highest value of q in all recordings, where the output is q itself.
         suffix: Distinguishes names where a model has several coordinates.
         taken: Names that users' own effects have.
         lever: By names of states, what a force adds to their rates for each that it adds to v';
@@ -75,6 +76,7 @@ class Site:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
     pasts: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
     sensors: tuple[Site, ...] = ()
+    visited: tuple[float, float] = (-np.inf, np.inf)
 
     def pushed(self, model: Model, force: Formula) -> Model:
         """A model with a force on the coordinate [force_unit]."""

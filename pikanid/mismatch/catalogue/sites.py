@@ -130,7 +130,9 @@ def _site(model: Model, recordings: tuple[Recording, ...], q: str, v: str, outpu
                 _interval(first, output.name), suffix,
                 operating=tuple(n for n in inputs if _operating(n, recordings)),
                 ranges={n: span_of(n, recordings) for n in inputs},
-                pasts=_pasts(model, recordings))
+                pasts=_pasts(model, recordings),
+                visited=span_of(output.name, recordings) if output.expression == symbol(q) and any(
+                    output.name in r for r in recordings) else Site.visited)
 
 
 def span_of(name: str, recordings: Sequence[Recording]) -> tuple[float, float]:
