@@ -13,7 +13,7 @@ from pikanid import Model, Recording
 from pikanid.mismatch.catalogue.friction import coulomb_friction
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.noise_level import bridged, refined
-from pikanid.mismatch.data.outliers import lone, without_lone, without_outliers
+from pikanid.mismatch.data.outliers import lone, not_lone, without_lone, without_outliers
 from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -67,6 +67,15 @@ def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
         records.recordings[0]["y"].values[hit]).sum()
     assert np.isin(hit, left).mean() > 0.85
     assert len(left) < len(hit) + 3
+
+
+def test_white_noise_has_no_outliers() -> None:
+    """Of 300 recordings of 1500 samples one holds a sample that is 5 sigma off, 1 in 400,000."""
+    left = sum(len(not_lone(noise(1500, seed=s), DEFAULTS.noise)) < 1500 for s in range(300))
+    assert left <= 6  # 3 by chance at RARE, of which P(> 6) is 3 %, and one
+    few = noise(1500, seed=1)
+    few[[300, 900]] += 12.0
+    assert set(range(1500)) - set(not_lone(few, DEFAULTS.noise)) == {300, 900}
 
 
 @pytest.mark.parametrize("turn", [10, 12, 16, 30])

@@ -28,6 +28,7 @@ MOST, NORMAL = 0.9, 1.645  # definition: a probability, and what normal noise st
 UNEVEN = 0.1  # numerical: share of neighbourhoods whose middle sample does not weigh most
 TOUCHING = 5  # numerical: samples, within which a sample makes others look bad
 GLITCH = 12  # numerical: samples that a glitch of a few may make look bad
+RARE = 0.01  # definition: rate of recordings in which chance makes as many samples alone
 NEAR = 15  # numerical: samples, within which errors that happen by chance seldom follow another
 LINE = np.array([-2.0, 1.0, 4.0]) / 3.0  # numerical: straight on from three on the left
 CUBIC = np.array([-4.0, 9.0, 0.0, 0.0, 0.0, 9.0, -4.0]) / 10.0  # numerical: but for the next ones
@@ -128,10 +129,10 @@ def from_inputs(recording: Recording, t: np.ndarray, y: np.ndarray, inputs: Sequ
     return explained(t, y, held, settings.detection.lags, settings.noise.by_chance)
 
 
-def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
-    """Which samples (N,) of a residual are far from what its neighbours say, whichever one asks:
-    those around it, those on one side only, beyond which a misfit may bend, or a cubic, which
-    follows one that swings.
+def lone(residual: np.ndarray, noise: NoiseSettings, gaps: float | None = None) -> np.ndarray:
+    """Which samples (N,) of a residual are far from what its neighbours say, by so many median
+    gaps (`noise.lone`), whichever one asks: those around it, those on one side only, beyond which
+    a misfit may bend, or a cubic, which follows one that swings.
     """
     if len(residual) < noise.least_alone:
         return np.zeros(len(residual), bool)
@@ -140,9 +141,27 @@ def lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
     said = np.stack([np.median(np.delete(near, 3, axis=1), axis=1), near[:, :3] @ LINE,
                      near[:, :3:-1] @ LINE])
     gap, swung = np.min(np.abs(residual - said), axis=0), np.abs(residual - near @ CUBIC)
-    far = gap > noise.lone * np.median(gap)
+    far = gap > (gaps or noise.lone) * np.median(gap)
     few = far.sum() <= noise.most_outliers * len(far)
     return far & (swung > noise.off_cubic * np.median(swung)) & few
+
+
+def not_lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
+    """Which samples (increasing) of a residual (N,) are not alone; where no more are than by
+    chance, only what chance does not make at all is.
+    """
+    def kept_by(gaps: float) -> np.ndarray:
+        kept = np.arange(len(residual))
+        # two that are neighbours hide each other: the second shows when the first has gone
+        while (bad := lone(residual[kept], noise, gaps)).any() and (
+                len(kept) > (1 - noise.most_outliers) * len(residual)):
+            kept = kept[~bad]
+        return kept
+
+    kept = kept_by(noise.lone)
+    count = len(_events(np.setdiff1d(np.arange(len(residual)), kept)))
+    chance = binom.sf(count - 1, len(residual), noise.lone_rate)
+    return kept if chance < RARE else kept_by(noise.lone_few)
 
 
 def with_humps(residual: np.ndarray, kept: np.ndarray, together: int) -> np.ndarray:
@@ -179,12 +198,8 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
                    for k in (0, 1))
         residual = left - from_inputs(
             as_one([recordings[r] for r in own]), t, left, inputs, records.settings)
-        kept = np.arange(len(t))
-        # two that are neighbours hide each other: the second shows when the first has gone
-        while (bad := lone(residual[kept], noise)).any() and (
-                len(kept) > (1 - noise.most_outliers) * len(t)):
-            kept = kept[~bad]
-        alone, kept = kept, with_humps(residual, kept, noise.together)
+        alone = not_lone(residual, noise)
+        kept = with_humps(residual, alone, noise.together)
         gone = np.setdiff1d(np.arange(len(t)), kept)
         # where most of what looked alone was not, it is all of one misfit
         most = len(_events(np.setdiff1d(kept, alone))) > len(_events(gone))

@@ -26,8 +26,11 @@ class NoiseSettings:
         same: Relative change of σ below which a level read again is the same.
         same_correlation: Change of the correlation of neighbours below which it is.
         spike: [σ] by which a sample must leave its neighbours before there is a fit.
-        lone: Median gaps by which it must once a fit is taken away: of white noise one sample in
-            5000 does, counted, that is also off the cubic.
+        lone: Median gaps by which it must once a fit is taken away, if there are more than chance
+            has made in a hundred recordings.
+        lone_rate: Share of white noise that does and is also off the cubic, counted.
+        lone_few: Median gaps by which it must if there are no more: 5 sigma, of white noise one
+            sample in 400,000.
         off_cubic: Median gaps by which it must leave a cubic through those around it as well: the
             peaks of a smooth misfit do not.
         together: Neighbours that are alone together are none: a sensor may have been at its end.
@@ -61,6 +64,8 @@ class NoiseSettings:
     same_correlation: Share = 0.06
     spike: Amount = 5.0
     lone: Amount = 9.0
+    lone_rate: Rate = 2e-4
+    lone_few: Amount = 12.0
     off_cubic: Amount = 2.5
     together: Count = 3
     by_chance: Rate = 1e-6
