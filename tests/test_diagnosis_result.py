@@ -41,6 +41,13 @@ def diagnosis(verdict: Verdict, *given: Explanation) -> Diagnosis:
                      nothing, nothing, None)
 
 
+def test_only_a_term_of_an_equation_is_added_to_it() -> None:
+    term = NamedEffect(("symbolic:-k*v**5",), "a law", "-k*v**5", {}, "dynamics", "v")
+    curve = NamedEffect(("symbolic:tanh(k*u)/k",), "a curve", "tanh(k*u)/k", {}, "input", "v")
+    said = str(diagnosis("named", Explanation((term, curve), 0.5, sloshing(), 0.0, None, None)))
+    assert "\n  v' += -k*v**5   [" in said and "\n  tanh(k*u)/k   [" in said
+
+
 def test_where_is_said_in_words_and_as_data() -> None:
     said = replace(diagnosis("named", explanation("impact on a wall", "-k*max(q - w, 0)")), where=(
         Where(("dynamics",), "v", ("q",), ((1.0, 2.5),), True, (Interval("q", 0.1, 0.3, "rad"),))))
@@ -159,7 +166,8 @@ def test_no_headline_says_the_same_twice(verdict: Verdict) -> None:
 
 @pytest.mark.parametrize("gap", [-10.0, -0.4, 0.0, 0.4])
 def test_what_fits_no_worse_is_not_said_to_fit_worse(gap: float) -> None:
-    assert "higher" not in _behind(gap) and "0" not in _behind(gap)
+    for given in (True, False):
+        assert "higher" not in _behind(gap, given) and "0" not in _behind(gap, given)
 
 
 @pytest.mark.parametrize("stiffer", [0.0, 400.0])

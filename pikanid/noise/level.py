@@ -170,7 +170,8 @@ def high_band_sigma(channel: Channel, rounding: RoundingSettings = ROUNDING
     """
     differences = beside_neighbours(channel.time, channel.values)
     if len(differences) < 8:
-        raise errors.BadRecording(errors.noise_short(channel.name, len(differences) + 4))
+        raise errors.BadRecording(errors.noise_short(
+            channel.name, int(np.isfinite(channel.values).sum())))
     sigma = max(_spread(differences), rounding_noise(channel.values, rounding))
     if sigma == 0:
         raise errors.BadRecording(errors.noise_none(channel.name))

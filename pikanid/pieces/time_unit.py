@@ -20,6 +20,17 @@ def time_unit(longest: float) -> tuple[float, str]:
                 (1.0, "s"))
 
 
+def duration(seconds: float) -> str:
+    """In words.
+
+    >>> duration(0.25), duration(9000.0), duration(30_000.0)
+    ('0.25 s', '9000 s', '8.3 h')
+    """
+    size, unit = time_unit(seconds)
+    told = seconds / size
+    return f"{told:.2g} {unit}" if told < 100 else f"{told:.0f} {unit}"
+
+
 def spans(windows: Sequence[tuple[float, float]], shown: int) -> str:
     """The first windows of time [s] in words; empty where there are none.
 

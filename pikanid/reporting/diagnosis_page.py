@@ -14,6 +14,7 @@ from pikanid.mismatch.report.text_report import places
 from pikanid.pieces.html import drawn, tabled, text
 from pikanid.pieces.sentences import p_text
 from pikanid.pieces.sheet import Sheet
+from pikanid.pieces.time_unit import duration
 from pikanid.reporting.document import document
 
 if TYPE_CHECKING:
@@ -86,8 +87,8 @@ def _force(dx: Diagnosis) -> str:
                  and dx.verdict not in ("named", "set")) else "")
     band = 100 * (1 - dx.settings.band)
     return (f" There the simultaneous {band:g} % band of the force that would explain it excludes "
-            f"zero (means over {force.resolution:.2g} s). What a sensor or an input gets wrong can "
-            f"look like a force too.{worth}")
+            f"zero (means over {duration(force.resolution)}). What a sensor or an input gets wrong "
+            f"can look like a force too.{worth}")
 
 
 def _surely(dx: Diagnosis) -> str:
@@ -155,9 +156,11 @@ def _lost(dx: Diagnosis) -> str:
     for (title, why), h in zip(dx.not_given, dx.rejected, strict=True):
         more = dx.behind(h)
         rows.append((title, why, "" if more is None else f"{round(more):+d}"))
+    told = "<h2>Tried and not given</h2>"
+    if not dx.hypotheses:
+        return told + tabled(Sheet(("tried", "why it is not given"), tuple(r[:2] for r in rows)))
     behind = "χ² and penalty, from what is given"
-    return "<h2>Tried and not given</h2>" + tabled(
-        Sheet(("tried", "why it is not given", behind), tuple(rows), (behind,)))
+    return told + tabled(Sheet(("tried", "why it is not given", behind), tuple(rows), (behind,)))
 
 
 def _patch(dx: Diagnosis) -> str:

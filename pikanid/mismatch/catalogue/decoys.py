@@ -226,7 +226,8 @@ def soft_saturation(site: Site) -> list[Candidate]:
                 {k.name: s / top}, push={u: np.tanh(s * view.u[u] / top) * top / s - view.u[u]},
                 one_sided=True, scales=False) for s in (0.1, 0.3, 0.8)] if top else []
 
-        found.append(Candidate(("soft_saturation",), "an input limited softly", text, "input", site,
+        found.append(Candidate(("soft_saturation",), "an input limited softly",
+                               f"tanh({k.name}*{u})/{k.name}", "input", site,
                                (k,), _through(u, text), directions, site.variant(u), known=False))
     return found
 

@@ -232,13 +232,13 @@ def _bent_otherwise(cubic: Candidate, n: int) -> Candidate:
     """y + b |y|ⁿ⁻¹ y, in place of y + b y³."""
     site, o = cubic.site, cubic.site.output.name
     b = Parameter(site.name(f"b_{n}"), 0.0, units.product((_unit(cubic, o), 1 - n)))
+    power = o if n == 2 else f"{o}**{n - 1}"
 
     def starts(values: Mapping[str, float], states: Mapping[str, np.ndarray]) -> Starts:
         top = float(np.abs(states[site.q]).max(initial=0.0))
         return [{b.name: values[cubic.parameters[0].name] * top ** (3 - n)}]
 
-    return _curve(cubic, o, f"sensor_power_{n}", f"{o} + {b.name}*abs({o})*{o}**{n - 1}", (b,),
-                  starts)
+    return _curve(cubic, o, f"sensor_power_{n}", f"{o} + {b.name}*abs({o})*{power}", (b,), starts)
 
 
 def _rounded(clipped: Candidate) -> Candidate:

@@ -135,8 +135,9 @@ def _too_little_beside_the_rest(c: _Claim, other: Hypothesis) -> str:
         return ""
     what = ("does not act in any other recording, and explains so little" if c.once else
             "explains so little beside the rest")
+    of = f" of {whole:.0f}" if len(c.h.effects) > 1 else ""
     return (f"{c.effect.name} {what} that it may stand for anything of its size (it lowers "
-            f"chi-squared by {gain:.0f} of {whole:.0f}, {asked:.0f} are asked)")
+            f"chi-squared by {gain:.0f}{of}, {asked:.0f} are asked)")
 
 
 def _too_weak(c: _Claim, other: Hypothesis) -> str:

@@ -23,6 +23,8 @@ from pikanid.mismatch.judge.rivals import rivals, same, twins, wider
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.model.parts import Parameter
 
+MORE = 1.05  # layout: times as much, that is not told as "about as much"
+
 
 @dataclass(frozen=True)
 class Instead:
@@ -234,7 +236,8 @@ def _examined(kind: Kind, lead: Weighed, found: Sequence[Weighed], settings: Set
         return Doubtful(kind, effect, f"its probability is {total:.3g}")
     if smaller(kappa, asked):
         return Doubtful(kind, effect, "without it the best explanation leaves " + (
-            f"{kappa:.2g} times as much, sure from {asked:.2g} on" if kappa >= 1 else "less"))
+            "less" if kappa < 1 else f"{kappa:.2g} times as much, sure from {asked:.2g} on"
+            if kappa >= MORE else "about as much"))
     found_more = min((_left(w) for w in others), default=np.inf) - _left(lead)
     if below(found_more, strong):
         return Doubtful(kind, effect, "it explains so little that it may stand for anything of its "

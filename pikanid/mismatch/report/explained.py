@@ -60,8 +60,8 @@ def explanations(answer: Answer, evidence: Evidence, overdispersion: float,
 
     given = tuple(one(h, float(w), "") for h, w in zip(answer.given, weights, strict=False))
     best = evidence.score(pool[0])
-    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(evidence.score(h) - best))
-                   for h in answer.others)
+    others = tuple(one(h, 0.0, answer.reasons.get(h.key) or _behind(
+        evidence.score(h) - best, bool(answer.given))) for h in answer.others)
     return given, others
 
 
@@ -71,16 +71,21 @@ def _told(e: Candidate, h: Hypothesis) -> tuple[Parameter, ...]:
                  or h.std[p.name] < UNKNOWN * max(abs(h.values[p.name]), abs(p.value)))
 
 
-def _behind(gap: float) -> str:
-    """Why a hypothesis is not given whose criterion exceeds that of the first one given by `gap`.
+def _behind(gap: float, given: bool) -> str:
+    """Why a hypothesis is not given whose criterion exceeds that of the first one given by `gap`,
+    or of the first of all where none is `given`.
 
-    >>> _behind(12.3)
+    >>> _behind(12.3, given=True)
     'chi-squared with the penalty for its parameters is higher by 12'
-    >>> _behind(-0.2)
+    >>> _behind(-0.2, given=True)
     'explains the recording no better than what is given'
-    >>> _behind(-40.0)
+    >>> _behind(-40.0, given=True)
     'explains the recording better, and nothing has confirmed it'
+    >>> _behind(0.0, given=False)
+    'nothing has confirmed it'
     """
+    if not given and gap < EVEN:
+        return "nothing has confirmed it"
     if gap < -EVEN:
         return "explains the recording better, and nothing has confirmed it"
     if gap < EVEN:

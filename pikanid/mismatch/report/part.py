@@ -106,6 +106,7 @@ class Present:
     def to_dict(self) -> dict[str, Any]:
         """For diagnosis.json."""
         return {"family": self.family, "or_family": self.or_family or None,
+                "places": list(self.places) or None,
                 "ids": list(self.ids) or None, "exact": bool(self.ids),
                 "expression": self.expression, "alternatives": list(self.alternatives),
                 "probability": self.probability, "probability_family": self.probability_family,

@@ -38,7 +38,9 @@ def lines_of(dx: DiagnosisData) -> list[str]:
     for h in dx.hypotheses:
         lines.append(f"What: {h.title}{dx.odds(h)}")
         for e in h.effects:
-            added = e.ids[0].startswith(SYMBOLIC) and " -> " not in e.expression
+            # what an input or a sensor becomes is no term of an equation
+            added = (e.ids[0].startswith(SYMBOLIC) and e.channel == "dynamics"
+                     and " -> " not in e.expression)
             left = f"{e.equation}' += " if added else ""
             lines.append(f"  {left}{e.expression}   [{', '.join(e.ids)}]")
             for name, v in e.parameters.items():
