@@ -19,8 +19,8 @@ def too_few_to_diagnose(samples: int, parameters: int, needed: int) -> str:
 
 def too_rough_to_diagnose(model: str) -> str:
     return (f"Model '{model}' cannot be simulated as exactly as the recording's noise asks: check "
-            "its units, the signs of its inputs and outputs, its initial values, the guesses of its "
-            "parameters and the given sigma.")
+            "its units, the signs of its inputs and outputs, its initial values, the guesses of "
+            "its parameters and the given sigma.")
 
 
 def bad_drive_bound(name: str, given: float) -> str:

@@ -73,7 +73,7 @@ class Search:
         return sum(c.known and c.suits() and not c.refines for c in self.candidates)
 
     def base(self) -> Hypothesis:
-        """The nominal model without effects, refitted; SimulationFailed where that cannot be."""
+        """The nominal model, refitted; SimulationFailed where that cannot be."""
         self._fit_all([((), [{}])], always=True)
         if frozenset() not in self.fits:
             raise errors.SimulationFailed(errors.too_rough_to_diagnose(self.nominal.name))
@@ -108,20 +108,21 @@ class Search:
     def grow(self, adequate: Adequate) -> list[Hypothesis]:
         """Add effects to the best hypotheses as long as something is left and that helps."""
         settings, budget = self.settings, self.settings.budget
-        close = settings.verdict.indistinct
         for count in range(1, budget.effects):
             if not adequate(best := self.ranked()[0]):
                 self._fit_all([*neighbours.afresh(best, self.records.guess)], again=True)
-            if adequate(best := self.ranked()[0]) or self.budget_exhausted:
+            # what a first effect has cost keeps no second one from being looked for
+            if adequate(best := self.ranked()[0]) or (count > 1 and self.budget_exhausted):
                 break
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
             near = rows + settings.fits.far * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
             simple = leaders.to_extend(self.ranked(), self.fits)
             for h in simple[: budget.leading if count == 1 else 1]:
+                first = count == 1 and h is simple[0]
                 if len(h.effects) < budget.effects and (h is simple[0] or h.minimum.chi2 < near):
                     self._extend(h, budget.beside_one if count == 1 else budget.beside_more,
-                                 always=law if count == 1 and h is simple[0] else nothing)
+                                 always=law if first else nothing, anyway=first)
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
@@ -141,13 +142,14 @@ class Search:
             best = self._fit(best.effects, [best.point], again=True)  # hills left for later
         if adequate(best):
             # what a test of everything misses may still be worth its penalty, or nearly
-            least = price(1, 1, best.whitened.rows, self.choices, settings.choice_weight) - close
-            self._extend(best, budget.beside_more, self.scale() * least, anyway=True)
+            least = price(1, 1, best.whitened.rows, self.choices, settings.choice_weight)
+            self._extend(best, budget.beside_more, anyway=True,
+                         least=self.scale() * (least - settings.verdict.indistinct))
             for h in self._contenders():
                 self._exchange(h)
             for h in self.ranked()[:budget.rivals]:
                 # fewer effects that explain almost as much may do with another one
-                reach = best.score(self.scale()) + 2 * close
+                reach = best.score(self.scale()) + 2 * settings.verdict.indistinct
                 if (0 < len(h.effects) < len(best.effects) and not self.budget_exhausted
                         and not adequate(h) and below(h.score(self.scale()), reach)):
                     self._extend(h, budget.beside_one)
@@ -168,9 +170,7 @@ class Search:
                 yield h
 
     def _simplify(self) -> None:
-        """Leave each effect of the best hypothesis out, or put a law that it contains in its place:
-        what led there may have been no more than a way out of a local minimum.
-        """
+        """Try less than the best: what led there may have only led out of a local minimum."""
         if self.ranked()[0].far:
             for closest in leaders.closest_of_each(self.fits.values()):
                 self._fit_all([*neighbours.without_one(closest)], again=True, always=True)
