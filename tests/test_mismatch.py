@@ -31,6 +31,7 @@ from pikanid.mismatch.settings.settings import DEFAULTS, Settings
 from pikanid.model import systems
 from pikanid.noise.level import NoiseModel
 from pikanid.optimise.levenberg_marquardt import minimise
+from pikanid.problem.held import HeldInput
 from pikanid.problem.problem import Problem
 from pikanid.recording import Recording, excitation
 from pikanid.simulation import simulate
@@ -110,7 +111,8 @@ def gaussian_case(seed: int, lift: float = 0.0, spread: float = 0.0) -> float:
     r -= J @ np.linalg.lstsq(J, r, rcond=None)[0]
     u = np.where((t > 1) & (t < 2), 1.0, 0.0)
     return detect(r, J, units, np.zeros(30, bool), frequency_bands(t, 15.0, DEFAULTS.detection),
-                  past_inputs(t, [(t, u)], 15.0, DEFAULTS.detection), spread, DEFAULTS).p_value
+                  past_inputs(t, [HeldInput("u", t, u, "zero")], 15.0, DEFAULTS.detection),
+                  spread, DEFAULTS).p_value
 
 
 @pytest.mark.slow

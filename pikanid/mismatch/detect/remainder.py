@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,11 +18,17 @@ from pikanid.mismatch.detect.residual_tests import (
     unit_columns,
 )
 from pikanid.mismatch.detect.tangent import directions
+from pikanid.noise.autoregressive import fit, innovations
+from pikanid.problem.held import HeldInput
+from pikanid.problem.inputs_past import ROWS, rests
+
+AHEAD = 3  # numerical: samples, from its own one on, at which an input may know a sample's noise
 
 
 def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.ndarray,
                    candidates: tuple[Candidate, ...], rate: float, seed: int = 0) -> Detection:
-    """Test the residual of a fit against everything that the catalogue and its decoys would show.
+    """Test the residual of a fit against everything that the catalogue and its decoys would show,
+    but for what follows an input that may follow the noise.
 
     r and J may have more rows than there are samples: those of a prior.
     """
@@ -35,8 +42,9 @@ def residual_tests(whitened: Whitened, theta: np.ndarray, r: np.ndarray, J: np.n
     D, one_sided = short(_above(found.D, more)), found.one_sided
     del found  # of a long recording there is no room for all at once
     bands, inputs = lines(whitened, rate, more, short)
-    units, _ = unit_columns(D, short(J))
-    return detect(-short(r), short(J), units, one_sided, bands, inputs, whitened.records.allowed,
+    J = short(np.concatenate([J, echoes(whitened, more)], axis=1))
+    units, _ = unit_columns(D, J)
+    return detect(-short(r), J, units, one_sided, bands, inputs, whitened.records.allowed,
                   whitened.settings, seed)
 
 
@@ -69,10 +77,32 @@ def lines(whitened: Whitened, rate: float, more: int,
     return bands, short(_scattered(pasts, where, total))
 
 
+def echoes(whitened: Whitened, more: int) -> np.ndarray:
+    """Columns (rows, K) of what is new in each input that does not rest, at each sample and at the
+    next ones, and the first of them times the time.
+
+    A controller answers the noise of a sample at once, and in a closed loop whatever looks ahead
+    (an input that comes too late, a clock that loses) shows where there is nothing but that noise
+    (L. Ljung, System Identification, 1999, section 13.4).
+    """
+    blocks, where = [np.empty((0, 0))], [np.empty(0, int)]
+    for t, rows, held in _seen_at_once(whitened):
+        moving = [u for u in held if not rests(u)]
+        if len(t) < ROWS * (AHEAD + 1) * len(moving):
+            continue
+        for values in (u.at(t) for u in moving):
+            change = values - values.mean()
+            new = innovations(change, fit(change))
+            new = np.append(np.zeros(len(t) - len(new)), new)
+            ahead = [np.append(new[k:], np.zeros(k)) for k in range(AHEAD)]
+            blocks.append(np.stack([*ahead, new * (t - t[0])], axis=1))
+            where.append(rows)
+    return _scattered(blocks, where, whitened.rows + more)
+
+
 def _seen_at_once(whitened: Whitened) -> Iterator[
-        tuple[np.ndarray, np.ndarray, list[tuple[np.ndarray, np.ndarray]]]]:
-    """Times of each output in each recording, of whose segments together, its rows, and times and
-    values of the inputs.
+        tuple[np.ndarray, np.ndarray, list[HeldInput]]]:
+    """Times of each output in each recording, of whose segments together, its rows, and the inputs.
     """
     problem = whitened.problem
     firsts = np.cumsum([0, *(len(s.t) for e in problem.experiments for s in e.samples)])
@@ -80,14 +110,19 @@ def _seen_at_once(whitened: Whitened) -> Iterator[
     begin = [[next(at) for _ in e.samples] for e in problem.experiments]
     for own in whitened.records.stretches:
         pieces = [problem.experiments[r] for r in own]
-        inputs = [(np.concatenate([h.time for h in same]), np.concatenate([h.values for h in same]))
-                  for same in zip(*(e.held for e in pieces), strict=True)]
-        held = [(t[once(t)], u[once(t)]) for t, u in inputs if len(t) > 1]
+        held = [u for u in (_together(same) for same in zip(*(e.held for e in pieces), strict=True))
+                if len(u.time) > 1]
         for k in range(len(pieces[0].samples)):
             times = [e.samples[k].t for e in pieces]
             rows = [np.arange(begin[r][k], begin[r][k] + len(t))
                     for r, t in zip(own, times, strict=True)]
             yield np.concatenate(times), np.concatenate(rows), held
+
+
+def _together(pieces: Sequence[HeldInput]) -> HeldInput:
+    """One input of all segments of a recording."""
+    t, u = (np.concatenate([getattr(h, name) for h in pieces]) for name in ("time", "values"))
+    return replace(pieces[0], time=t[once(t)], values=u[once(t)])
 
 
 def _scattered(blocks: list[np.ndarray], where: list[np.ndarray], rows: int) -> np.ndarray:

@@ -10,7 +10,7 @@ drawn exactly from a Gaussian of that size; the noise level's own error is drawn
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,6 +20,8 @@ from scipy.special import chdtrc, roots_hermitenorm
 from pikanid.mismatch.settings.detection import DetectionSettings
 from pikanid.mismatch.settings.settings import Settings
 from pikanid.noise.projection import project
+from pikanid.problem.held import HeldInput
+from pikanid.problem.inputs_past import rests
 
 BATCH = 500  # numerical: draws at once, between which it is asked whether more would matter
 CLEAR = (1e-6, 0.1)  # numerical: p-values beyond which more draws would decide nothing
@@ -187,22 +189,23 @@ def frequency_bands(t: np.ndarray, rate: float, settings: DetectionSettings) -> 
             for a, b in pairwise(edges)]
 
 
-def past_inputs(t: np.ndarray, inputs: list[tuple[np.ndarray, np.ndarray]], rate: float,
+def past_inputs(t: np.ndarray, inputs: Sequence[HeldInput], rate: float,
                 settings: DetectionSettings) -> np.ndarray:
-    """Orthonormal columns (N, k): each input (times, values) at lags up to a natural period, and a
-    few samples ago: a rig that is as fast as its sampling answers there and nowhere else.
+    """Orthonormal columns (N, k): each input at lags up to a natural period, and a few samples ago:
+    a rig that is as fast as its sampling answers there and nowhere else.  Of one that does not
+    rest, what begins at the sample itself may know that one's noise, and is no past.
 
     Args:
         t: (N,) [s].
-        inputs: Their times and values.
+        inputs: That move.
         rate: Natural frequency [rad/s]; 0 where nothing oscillates.
         settings: Number and reach of the lags.
     """
     period = 2 * np.pi / rate if rate else (t[-1] - t[0]) / settings.spans
     lags = np.concatenate([np.linspace(0, period, settings.lags),
                            float(np.median(np.diff(t))) * np.arange(1, AT_ONCE + 1)])
-    columns = [np.interp(t - lag, time, values, left=values[0])
-               for time, values in inputs for lag in lags]
+    columns = [np.interp(t - lag, u.time, u.values, left=u.values[0])
+               for u in inputs for lag in lags[not rests(u):]]
     if not columns:
         return np.empty((len(t), 0))
     stacked = np.stack(columns, axis=1)
