@@ -163,9 +163,9 @@ def test_a_loss_of_free_exponent_may_saturate(by_key: dict[str, Candidate]) -> N
     assert rise == pytest.approx(0.5)
 
 
-def test_springs_belong_to_coordinates_that_have_a_place() -> None:
+def test_what_bends_a_spring_belongs_to_coordinates_that_have_a_place() -> None:
     """A cart that its controller holds has one, though its own equation brings it nowhere; a cart
-    by itself has none.
+    by itself has none, but a spring may give it one.
     """
     def springs(fed_back: str) -> set[str]:
         model = pk.Model.from_dict({
@@ -180,7 +180,7 @@ def test_springs_belong_to_coordinates_that_have_a_place() -> None:
         return {c.ids[0] for c in candidates(sites(model, (run,)))} & {
             "cubic_stiffness", "amplitude_damping", "linear_stiffness", "quintic_stiffness"}
 
-    assert springs("") == set()
+    assert springs("") == {"linear_stiffness"}
     assert springs("+ 2.0*x") == {"cubic_stiffness", "amplitude_damping", "linear_stiffness",
                                   "quintic_stiffness"}
 

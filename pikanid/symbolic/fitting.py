@@ -175,8 +175,9 @@ def _linear(form: Form, curve: Curve, p: Array) -> _Projected | None:
     if not np.isfinite(raw).all() or not curve.visible(raw.T).all():
         return None
     phi = curve.project(curve.whiten(raw.T)).T
-    size = np.linalg.norm(phi, axis=0)
-    whole = np.linalg.norm(raw, axis=0) * float(np.abs(curve.weight).max())
+    with np.errstate(over="ignore"):  # what is no number then is told from nothing by no curve
+        size = np.linalg.norm(phi, axis=0)
+        whole = np.linalg.norm(raw, axis=0) * float(np.abs(curve.weight).max())
     if np.any(size <= 1e-9 * whole) or not np.all(size > 0):
         return None
     q, r = np.linalg.qr(phi / size)

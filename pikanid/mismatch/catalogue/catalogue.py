@@ -50,6 +50,7 @@ ENTRIES: tuple[tuple[Make, tuple[Family, ...]], ...] = (
     (input_backlash, ("input curve",)),
     (channels.sensor_offset, ("constant force",)),
     (channels.sensor_drift, ("slow change",)),
+    (channels.sensor_fading, ("slow change",)),
     (channels.sensor_saturation, ("sensor curve",)),
     (channels.sensor_nonlinearity, ("sensor curve",)),
     (coupled_state, ("coupling",)),
@@ -109,7 +110,7 @@ def candidates(sites: Sequence[Site], effects: Iterable[Effect] = ()) -> tuple[C
     >>> model, rec = systems.sloshing(), excitation.two_pulse()
     >>> found = candidates(sites(model, (rec,)))
     >>> sum(c.known and c.suits() and not c.refines for c in found), found[0].key
-    (38, 'coulomb_friction')
+    (39, 'coulomb_friction')
     """
     made: dict[str, Candidate] = {}
     # two coordinates may be seen in one output, or moved by one input: each is one channel

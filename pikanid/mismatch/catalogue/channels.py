@@ -47,6 +47,15 @@ def sensor_drift(site: Site) -> list[Candidate]:
                     f"{site.output.name} + {b.name}*t", lambda w: w.t, drift=b.name)]
 
 
+def sensor_fading(site: Site) -> list[Candidate]:
+    """The sensor's scale drifts, as it ages."""
+    r = Parameter(site.name("r_scale"), 0.0, "1/s")
+    o = site.output.name
+    text = f"{o}*(1 + {r.name}*t)"
+    return [_sensor(site, "sensor_fading", "a drift of the sensor's scale", r, text,
+                    lambda w: w.t * w.y[o], function=text)]
+
+
 def sensor_gain(site: Site) -> list[Candidate]:
     """The sensor's scale is off."""
     k = Parameter(site.name("k_out"), 1.0, "", (0.05, 20.0))

@@ -50,8 +50,8 @@ def cubic_stiffness(site: Site) -> list[Candidate]:
 
 
 def free_spring(site: Site) -> list[Candidate]:
-    """A spring at a coordinate that has a place but that nothing brings back to it."""
-    return [spring(site, "a spring")] if site.placed and not site.rate else []
+    """A spring at a coordinate that nothing brings back to a place."""
+    return [spring(site, "a spring")] if site.q and not site.rate else []
 
 
 def spring(site: Site, name: str) -> Candidate:

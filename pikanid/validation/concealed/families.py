@@ -31,7 +31,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "sensor curve": ("sensor_saturation", "sensor_nonlinearity", "eccentric_encoder",
                      "rippled_sensor"),
     "mode": ("second_mode", "internal_resonance", "potential_flow"),
-    "slow change": ("parameter_drift", "sensor_drift", "wobbling_length", "warming_damping"),
+    "slow change": ("parameter_drift", "sensor_drift", "sensor_fading", "wobbling_length",
+                    "warming_damping"),
     "other axis": ("cross_axis",),
 }
 DRY_EXPONENT = 0.3  # definition: up to which a power law of the speed is dry friction as well
