@@ -58,7 +58,7 @@ def reported(case: Case, detection: Detection, answer: Answer, site: Site,
     alone = not smaller(case.detected().p_value, alpha)
     if alone and not answer.given and proof is not None and proof.p_value < alpha:
         case.notes.append(
-            "By itself the recording shows nothing, but the model does not predict the held-out one "
+            "The recording itself shows nothing, but the model does not predict the held-out one "
             f"({p_text(proof.p_value, 1)}): diagnose that one, with this one held out.")
         case.notes += sampled_otherwise(case)
     if answer.verdict == "unnamed":
