@@ -84,6 +84,18 @@ def test_one_family_in_either_of_two_equations_says_which() -> None:
     assert isinstance(other, Present) and remaining._places(other) == ()
 
 
+def test_one_law_of_two_families_is_told_as_one() -> None:
+    def law(family: str, expression: str, *ids: str) -> reported_as.Present:
+        return reported_as.Present(family, ids, family, expression, {}, 0.6, 1.0, 30.0, 1.2, 0.9,
+                                   {}, {})
+
+    both = [law("dry friction", "-c*abs(q)*sign(v)"), law("drag", "-c*abs(q)*sign(v)")]
+    assert reported_as.titles_of([*both, law("timing", "lag", "sensor_lag")]) == [
+        "one law that counts as dry friction and drag", "timing"]
+    two = [law("dry friction", "-c*sign(v)"), law("drag", "-q2*abs(v)*v")]
+    assert reported_as.titles_of(two) == ["dry friction", "drag"]
+
+
 def test_what_holds_neither_of_two_families_is_fitted_beside_the_rest(
         monkeypatch: pytest.MonkeyPatch) -> None:
     lead, rest = (SimpleNamespace(effects=e, key=frozenset(one.key for one in e), values={},

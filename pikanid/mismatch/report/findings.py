@@ -259,10 +259,7 @@ class DiagnosisData:
         if self.verdict == "set":
             return head + f"one of {_first(titles)}, which these recordings cannot tell apart."
         if self.verdict == "partial" and self.remainder is not None:
-            more = ", and something else" if self.remainder.p_value < self.settings.adequate else ""
-            sure = sorted(self.present, key=lambda p: bool(p.or_family))
-            return head + f"surely {enumerated([p.title for p in sure])}{more}. " \
-                f"{self.remainder.sentence()}."
+            return head + self.remainder.beside(self.present, self.settings.adequate)
         if self.verdict == "unconfirmed":
             doubt = f": {self.doubt}." if self.doubt else " on other data."
             if self.hypotheses[0].probability >= self.settings.verdict.guessed:

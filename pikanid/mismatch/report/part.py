@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any
@@ -117,6 +117,18 @@ class Present:
                                for n, v in self.parameters.items()}}
 
 
+def titles_of(found: Sequence[Present]) -> list[str]:
+    """The title of each, of those last of which one of two is there; families that one law is a
+    member of together are one.
+    """
+    laws: dict[object, list[Present]] = {}
+    for p in sorted(found, key=lambda p: bool(p.or_family)):
+        laws.setdefault(p.expression if not p.ids and not p.or_family else id(p), []).append(p)
+    return [own[0].title if len(own) == 1 else
+            f"one law that counts as {enumerated([p.family for p in own])}"
+            for own in laws.values()]
+
+
 def in_words(family: str) -> str:
     """A family as something that is there.
 
@@ -162,6 +174,13 @@ class Remainder:
     frequency: float
     time: tuple[tuple[float, float], ...]
     doubtful: tuple[tuple[str, str], ...]
+
+    def beside(self, found: Sequence[Present], adequate: float) -> str:
+        """What is surely there and how much is left; something else, where the p-value is less than
+        what is `adequate`.
+        """
+        more = ", and something else" if self.p_value < adequate else ""
+        return f"surely {enumerated(titles_of(found))}{more}. {self.sentence()}."
 
     def sentence(self) -> str:
         """In words."""
