@@ -63,6 +63,21 @@ def test_a_stop_is_one_that_the_motion_leaves() -> None:
         assert all(at.bounds[0] <= level[at.name] for level in walls[variant].levels)
 
 
+def test_what_falls_freely_is_at_each_place_once() -> None:
+    """Its speed and its place say the same: no stop is looked for where it has not turned."""
+    fall = Model.from_dict({
+        "name": "fall", "states": {"z": {"unit": "m", "initial": "free"}, "v": {"unit": "m/s"}},
+        "parameters": {"g": {"unit": "m/s^2", "guess": 9.0}},
+        "equations": {"z": "v", "v": "-g"}, "outputs": {"z": {"unit": "m", "expression": "z"}}})
+    t = np.linspace(0.0, 1.0, 100)
+    rec = Recording.from_arrays(t, {"z": 10.0 - 4.9 * t**2}, units={"z": "m"})
+    found = candidates(sites(fall, (rec,)))
+    walls = [c.parameters[0].bounds[0] for c in found if c.ids == ("wall_impact",)]
+    assert walls and min(walls) > 0
+    assert not {c.ids[0] for c in found} & {"linear_stiffness", "sensor_fading",
+                                            "position_coupled_drive"}
+
+
 def test_the_drive_may_depend_on_the_place() -> None:
     law = next(c for c in candidates(sites(slide(), (driven(1, 2.0, 1),)))
                if c.ids == ("position_coupled_drive",))

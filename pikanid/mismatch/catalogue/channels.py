@@ -48,7 +48,9 @@ def sensor_drift(site: Site) -> list[Candidate]:
 
 
 def sensor_fading(site: Site) -> list[Candidate]:
-    """The sensor's scale drifts, as it ages."""
+    """The sensor's scale drifts, as it ages; what swings undriven would be damped by that."""
+    if not site.model.inputs:
+        return []
     r = Parameter(site.name("r_scale"), 0.0, "1/s")
     o = site.output.name
     text = f"{o}*(1 + {r.name}*t)"

@@ -50,8 +50,11 @@ def cubic_stiffness(site: Site) -> list[Candidate]:
 
 
 def free_spring(site: Site) -> list[Candidate]:
-    """A spring at a coordinate that nothing brings back to a place."""
-    return [spring(site, "a spring")] if site.q and not site.rate else []
+    """A spring at a coordinate that nothing brings back to a place.  Of a motion that nothing
+    drives through one again and again, place and speed tell the same.
+    """
+    return [spring(site, "a spring")] if not site.rate and (
+        site.placed or (site.q and site.inputs)) else []
 
 
 def spring(site: Site, name: str) -> Candidate:
@@ -140,7 +143,8 @@ def wall_impact(site: Site) -> list[Candidate]:
     stiffest = max((np.pi / site.interval) ** 2, 1e4)
     stiffnesses, near = np.array([0.03, 0.1, 0.3]), NEAREST * site.half_range
     k = Parameter(site.name("k_wall"), 0.0, "1/s^2", (0.0, stiffest))
-    about = site.visited[0] < 0 < site.visited[1]
+    # what nothing drives is at each place once
+    about = site.visited[0] < 0 < site.visited[1] or not site.inputs
 
     def one(variant: str, name: str = "impact on a wall") -> Candidate:
         sides = SIDES[variant]

@@ -17,6 +17,13 @@ def leading(ranked: Iterable[Hypothesis]) -> list[Hypothesis]:
     return found
 
 
+def an_event(h: Hypothesis) -> bool:
+    """Whether it is what happens once, alone: that may be beside anything that lasts, whatever the
+    search for it has cost.
+    """
+    return len(h.effects) == 1 and h.effects[0].absent
+
+
 def wide(h: Hypothesis, fits: Mapping[frozenset[str], Hypothesis]) -> bool:
     """Whether a law that one of its effects contains does nearly as well in that one's place: then
     more is added to the simpler one.

@@ -111,18 +111,18 @@ class Search:
         for count in range(1, budget.effects):
             if not adequate(best := self.ranked()[0]):
                 self._fit_all([*neighbours.afresh(best, self.records.guess)], again=True)
-            # what a first effect has cost keeps no second one from being looked for
-            if adequate(best := self.ranked()[0]) or (count > 1 and self.budget_exhausted):
+            event = leaders.an_event(best := self.ranked()[0])
+            if adequate(best) or (self.budget_exhausted and not event):
                 break
             self.tell(f"{count + 1} effects together")
             rows = best.whitened.rows
             near = rows + settings.fits.far * max(best.minimum.chi2 - rows, float(np.sqrt(rows)))
             simple = leaders.to_extend(self.ranked(), self.fits)
             for h in simple[: budget.leading if count == 1 else 1]:
-                first = count == 1 and h is simple[0]
                 if len(h.effects) < budget.effects and (h is simple[0] or h.minimum.chi2 < near):
                     self._extend(h, budget.beside_one if count == 1 else budget.beside_more,
-                                 always=law if first else nothing, anyway=first)
+                                 always=law if count == 1 and h is simple[0] else nothing,
+                                 anyway=event and h is best)
             if self.ranked()[0] is best or (
                     len(best.effects) > 1 and not self.predicts(best, self.ranked()[0])):
                 break
