@@ -70,7 +70,11 @@ def explained(t: np.ndarray, y: np.ndarray, inputs: Sequence[HeldInput], lags: i
     sharp = gaps.std(axis=0) > SMOOTH * moves
     said, _ = _robust(gap, gaps[:, sharp])
     sizes = np.linalg.lstsq(gaps[:, sharp], said, rcond=None)[0]
-    return np.asarray((X - X.mean(axis=0))[:, sharp] @ sizes)
+    part = np.asarray((X - X.mean(axis=0))[:, sharp] @ sizes)
+    # an input that a controller drives knows the noise of earlier samples, which is no motion
+    if not all(rests(u) for u in inputs) and np.std(np.diff(part)) > np.std(np.diff(y)):
+        return nothing
+    return part
 
 
 def _robust(wanted: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
@@ -91,18 +95,17 @@ def _robust(wanted: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]
 
 def _past(t: np.ndarray, inputs: Sequence[HeldInput], lags: int, uneven: bool
           ) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (N, k), and how far each moves in an interval (k,): every input that moves now and
-    then, at the same instant and earlier; between `uneven` samples its integral as well, which has
-    the corners of a slow rig where they are.  Between even ones the past has them, and the two
-    would be alike.
+    """Columns (N, k), and how far each moves in an interval (k,): every input that moves, one
+    interval ago and more; between `uneven` samples its integral as well, which has the corners of
+    a slow rig where they are.  Between even ones the past has them, and the two would be alike.
 
-    One that a controller drives knows the noise of all samples before: it would explain that.
+    At the same instant an input may know the output's noise, where a controller drives it; one that
+    stands still at most samples does not, and an output may follow it at once.
     """
     step = float(np.median(np.diff(t)))
     columns, moves = [np.empty((len(t), 0))], [np.empty(0)]
-    for u in (u for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0
-              and rests(u)):
-        own = np.stack([u.at(t, k * step) for k in range(lags + 1)], axis=1)
+    for u in (u for u in inputs if np.all(np.isfinite(u.values)) and np.ptp(u.values) > 0):
+        own = np.stack([u.at(t, k * step) for k in range(not rests(u), lags + 1)], axis=1)
         own = own[:, np.ptp(own, axis=0) > 0]
         columns.append(own)
         moves.append(own.std(axis=0))
@@ -119,7 +122,7 @@ def rests(u: HeldInput) -> bool:
     >>> rests(HeldInput("u", t, np.sin(t), "zero")), rests(HeldInput("u", t, np.ones(4), "zero"))
     (False, True)
     """
-    return bool(np.mean(np.diff(u.values) != 0.0) < RESTS)
+    return bool(np.sum(np.diff(u.values) != 0.0) < RESTS * max(len(u.values) - 1, 1))
 
 
 def _integral(u: HeldInput, t: np.ndarray) -> np.ndarray:
