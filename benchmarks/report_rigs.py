@@ -146,7 +146,9 @@ four are laws of no catalogue.  With what followed (a push that is as loud as al
 beside lasting effects, a linear coupling is compared with one in the product of both states, a
 constant force with curves of inputs that act elsewhere) a rectified drive that had been a constant
 force is that or a curve of an input, and a lag beside a push of 106 sigma, which had not been sure,
-is right; the answers of before are reported.
+is right; the answers of before are reported.  cart_pole_upright at 0.5 % was answered later,
+blindly as well, by code in which an input that moves at every sample may know that one's noise: its
+wrong answer is a delay of the input, where a lag of a sensor acts besides.
 
 Of rounds 1 to 3, the code after round 4 has answered all sets of cascaded_tanks, dc_motor and
 thermal_rc again but three (cascaded_tanks at 5 % of round 1 and at 0.5 % of round 2, dc_motor at
