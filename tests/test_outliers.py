@@ -13,7 +13,13 @@ from pikanid import Model, Recording
 from pikanid.mismatch.catalogue.friction import coulomb_friction
 from pikanid.mismatch.catalogue.sites import sites
 from pikanid.mismatch.data.noise_level import bridged, refined
-from pikanid.mismatch.data.outliers import lone, not_lone, without_lone, without_outliers
+from pikanid.mismatch.data.outliers import (
+    gaps_asked,
+    lone,
+    not_lone,
+    without_lone,
+    without_outliers,
+)
 from pikanid.mismatch.data.records import Records
 from pikanid.mismatch.fitting.fit import fitted
 from pikanid.mismatch.settings.settings import DEFAULTS
@@ -69,13 +75,27 @@ def test_small_errors_that_hide_in_a_motion_show_in_the_residual() -> None:
     assert len(left) < len(hit) + 3
 
 
+def left_of(*residuals: np.ndarray) -> list[int]:
+    """Samples of each that are alone."""
+    gaps = gaps_asked(residuals, DEFAULTS.noise)
+    return [len(r) - len(not_lone(r, DEFAULTS.noise, gaps)) for r in residuals]
+
+
 def test_white_noise_has_no_outliers() -> None:
     """Of 300 recordings of 1500 samples one holds a sample that is 5 sigma off, 1 in 400,000."""
-    left = sum(len(not_lone(noise(1500, seed=s), DEFAULTS.noise)) < 1500 for s in range(300))
+    left = sum(left_of(noise(1500, seed=s)) != [0] for s in range(300))
     assert left <= 6  # 3 by chance at RARE, of which P(> 6) is 3 %, and one
     few = noise(1500, seed=1)
     few[[300, 900]] += 12.0
-    assert set(range(1500)) - set(not_lone(few, DEFAULTS.noise)) == {300, 900}
+    gaps = gaps_asked([few], DEFAULTS.noise)
+    assert set(range(1500)) - set(not_lone(few, DEFAULTS.noise, gaps)) == {300, 900}
+
+
+def test_outliers_of_many_short_pieces_count_together() -> None:
+    pieces = [noise(100, seed=s) for s in range(30)]
+    for piece in pieces[::3]:
+        piece[50] += 5.0
+    assert sum(left_of(*pieces)) > 2 * sum(left_of(p)[0] for p in pieces)
 
 
 @pytest.mark.parametrize("turn", [10, 12, 16, 30])

@@ -146,22 +146,24 @@ def lone(residual: np.ndarray, noise: NoiseSettings, gaps: float | None = None) 
     return far & (swung > noise.off_cubic * np.median(swung)) & few
 
 
-def not_lone(residual: np.ndarray, noise: NoiseSettings) -> np.ndarray:
-    """Which samples (increasing) of a residual (N,) are not alone; where no more are than by
-    chance, only what chance does not make at all is.
-    """
-    def kept_by(gaps: float) -> np.ndarray:
-        kept = np.arange(len(residual))
-        # two that are neighbours hide each other: the second shows when the first has gone
-        while (bad := lone(residual[kept], noise, gaps)).any() and (
-                len(kept) > (1 - noise.most_outliers) * len(residual)):
-            kept = kept[~bad]
-        return kept
+def not_lone(residual: np.ndarray, noise: NoiseSettings, gaps: float) -> np.ndarray:
+    """Which samples (increasing) of a residual (N,) are not alone, by so many median gaps."""
+    kept = np.arange(len(residual))
+    # two that are neighbours hide each other: the second shows when the first has gone
+    while (bad := lone(residual[kept], noise, gaps)).any() and (
+            len(kept) > (1 - noise.most_outliers) * len(residual)):
+        kept = kept[~bad]
+    return kept
 
-    kept = kept_by(noise.lone)
-    count = len(_events(np.setdiff1d(np.arange(len(residual)), kept)))
-    chance = binom.sf(count - 1, len(residual), noise.lone_rate)
-    return kept if chance < RARE else kept_by(noise.lone_few)
+
+def gaps_asked(residuals: Sequence[np.ndarray], noise: NoiseSettings) -> float:
+    """Median gaps from which on samples of an output's residuals (N,) are alone: where no more are
+    than by chance, in all of them together, only what chance does not make at all is.
+    """
+    count = sum(len(_events(np.setdiff1d(np.arange(len(r)), not_lone(r, noise, noise.lone))))
+                for r in residuals)
+    chance = binom.sf(count - 1, sum(map(len, residuals)), noise.lone_rate)
+    return noise.lone if chance < RARE else noise.lone_few
 
 
 def with_humps(residual: np.ndarray, kept: np.ndarray, together: int) -> np.ndarray:
@@ -193,12 +195,16 @@ def without_lone(records: Records, seen: Iterable[tuple[int, str, np.ndarray, np
     found = list(records.left_out)
     of = {(r, name): (t, left) for r, name, t, left in seen}
     names = list(dict.fromkeys(name for _, name in of))
+    seen_in: dict[str, list[tuple[list[int], np.ndarray, np.ndarray]]] = {n: [] for n in names}
     for own, name in ((own, name) for own in records.stretches for name in names):
         t, left = (np.concatenate([of[r, name][k] for r in own if (r, name) in of] or [np.empty(0)])
                    for k in (0, 1))
-        residual = left - from_inputs(
-            as_one([recordings[r] for r in own]), t, left, inputs, records.settings)
-        alone = not_lone(residual, noise)
+        seen_in[name].append((own, t, left - from_inputs(
+            as_one([recordings[r] for r in own]), t, left, inputs, records.settings)))
+    asked = {n: gaps_asked([r for *_, r in some], noise) for n, some in seen_in.items()}
+    for own, name, t, residual in ((own, name, t, r) for name, some in seen_in.items()
+                                   for own, t, r in some):
+        alone = not_lone(residual, noise, asked[name])
         kept = with_humps(residual, alone, noise.together)
         gone = np.setdiff1d(np.arange(len(t)), kept)
         # where most of what looked alone was not, it is all of one misfit
