@@ -45,7 +45,7 @@ class FitSettings:
     slow: Share = 0.7
     other_order: Amount = 1.0
     lower_hill: Amount = 1.0
-    hop_again: Share = 0.1
+    hop_again: Share = 0.02
     rows_a_parameter: Count = 10
 
 
