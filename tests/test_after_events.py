@@ -9,6 +9,7 @@ import pytest
 
 from pikanid.mismatch.search import leaders
 from pikanid.mismatch.search.search import Search
+from pikanid.mismatch.settings.settings import DEFAULTS
 
 PUSH, DRAG = (SimpleNamespace(key=k, absent=a) for k, a in (("push", True), ("drag", False)))
 
@@ -46,9 +47,9 @@ def test_no_budget_keeps_what_lasts_from_being_looked_for(
 
     monkeypatch.setattr("pikanid.mismatch.search.search.neighbours.afresh", lambda *args: ())
     monkeypatch.setattr("pikanid.mismatch.search.search.neighbours.with_events", after)
-    from pikanid.mismatch.settings.settings import DEFAULTS
+    nominal: Any = SimpleNamespace(name="any")
     records: Any = SimpleNamespace(settings=DEFAULTS, guess={})
-    search = Search(SimpleNamespace(name="any"), records, ())  # type: ignore[arg-type]
+    search = Search(nominal, records, ())
     with pytest.raises(Stopped):
         search.grow(lambda h: False)
     assert tried == ([True] if goes_on else [])

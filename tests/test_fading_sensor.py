@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -33,7 +35,7 @@ def lift() -> Model:
         "outputs": {"x": {"unit": "m", "expression": "x"}}})
 
 
-def run(f, steps: np.ndarray, dt: float) -> np.ndarray:  # type: ignore[no-untyped-def]
+def run(f: Callable[[np.ndarray, float], list[float]], steps: np.ndarray, dt: float) -> np.ndarray:
     """States (N, 2) at the beginning of every step, from rest."""
     x, rows = np.zeros(2), []
     for u in steps:
