@@ -8,7 +8,8 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 import pikanid as pk
-from pikanid.mismatch.fitting.repeats import Spectra, modes_beside, same_experiment
+from pikanid.mismatch.fitting.repeats import Spectra, modes_beside
+from pikanid.mismatch.fitting.same_experiment import same_experiment
 from pikanid.mismatch.settings.settings import DEFAULTS
 from pikanid.mismatch.steps.opening import open_case
 from pikanid.noise.level import NoiseModel
@@ -89,6 +90,25 @@ def test_another_motion_is_no_repeat() -> None:
     assert same_experiment(model, [swing(0.5, 0), swing(0.52, 1)], DEFAULTS.noise)
     assert not same_experiment(model, [swing(0.5, 0), swing(0.2, 1)], DEFAULTS.noise)
     assert not same_experiment(model, [swing(0.5, 0), swing(0.5, 1, 5.0)], DEFAULTS.noise)
+
+
+def test_another_temperature_is_no_repeat() -> None:
+    model = pk.systems.pendulum()
+
+    def swing(warm: float, seed: int, drift: float = 0.0) -> pk.Recording:
+        t = np.arange(0, 10.0, 0.02)
+        draw = np.random.default_rng(seed)
+        return pk.Recording.from_arrays(
+            t, {"theta": 0.5 * np.exp(-0.05 * t) * np.cos(6 * t)
+                + 0.001 * draw.standard_normal(len(t)),
+                "T_air": warm + drift * t + 0.1 * draw.standard_normal(len(t)),
+                "shake": draw.standard_normal(len(t))},
+            {"theta": "rad", "T_air": "degC", "shake": "m/s^2"})
+
+    assert same_experiment(model, [swing(20.0, 0), swing(20.1, 1)], DEFAULTS.noise)
+    assert same_experiment(model, [swing(20.0, 0, 0.1), swing(20.0, 1, 0.1)], DEFAULTS.noise)
+    assert not same_experiment(model, [swing(20.0, 0), swing(24.0, 1)], DEFAULTS.noise)
+    assert not same_experiment(model, [swing(20.0, 0), swing(20.0, 1, 0.1)], DEFAULTS.noise)
 
 
 def drop(drag: float, seed: int, level: float = 0.03) -> pk.Recording:
