@@ -19,6 +19,8 @@ from pikanid.errors import BadModel, BadUnit
 from pikanid.formula.expressions import symbol
 from pikanid.formula.units import convert
 from pikanid.model import Input, Output
+from pikanid.model.checks import Checked
+from pikanid.model.units import coherent
 from pikanid.simulation import simulate
 
 T = np.linspace(0.0, 2.0, 41)
@@ -255,7 +257,8 @@ def test_every_effect_of_the_catalogue_can_be_added_in_units_that_are_not_si(
     made = 0
     for candidate in candidates(sites(model, (rec,))):
         if candidate.suits():
-            candidate.applied(model)
+            applied = candidate.applied(model)
+            assert not coherent(applied, Checked())  # what was kept from the model needs nothing
             made += 1
     assert made > 25
 

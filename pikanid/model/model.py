@@ -107,7 +107,7 @@ class Model(Operations):
         parts: tuple[State | Input | Parameter | Output, ...] = (
             *self.states, *self.inputs, *self.parameters, *self.outputs)
         model_units.check(part for part in parts if not checked.holds(part))
-        for name, value in model_units.coherent(self).items():
+        for name, value in model_units.coherent(self, checked).items():
             put(self, name, MappingProxyType(value) if name == "equations" else value)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -22,6 +22,7 @@ import sympy as sp
 
 from pikanid import errors
 from pikanid.formula import units
+from pikanid.model.checks import Checked
 from pikanid.model.lookup import Lookup
 from pikanid.model.parts import Input, Output, Parameter, State
 from pikanid.model.shown_rates import showing
@@ -38,8 +39,13 @@ def check(parts: Iterable[State | Input | Parameter | Output]) -> None:
         units.check(part.unit, f"{type(part).__name__.lower()} '{part.name}'")
 
 
-def coherent(model: Lookup) -> dict[str, Any]:
+def coherent(model: Lookup, checked: Checked) -> dict[str, Any]:
     """The fields of a model in which factors between units are missing; none as a rule.
+
+    Args:
+        model: To be put into one form.
+        checked: What it was made from: formulas that stay have all that they need, as long as no
+            name changes its unit.
 
     Returns:
         Field -> new value: equations, states, inputs, outputs, and the parameters with those that
@@ -48,11 +54,12 @@ def coherent(model: Lookup) -> dict[str, Any]:
     Raises:
         BadUnit: If units meet that cannot be converted.
     """
-    named: list[State | Input | Parameter] = [*model.states, *model.inputs, *model.parameters]
+    named = _named(model)
     if all(units.is_coherent(part.unit) for part in [*named, *model.outputs]):
         return {}
     conversion = Conversion({p.name: p for p in named})
-    changes = _converted(model, conversion.put)
+    same = checked.model is not None and _units(checked.model).items() <= _units(model).items()
+    changes = _converted(model, conversion.put, checked if same else Checked())
     if not conversion.used:
         return {}
     return {**changes, "parameters": (*model.parameters, *conversion.added)}
@@ -74,24 +81,33 @@ def disagreements(model: Lookup) -> tuple[str, ...]:
     ("The equation of 'v': '-c*v/m' comes out in 'N*m/(kg*s)' where 'm/s^2' is needed; \
 its numbers are used as they are: check the formula and its units.",)
     """
-    named: list[State | Input | Parameter] = [*model.states, *model.inputs, *model.parameters]
-    conversion = Conversion({p.name: p for p in named})
-    _converted(model, conversion.put)
+    conversion = Conversion({p.name: p for p in _named(model)})
+    _converted(model, conversion.put, Checked())
     return tuple(conversion.disagreements.values())
 
 
-def _converted(model: Lookup, put: Callable[..., sp.Expr]) -> dict[str, Any]:
-    """The fields of a model that hold formulas, each formula put into the unit of its place."""
+def _named(model: Lookup) -> list[State | Input | Parameter]:
+    return [*model.states, *model.inputs, *model.parameters]
+
+
+def _units(model: Lookup) -> dict[str, str]:
+    return {p.name: p.unit for p in _named(model)}
+
+
+def _converted(model: Lookup, put: Callable[..., sp.Expr], checked: Checked) -> dict[str, Any]:
+    """The fields of a model that hold formulas, each new formula put into the unit of its place."""
     rates = {s.name: declared(s.unit, s.name).times(SECOND, Fraction(-1)) for s in model.states}
-    equations = {name: put(e, rates[name], f"The equation of '{name}'")
-                 for name, e in model.equations.items()}
+    before = checked.model.equations if checked.model else {}
+    equations = {
+        name: e if before.get(name) == e else put(e, rates[name], f"The equation of '{name}'")
+        for name, e in model.equations.items()}
     return {
         "equations": equations,
-        "states": tuple(dataclasses.replace(s, initial=put(
+        "states": tuple(s if checked.holds(s) else dataclasses.replace(s, initial=put(
             s.initial, declared(s.unit), f"The initial value of '{s.name}'", open_=not s.unit))
             for s in model.states),
-        "inputs": tuple(_input(i, put) for i in model.inputs),
-        "outputs": tuple(showing(
+        "inputs": tuple(i if checked.holds(i) else _input(i, put) for i in model.inputs),
+        "outputs": tuple(o if checked.holds(o) else showing(
             dataclasses.replace(o, delay=put(o.delay, SECOND, f"The delay of output '{o.name}'")),
             put(o.formula, declared(o.unit), f"Output '{o.name}'", open_=not o.unit), equations)
             for o in model.outputs)}
@@ -99,8 +115,7 @@ def _converted(model: Lookup, put: Callable[..., sp.Expr]) -> dict[str, Any]:
 
 def of_formula(model: Lookup, expr: sp.Expr) -> str:
     """The unit in which a formula of a model comes out, "" where it has none."""
-    named: list[State | Input | Parameter] = [*model.states, *model.inputs, *model.parameters]
-    return Conversion({p.name: p for p in named}).walk(expr, "The formula")[1].text
+    return Conversion({p.name: p for p in _named(model)}).walk(expr, "The formula")[1].text
 
 
 def of_difference(text: str) -> str:
