@@ -109,6 +109,9 @@ def test_another_temperature_is_no_repeat() -> None:
     assert same_experiment(model, [swing(20.0, 0, 0.1), swing(20.0, 1, 0.1)], DEFAULTS.noise)
     assert not same_experiment(model, [swing(20.0, 0), swing(24.0, 1)], DEFAULTS.noise)
     assert not same_experiment(model, [swing(20.0, 0), swing(20.0, 1, 0.1)], DEFAULTS.noise)
+    # a column without values tells nothing
+    assert same_experiment(model, [swing(20.0, 0), swing(np.nan, 1)], DEFAULTS.noise)
+    assert same_experiment(model, [swing(np.nan, 0), swing(20.0, 1)], DEFAULTS.noise)
 
 
 def drop(drag: float, seed: int, level: float = 0.03) -> pk.Recording:

@@ -76,8 +76,10 @@ def _differs(first: Recording, other: Recording, name: str, span: float,
     """Whether a channel that the model does not use, such as a temperature, differs by more than
     its own noise: what differs with it is none.
     """
-    gap, values = _gap(first, other, name, span), _begin(first, name)[1]
-    noise = np.mean(np.diff(gap) ** 2) / 2 if len(gap) > 1 else 0.0
+    if not len(_begin(other, name)[1]) or len(gap := _gap(first, other, name, span)) < 2:
+        return False  # a column without values tells nothing
+    values = _begin(first, name)[1]
+    noise = np.mean(np.diff(gap) ** 2) / 2
     return bool(np.mean(gap**2) - noise > (alike.driven_alike * _rms(values)) ** 2
                 + (alike.moved_alike * np.std(values)) ** 2)
 
